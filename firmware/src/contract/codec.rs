@@ -1,0 +1,226 @@
+//! Bytes of a table: fixed header, postcard payload, CRC-32.
+//!
+//! | offset | bytes | little-endian content |
+//! |---|---|---|
+//! | 0 | 8 | magic `STILLPT\0` |
+//! | 8 | 2 | format version |
+//! | 10 | 1 | scalar kind: 4 = f32, 8 = f64 |
+//! | 11 | 1 | dimension of space |
+//! | 12 | 2 | paddle degrees of freedom |
+//! | 14 | 2 | reserved, 0 |
+//! | 16 | 32 | SHA-256 of the scene |
+//! | 48 | 4 | length L of the payload |
+//! | 52 | L | payload: [`Table`] in postcard |
+//! | 52 + L | 4 | CRC-32 (ISO-HDLC) over everything before it |
+//!
+//! Everything is checked before the payload is decoded, and nothing is allocated for lengths that a file claims.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+use super::{Table, TableError};
+use crate::scalar::{Scalar, ScalarKind};
+
+/// Version of the table format. postcard cannot append fields compatibly, so every change of the payload bumps it.
+pub const FORMAT_VERSION: u16 = 1;
+
+/// Bytes before the payload.
+pub const HEADER_BYTES: usize = 52;
+
+/// A buffer of this size holds every encoded table of dimension 2 or 3.
+pub const MAX_TABLE_BYTES: usize = 64 * 1024;
+
+const MAGIC: [u8; 8] = *b"STILLPT\0";
+const CHECKSUM_BYTES: usize = 4;
+const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Header of a table, readable without knowing the type of the payload.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// Version of the format.
+    pub format_version: u16,
+    /// Type of the numbers.
+    pub scalar: ScalarKind,
+    /// Dimension of space.
+    pub dimension: u8,
+    /// Degrees of freedom of the paddle.
+    pub paddle_dof: u16,
+    /// SHA-256 of the scene.
+    pub scene_hash: [u8; 32],
+    /// Length of the payload, bytes.
+    pub payload_bytes: u32,
+}
+
+impl Header {
+    /// Reads the header of a whole table file and checks everything that needs no payload type: magic, version,
+    /// reserved bytes, length and checksum.
+    ///
+    /// # Errors
+    /// The first check that fails, as its own [`TableError`].
+    pub fn read(bytes: &[u8]) -> Result<Self, TableError> {
+        split(bytes).map(|(header, _)| header)
+    }
+
+    fn parse(bytes: &[u8; HEADER_BYTES]) -> Result<Self, TableError> {
+        let mut reader = Reader(bytes);
+        if reader.take::<8>()? != MAGIC {
+            return Err(TableError::NotATable);
+        }
+        let format_version = u16::from_le_bytes(reader.take()?);
+        if format_version != FORMAT_VERSION {
+            return Err(TableError::FormatVersion {
+                found: format_version,
+            });
+        }
+        let [scalar, dimension] = reader.take()?;
+        let paddle_dof = u16::from_le_bytes(reader.take()?);
+        if reader.take()? != [0, 0] {
+            return Err(TableError::Reserved);
+        }
+        Ok(Self {
+            format_version,
+            scalar: ScalarKind::from_byte(scalar)
+                .ok_or(TableError::UnknownScalar { found: scalar })?,
+            dimension,
+            paddle_dof,
+            scene_hash: reader.take()?,
+            payload_bytes: u32::from_le_bytes(reader.take()?),
+        })
+    }
+
+    fn to_bytes(self) -> [u8; HEADER_BYTES] {
+        let mut bytes = [0; HEADER_BYTES];
+        let fields = MAGIC
+            .into_iter()
+            .chain(self.format_version.to_le_bytes())
+            .chain([self.scalar as u8, self.dimension])
+            .chain(self.paddle_dof.to_le_bytes())
+            .chain([0, 0])
+            .chain(self.scene_hash)
+            .chain(self.payload_bytes.to_le_bytes());
+        for (byte, value) in bytes.iter_mut().zip(fields) {
+            *byte = value;
+        }
+        bytes
+    }
+}
+
+/// Writes `table` into the front of `buffer` and returns the number of bytes used.
+/// [`MAX_TABLE_BYTES`] are always enough.
+///
+/// # Errors
+/// [`TableError::BufferTooSmall`], or what [`Table::validate`] refuses: an invalid table is never written.
+pub fn encode<T: Scalar, const D: usize>(
+    table: &Table<T, D>,
+    buffer: &mut [u8],
+) -> Result<usize, TableError> {
+    table.validate()?;
+    let too_small = TableError::BufferTooSmall {
+        bytes: buffer.len(),
+    };
+    let (header, body) = buffer
+        .split_first_chunk_mut::<HEADER_BYTES>()
+        .ok_or(too_small)?;
+    let payload_bytes = postcard::to_slice(table, body)
+        .map_err(|_| too_small)?
+        .len();
+    *header = Header {
+        format_version: FORMAT_VERSION,
+        scalar: T::KIND,
+        dimension: u8::try_from(D).map_err(|_| TableError::Dimension {
+            found: D,
+            expected: 3,
+        })?,
+        paddle_dof: u16::try_from(D).map_err(|_| TableError::PaddleDof {
+            found: D,
+            expected: 3,
+        })?,
+        scene_hash: table.scene_hash,
+        payload_bytes: u32::try_from(payload_bytes).map_err(|_| too_small)?,
+    }
+    .to_bytes();
+    let covered = HEADER_BYTES + payload_bytes;
+    let (content, rest) = buffer.split_at_mut_checked(covered).ok_or(too_small)?;
+    *rest.first_chunk_mut().ok_or(too_small)? = CRC.checksum(content).to_le_bytes();
+    Ok(covered + CHECKSUM_BYTES)
+}
+
+/// Reads a table, checking everything: header, length, checksum, types, payload, invariants.
+///
+/// # Errors
+/// The first check that fails, as its own [`TableError`].
+pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, TableError> {
+    let (header, payload) = split(bytes)?;
+    if header.scalar != T::KIND {
+        return Err(TableError::ScalarKind {
+            found: header.scalar.name(),
+            expected: T::KIND.name(),
+        });
+    }
+    if usize::from(header.dimension) != D {
+        return Err(TableError::Dimension {
+            found: header.dimension.into(),
+            expected: D,
+        });
+    }
+    if usize::from(header.paddle_dof) != D {
+        return Err(TableError::PaddleDof {
+            found: header.paddle_dof.into(),
+            expected: D,
+        });
+    }
+    let (mut table, rest) =
+        postcard::take_from_bytes::<Table<T, D>>(payload).map_err(|_| TableError::Payload)?;
+    if !rest.is_empty() {
+        return Err(TableError::PayloadTrailing { extra: rest.len() });
+    }
+    table.scene_hash = header.scene_hash;
+    table.validate()?;
+    Ok(table)
+}
+
+/// Header and payload of an intact file.
+fn split(bytes: &[u8]) -> Result<(Header, &[u8]), TableError> {
+    let too_short = TableError::TooShort { bytes: bytes.len() };
+    let (content, checksum) = bytes
+        .split_last_chunk::<CHECKSUM_BYTES>()
+        .ok_or(too_short)?;
+    let (head, payload) = content
+        .split_first_chunk::<HEADER_BYTES>()
+        .ok_or(too_short)?;
+    let header = Header::parse(head)?;
+    let claimed = header.payload_bytes as usize;
+    if claimed > payload.len() {
+        return Err(TableError::Truncated {
+            missing: claimed - payload.len(),
+        });
+    }
+    if claimed < payload.len() {
+        return Err(TableError::TrailingBytes {
+            extra: payload.len() - claimed,
+        });
+    }
+    let (written, computed) = (u32::from_le_bytes(*checksum), CRC.checksum(content));
+    if written != computed {
+        return Err(TableError::Checksum { written, computed });
+    }
+    Ok((header, payload))
+}
+
+/// Takes fixed-size fields off the front of the header.
+struct Reader<'a>(&'a [u8]);
+
+impl Reader<'_> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], TableError> {
+        let (field, rest) = self
+            .0
+            .split_first_chunk::<N>()
+            .ok_or(TableError::TooShort {
+                bytes: self.0.len(),
+            })?;
+        self.0 = rest;
+        Ok(*field)
+    }
+}
+
+#[cfg(test)]
+mod tests;

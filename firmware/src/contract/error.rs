@@ -1,0 +1,231 @@
+//! Why a table is refused, and what to do about it.
+
+use core::fmt;
+
+/// Refusal of a controller table. Each variant says what was wrong; its `Display` also says what to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TableError {
+    /// Fewer bytes than a header and a checksum.
+    TooShort {
+        /// Bytes given.
+        bytes: usize,
+    },
+    /// The file does not start with the magic of a table.
+    NotATable,
+    /// Written in another version of the format.
+    FormatVersion {
+        /// Version found.
+        found: u16,
+    },
+    /// Reserved header bytes are not zero.
+    Reserved,
+    /// The scalar kind byte is none that any version wrote.
+    UnknownScalar {
+        /// Byte found.
+        found: u8,
+    },
+    /// Shorter than the header says.
+    Truncated {
+        /// Payload bytes missing.
+        missing: usize,
+    },
+    /// Longer than the header says.
+    TrailingBytes {
+        /// Bytes too many.
+        extra: usize,
+    },
+    /// CRC-32 over header and payload does not match.
+    Checksum {
+        /// CRC written in the file.
+        written: u32,
+        /// CRC of the bytes.
+        computed: u32,
+    },
+    /// Intact, but holds another scalar type than asked for.
+    ScalarKind {
+        /// Kind of the file.
+        found: &'static str,
+        /// Kind asked for.
+        expected: &'static str,
+    },
+    /// Intact, but for another dimension of space.
+    Dimension {
+        /// Dimension of the file.
+        found: usize,
+        /// Dimension asked for.
+        expected: usize,
+    },
+    /// Intact, but for another number of paddle degrees of freedom.
+    PaddleDof {
+        /// Number in the file.
+        found: usize,
+        /// Number asked for.
+        expected: usize,
+    },
+    /// The payload is not a table in this format, although its checksum is right.
+    Payload,
+    /// The payload goes on after the table.
+    PayloadTrailing {
+        /// Bytes too many.
+        extra: usize,
+    },
+    /// A number is NaN or infinite.
+    NotFinite {
+        /// Field that holds it.
+        field: &'static str,
+    },
+    /// A number that must be positive is not.
+    NotPositive {
+        /// Field that holds it.
+        field: &'static str,
+    },
+    /// A direction is not a unit vector.
+    NotUnit {
+        /// Field that holds it.
+        field: &'static str,
+    },
+    /// The unit vector n is not orthogonal to the needle axis.
+    NotOrthogonal,
+    /// Fewer than two knots.
+    TooFewKnots {
+        /// Knots found.
+        found: usize,
+    },
+    /// Depths do not increase strictly.
+    DepthOrder {
+        /// First knot that is not deeper than its predecessor.
+        knot: usize,
+    },
+    /// The validity range of depth is not that of the knots.
+    DepthRange,
+    /// The paddle may go further than the table is valid.
+    DisplacementRange,
+    /// A Jacobian is singular or too close to it.
+    IllConditioned {
+        /// Knot with that Jacobian.
+        knot: usize,
+    },
+    /// The feed-forward path leaves the paddle's range.
+    PathBeyondLimit {
+        /// Knot whose path does.
+        knot: usize,
+    },
+    /// The suggested gain is outside (0, 1) or the model error margin is below 1.
+    Gains,
+    /// The output buffer cannot hold the table.
+    BufferTooSmall {
+        /// Bytes given.
+        bytes: usize,
+    },
+}
+
+impl fmt::Display for TableError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const REWRITE: &str = "the file is damaged: write it again with `model-offline table`";
+        match *self {
+            Self::TooShort { bytes } => {
+                write!(f, "{bytes} bytes cannot hold a controller table; {REWRITE}")
+            }
+            Self::NotATable => write!(
+                f,
+                "not a controller table: give a file written by `model-offline table`"
+            ),
+            Self::FormatVersion { found } => write!(
+                f,
+                "table format version {found}, this build reads version {}: write the table again with the \
+                 `model-offline` of this build",
+                super::codec::FORMAT_VERSION
+            ),
+            Self::Reserved => write!(f, "reserved header bytes are not zero; {REWRITE}"),
+            Self::UnknownScalar { found } => write!(f, "unknown scalar kind {found}; {REWRITE}"),
+            Self::Truncated { missing } => {
+                write!(f, "the last {missing} bytes are missing; {REWRITE}")
+            }
+            Self::TrailingBytes { extra } => write!(f, "{extra} bytes follow the table; {REWRITE}"),
+            Self::Checksum { written, computed } => {
+                write!(
+                    f,
+                    "checksum {computed:08x}, the file says {written:08x}; {REWRITE}"
+                )
+            }
+            Self::ScalarKind { found, expected } => {
+                write!(
+                    f,
+                    "the table holds {found}, this controller computes in {expected}: write it as {expected}"
+                )
+            }
+            Self::Dimension { found, expected } => {
+                write!(
+                    f,
+                    "the table is {found}-dimensional, this controller {expected}-dimensional"
+                )
+            }
+            Self::PaddleDof { found, expected } => {
+                write!(
+                    f,
+                    "the table has {found} paddle degrees of freedom, this controller {expected}"
+                )
+            }
+            Self::Payload => write!(
+                f,
+                "the payload is no table although its checksum is right; {REWRITE}"
+            ),
+            Self::PayloadTrailing { extra } => {
+                write!(f, "the payload is {extra} bytes too long; {REWRITE}")
+            }
+            Self::NotFinite { field } => write!(
+                f,
+                "{field} is not a finite number: check the scene, solve again"
+            ),
+            Self::NotPositive { field } => write!(f, "{field} must be positive: correct the scene"),
+            Self::NotUnit { field } => write!(
+                f,
+                "{field} is not a unit vector: normalise it before writing"
+            ),
+            Self::NotOrthogonal => write!(
+                f,
+                "n is not orthogonal to the needle axis: project it before writing"
+            ),
+            Self::TooFewKnots { found } => {
+                write!(f, "{found} knots in depth, at least 2 are needed")
+            }
+            Self::DepthOrder { knot } => write!(
+                f,
+                "knot {knot} is not deeper than the one before it: sort the knots"
+            ),
+            Self::DepthRange => write!(
+                f,
+                "validity must start at the first knot's depth and end at the last one's"
+            ),
+            Self::DisplacementRange => {
+                write!(
+                    f,
+                    "the paddle's limit exceeds the range where the table is valid: lower the limit"
+                )
+            }
+            Self::IllConditioned { knot } => write!(
+                f,
+                "the Jacobian of knot {knot} is (nearly) singular: this paddle cannot control the target, choose another"
+            ),
+            Self::PathBeyondLimit { knot } => {
+                write!(
+                    f,
+                    "the feed-forward path leaves the paddle's range at knot {knot}: raise the paddle's limit"
+                )
+            }
+            Self::Gains => write!(
+                f,
+                "the suggested gain must lie in (0, 1) and lambda_max be at least 1"
+            ),
+            Self::BufferTooSmall { bytes } => {
+                write!(
+                    f,
+                    "{bytes} bytes cannot hold the table: give {}",
+                    super::codec::MAX_TABLE_BYTES
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for TableError {}

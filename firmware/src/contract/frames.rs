@@ -1,0 +1,164 @@
+//! Sample frames: what crosses the boundary of the controller, byte for byte.
+//!
+//! Every frame is `repr(C)`, all-`f64`, and without padding (checked at compile time), so that it can lie in shared
+//! memory, and derives serde, so that postcard can put it on a serial line. Lengths are in the scene's length unit,
+//! times in nanoseconds of one monotonic clock shared by all frames of a run.
+//!
+//! `sequence` counts publications of one stream and wraps at 2³²; its first value is free.
+
+use core::mem::{align_of, size_of};
+
+use serde::{Deserialize, Serialize};
+
+/// Version of the layout of all frames; goes into service names and handshakes.
+pub const LAYOUT_VERSION: u32 = 1;
+
+/// [`TargetSample::flags`]: the sensor saw the target; without it the displacement means nothing.
+pub const TARGET_VISIBLE: u32 = 1 << 0;
+
+/// [`PaddleCommand::flags`]: `displacement` is to be executed. Without it the actuator keeps its position, because
+/// the controller has not yet heard where the paddle is.
+pub const COMMAND_VALID: u32 = 1 << 0;
+
+/// Needle tip as measured, at loop rate.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct NeedleSample {
+    /// Publication counter, wraps.
+    pub sequence: u32,
+    /// Zero; keeps the layout free of padding.
+    pub reserved: u32,
+    /// Time of the measurement, ns.
+    pub time_ns: u64,
+    /// Insertion depth along the needle axis, length.
+    pub depth: f64,
+    /// Rate of the depth, length/s.
+    pub velocity: f64,
+}
+
+/// Displacement of the target from its rest position, at the sensor's own rate.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TargetSample {
+    /// Publication counter, wraps.
+    pub sequence: u32,
+    /// Bit set of [`TARGET_VISIBLE`].
+    pub flags: u32,
+    /// Time of the measurement (not of its arrival), ns.
+    pub time_ns: u64,
+    /// Displacement x, y from the rest position, length.
+    pub displacement: [f64; 2],
+}
+
+impl TargetSample {
+    /// Whether the sensor saw the target.
+    pub const fn is_visible(&self) -> bool {
+        self.flags & TARGET_VISIBLE != 0
+    }
+}
+
+/// Where the paddle is, as measured by its actuator.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PaddleSample {
+    /// Publication counter, wraps.
+    pub sequence: u32,
+    /// Identity of the attached paddle; must be the table's.
+    pub paddle_index: u32,
+    /// Time of the measurement, ns.
+    pub time_ns: u64,
+    /// Displacement x, y of the paddle from where it touches the undeformed tissue, length.
+    pub displacement: [f64; 2],
+}
+
+/// Where the paddle shall be: one per tick, in every state.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PaddleCommand {
+    /// Publication counter, wraps.
+    pub sequence: u32,
+    /// [`crate::supervisor::Mode`] as a number: 1 HOLD, 2 RUN, 3 SAFE.
+    pub state: u32,
+    /// Number of the release that this command belongs to; skipped periods leave gaps.
+    pub tick: u64,
+    /// Time of the tick, ns.
+    pub time_ns: u64,
+    /// Bit set of [`crate::supervisor::Faults`].
+    pub faults: u64,
+    /// Displacement x, y of the paddle, length.
+    pub displacement: [f64; 2],
+    /// Sequence number of the newest needle sample that was used.
+    pub needle_sequence: u32,
+    /// Sequence number of the newest target sample that was used.
+    pub target_sequence: u32,
+    /// Identity of the paddle that the command is for.
+    pub paddle_index: u32,
+    /// Bit set of [`COMMAND_VALID`].
+    pub flags: u32,
+}
+
+impl PaddleCommand {
+    /// Whether the actuator may execute [`displacement`](Self::displacement).
+    pub const fn is_valid(&self) -> bool {
+        self.flags & COMMAND_VALID != 0
+    }
+}
+
+/// A frame is as large as its fields together (no padding) and aligned to 8.
+macro_rules! assert_layout {
+    ($frame:ty, $bytes:expr, $words32:expr, $words64:expr) => {
+        const _: () = {
+            assert!(size_of::<$frame>() == $bytes);
+            assert!(align_of::<$frame>() == 8);
+            assert!($words32 * size_of::<u32>() + $words64 * size_of::<u64>() == $bytes);
+        };
+    };
+}
+
+assert_layout!(NeedleSample, 32, 2, 3);
+assert_layout!(TargetSample, 32, 2, 3);
+assert_layout!(PaddleSample, 32, 2, 3);
+assert_layout!(PaddleCommand, 64, 6, 5);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn round_trip<F: Serialize + for<'de> Deserialize<'de> + PartialEq + core::fmt::Debug>(
+        frame: F,
+    ) {
+        let mut buffer = [0u8; 128];
+        let bytes = postcard::to_slice_cobs(&frame, &mut buffer).unwrap();
+        assert_eq!(postcard::from_bytes_cobs::<F>(bytes).unwrap(), frame);
+    }
+
+    #[test]
+    fn every_frame_survives_the_serial_line() {
+        round_trip(NeedleSample {
+            sequence: u32::MAX,
+            reserved: 0,
+            time_ns: 7,
+            depth: 0.1,
+            velocity: -2.5e-3,
+        });
+        round_trip(TargetSample {
+            sequence: 3,
+            flags: TARGET_VISIBLE,
+            time_ns: 9,
+            displacement: [1e-9, -0.3],
+        });
+        round_trip(PaddleSample {
+            sequence: 3,
+            paddle_index: 4,
+            time_ns: u64::MAX,
+            displacement: [0.0, -0.0],
+        });
+        round_trip(PaddleCommand {
+            state: 2,
+            tick: 1 << 40,
+            faults: 1 << 33,
+            flags: 1,
+            ..PaddleCommand::default()
+        });
+    }
+}

@@ -1,0 +1,157 @@
+//! The controller table: everything that the controller knows about the tissue.
+//!
+//! Written offline from the nonlinear model, read once at start. `D` is the dimension of space and the number of
+//! degrees of freedom of the paddle. Lengths are in the scene's own unit, times in seconds.
+
+use heapless::{String, Vec};
+use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
+
+use crate::scalar::Scalar;
+
+/// Capacity for knots in depth.
+pub const MAX_KNOTS: usize = 256;
+
+/// Labels of the scene's units, for reports only.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Units {
+    /// Unit of lengths.
+    pub length: String<16>,
+    /// Unit of stresses.
+    pub stress: String<16>,
+}
+
+/// The paddle that the table was computed for, and what it may do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Paddle<T: Scalar, const D: usize> {
+    /// Identity, as in the scene file.
+    pub index: u32,
+    /// End points of the paddle on the undeformed boundary, length.
+    pub segment: [SVector<T, D>; 2],
+    /// Largest norm of the displacement, length, > 0.
+    pub max_displacement: T,
+    /// Largest norm of the rate of displacement, length/s, > 0.
+    pub max_rate: T,
+}
+
+/// Where the table holds.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Validity<T: Scalar> {
+    /// Smallest depth: that of the first knot, length.
+    pub depth_start: T,
+    /// Largest depth: that of the last knot, length.
+    pub depth_end: T,
+    /// Largest norm of paddle displacement for which the model was solved, length, ≥ the paddle's limit.
+    pub paddle_displacement: T,
+    /// Largest needle speed for which the quasi-static model holds, length/s, > 0.
+    pub needle_speed: T,
+}
+
+/// Controller settings that the table suggests; see [`crate::stability`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Gains<T: Scalar> {
+    /// Loop gain g per target sample, 0 < g < 1.
+    pub loop_gain: T,
+    /// Delay d of the loop that `loop_gain` was chosen for, target samples.
+    pub delay_samples: u32,
+    /// Largest |λ| of J·Ĵ⁻¹ over the model errors that the scene admits, ≥ 1.
+    pub lambda_max: T,
+}
+
+/// The tissue at one needle depth, on the feed-forward path unless stated otherwise.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Knot<T: Scalar, const D: usize> {
+    /// Needle depth, length.
+    pub depth: T,
+    /// Actuation Jacobian d(target displacement)/d(paddle displacement); rows target, columns paddle.
+    pub jacobian: SMatrix<T, D, D>,
+    /// Paddle displacement that makes the orthogonal target displacement 0 (feed-forward), length.
+    pub paddle_path: SVector<T, D>,
+    /// d(paddle path)/d(depth).
+    pub paddle_path_slope: SVector<T, D>,
+    /// Target displacement with the paddle on the path: the axial motion that remains, length.
+    pub target_displacement: SVector<T, D>,
+    /// d(target displacement)/d(depth) along the path.
+    pub target_displacement_slope: SVector<T, D>,
+    /// Target displacement with the paddle held at zero, length.
+    pub static_target_displacement: SVector<T, D>,
+}
+
+/// Controller table of one paddle; see the module documentation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct Table<T: Scalar, const D: usize> {
+    /// SHA-256 of the scene that the table was computed from. Lives in the header of the file.
+    #[serde(skip)]
+    pub scene_hash: [u8; 32],
+    /// Labels of units.
+    pub units: Units,
+    /// Which tissue was assumed, e.g. `homogeneous` or `inclusion`.
+    pub tissue: String<32>,
+    /// Identity and limits of the paddle.
+    pub paddle: Paddle<T, D>,
+    /// Unit vector along the insertion.
+    pub needle_axis: SVector<T, D>,
+    /// Unit vector n orthogonal to the needle axis.
+    pub orthogonal: SVector<T, D>,
+    /// Rest position of the target, length.
+    pub target_position: SVector<T, D>,
+    /// Where the table holds.
+    pub validity: Validity<T>,
+    /// Suggested settings.
+    pub gains: Gains<T>,
+    /// At least two knots, depth strictly increasing.
+    pub knots: Vec<Knot<T, D>, MAX_KNOTS>,
+}
+
+impl<T: Scalar, const D: usize> Table<T, D> {
+    /// The same table in another scalar type, every number rounded to nearest.
+    ///
+    /// The result is not validated: knots closer than the resolution of `U` fall together.
+    pub fn cast<U: Scalar>(&self) -> Table<U, D> {
+        let scalar = |x: T| U::of(x.to_f64());
+        let vector = |v: &SVector<T, D>| v.map(scalar);
+        Table {
+            scene_hash: self.scene_hash,
+            units: self.units.clone(),
+            tissue: self.tissue.clone(),
+            paddle: Paddle {
+                index: self.paddle.index,
+                segment: self.paddle.segment.map(|end| vector(&end)),
+                max_displacement: scalar(self.paddle.max_displacement),
+                max_rate: scalar(self.paddle.max_rate),
+            },
+            needle_axis: vector(&self.needle_axis),
+            orthogonal: vector(&self.orthogonal),
+            target_position: vector(&self.target_position),
+            validity: Validity {
+                depth_start: scalar(self.validity.depth_start),
+                depth_end: scalar(self.validity.depth_end),
+                paddle_displacement: scalar(self.validity.paddle_displacement),
+                needle_speed: scalar(self.validity.needle_speed),
+            },
+            gains: Gains {
+                loop_gain: scalar(self.gains.loop_gain),
+                delay_samples: self.gains.delay_samples,
+                lambda_max: scalar(self.gains.lambda_max),
+            },
+            knots: self
+                .knots
+                .iter()
+                .map(|knot| Knot {
+                    depth: scalar(knot.depth),
+                    jacobian: knot.jacobian.map(scalar),
+                    paddle_path: vector(&knot.paddle_path),
+                    paddle_path_slope: vector(&knot.paddle_path_slope),
+                    target_displacement: vector(&knot.target_displacement),
+                    target_displacement_slope: vector(&knot.target_displacement_slope),
+                    static_target_displacement: vector(&knot.static_target_displacement),
+                })
+                .collect(),
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The number type that the controller computes with.
+
+use core::fmt::{Debug, Display};
+
+use nalgebra::RealField;
+use serde::{Serialize, de::DeserializeOwned};
+
+/// Which floating-point type a table holds, as written in its header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ScalarKind {
+    /// IEEE 754 binary32.
+    F32 = 4,
+    /// IEEE 754 binary64.
+    F64 = 8,
+}
+
+impl ScalarKind {
+    /// The kind written as `byte`, or `None` for a byte that no version ever wrote.
+    pub const fn from_byte(byte: u8) -> Option<Self> {
+        match byte {
+            4 => Some(Self::F32),
+            8 => Some(Self::F64),
+            _ => None,
+        }
+    }
+
+    /// Name as Rust spells it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::F64 => "f64",
+        }
+    }
+}
+
+/// A real scalar: `f32` or `f64`.
+///
+/// The control law uses only `+ − × ÷ √` and comparisons. IEEE 754 rounds all of these correctly, so the same
+/// inputs give the same bits on every target.
+pub trait Scalar:
+    RealField + Copy + Debug + Display + Default + Serialize + DeserializeOwned
+{
+    /// Kind written into the table header.
+    const KIND: ScalarKind;
+    /// How far the norm of a unit vector may be from 1: a few rounding errors of this type.
+    const UNIT_TOLERANCE: f64;
+
+    /// Nearest value of this type.
+    fn of(value: f64) -> Self;
+    /// Exact value as `f64`.
+    fn to_f64(self) -> f64;
+}
+
+impl Scalar for f32 {
+    const KIND: ScalarKind = ScalarKind::F32;
+    const UNIT_TOLERANCE: f64 = 1e-6;
+
+    fn of(value: f64) -> Self {
+        value as f32
+    }
+
+    fn to_f64(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Scalar for f64 {
+    const KIND: ScalarKind = ScalarKind::F64;
+    const UNIT_TOLERANCE: f64 = 1e-12;
+
+    fn of(value: f64) -> Self {
+        value
+    }
+
+    fn to_f64(self) -> f64 {
+        self
+    }
+}

@@ -1,0 +1,134 @@
+//! Interpolation of the table in needle depth.
+//!
+//! The feed-forward path and the target displacement are cubic Hermite in depth (their slopes are in the table); the
+//! Jacobian is linear. Depths outside the table are clamped to its ends and flagged: nothing is ever extrapolated.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::contract::{Knot, Table};
+use crate::scalar::Scalar;
+
+/// A depth located in the table: the two knots around it and the position between them.
+#[derive(Clone, Copy, Debug)]
+pub struct Location<'t, T: Scalar, const D: usize> {
+    left: &'t Knot<T, D>,
+    right: &'t Knot<T, D>,
+    /// Distance of the knots, length.
+    interval: T,
+    /// 0 at the left knot, 1 at the right one.
+    fraction: T,
+    /// The depth was outside the table and has been moved to its nearest end.
+    pub clamped: bool,
+}
+
+impl<T: Scalar, const D: usize> Table<T, D> {
+    /// Locates `depth` by bisection; `None` only for a table with fewer than two knots, which validation refuses.
+    pub fn locate(&self, depth: T) -> Option<Location<'_, T, D>> {
+        let (first, last) = (self.knots.first()?, self.knots.last()?);
+        let inside = depth.clamp(first.depth, last.depth);
+        let right_index = self
+            .knots
+            .partition_point(|knot| knot.depth <= inside)
+            .clamp(1, self.knots.len() - 1);
+        let (left, right) = (
+            self.knots.get(right_index - 1)?,
+            self.knots.get(right_index)?,
+        );
+        let interval = right.depth - left.depth;
+        Some(Location {
+            left,
+            right,
+            interval,
+            fraction: (inside - left.depth) / interval,
+            clamped: inside != depth,
+        })
+    }
+}
+
+impl<T: Scalar, const D: usize> Location<'_, T, D> {
+    /// Feed-forward paddle displacement, length.
+    pub fn paddle_path(&self) -> SVector<T, D> {
+        self.hermite(
+            (&self.left.paddle_path, &self.left.paddle_path_slope),
+            (&self.right.paddle_path, &self.right.paddle_path_slope),
+        )
+    }
+
+    /// Target displacement along the feed-forward path, length.
+    pub fn target_displacement(&self) -> SVector<T, D> {
+        self.hermite(
+            (
+                &self.left.target_displacement,
+                &self.left.target_displacement_slope,
+            ),
+            (
+                &self.right.target_displacement,
+                &self.right.target_displacement_slope,
+            ),
+        )
+    }
+
+    /// Target displacement with the paddle held at zero, length.
+    pub fn static_target_displacement(&self) -> SVector<T, D> {
+        self.left
+            .static_target_displacement
+            .lerp(&self.right.static_target_displacement, self.fraction)
+    }
+
+    /// Actuation Jacobian; rows target, columns paddle.
+    pub fn jacobian(&self) -> SMatrix<T, D, D> {
+        self.left.jacobian + (self.right.jacobian - self.left.jacobian) * self.fraction
+    }
+
+    /// Cubic through values and slopes at both knots, with s the fraction and h the interval:
+    /// p = p₀ + s·(h·m₀ + s·((3Δ − 2h·m₀ − h·m₁) + s·(h·m₀ + h·m₁ − 2Δ))), Δ = p₁ − p₀.
+    fn hermite(
+        &self,
+        (left, left_slope): (&SVector<T, D>, &SVector<T, D>),
+        (right, right_slope): (&SVector<T, D>, &SVector<T, D>),
+    ) -> SVector<T, D> {
+        let s = self.fraction;
+        let (two, three) = (T::of(2.0), T::of(3.0));
+        let rise = right - left;
+        let start = left_slope * self.interval;
+        let end = right_slope * self.interval;
+        let quadratic = rise * three - start * two - end;
+        let cubic = start + end - rise * two;
+        left + (start + (quadratic + cubic * s) * s) * s
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+
+    use crate::test_support::table;
+
+    #[test]
+    fn hermite_reproduces_a_cubic_and_its_knots() {
+        let mut table = table();
+        let path = |z: f64| Vector2::new(z - 3.0 * z * z, 2.0 * z * z * z);
+        for knot in &mut table.knots {
+            let z = knot.depth;
+            knot.paddle_path = path(z);
+            knot.paddle_path_slope = Vector2::new(1.0 - 6.0 * z, 6.0 * z * z);
+        }
+        for step in 0..=100 {
+            let depth = 0.1 * f64::from(step) / 100.0;
+            let location = table.locate(depth).unwrap();
+            assert!(!location.clamped);
+            assert!((location.paddle_path() - path(depth)).norm() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn outside_is_clamped_and_flagged() {
+        let table = table();
+        for (outside, end) in [(-0.01, 0.0), (0.11, 0.1)] {
+            let (clamped, at_end) = (table.locate(outside).unwrap(), table.locate(end).unwrap());
+            assert!(clamped.clamped && !at_end.clamped);
+            assert_eq!(clamped.paddle_path(), at_end.paddle_path());
+            assert_eq!(clamped.jacobian(), at_end.jacobian());
+        }
+    }
+}
