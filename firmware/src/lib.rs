@@ -1,4 +1,66 @@
-//! Fixed-rate controller.
+//! Fixed-rate controller that holds a soft-tissue target still while a needle goes in.
+//!
+//! A needle goes into soft tissue and drags a target along. A paddle on the skin moves so that the displacement of
+//! the target orthogonal to the needle axis stays 0 (model based stabilization of soft tissue targets, dynamic
+//! paddle). What the tissue does is computed offline and comes as a [table](contract::Table); this crate reads
+//! samples, checks them, and gives one paddle command per tick.
+//!
+//! The crate is `no_std`, allocates nothing, has no `unsafe` and no panic path, and computes in `f32` or `f64`. The
+//! same code runs in the simulator and on the microcontroller.
+//!
+//! # Control law
+//! With the needle depth z extrapolated by its velocity to the time when the command acts:
+//!
+//! ```text
+//! feed-forward    f = path(z)                        table, cubic Hermite in depth
+//! error           e = n·y                            once per target sample, y measured
+//! feedback        w ← w − g·d(z)·e,   d = J⁻¹n       or the minimum-norm direction Jₙᵀ/(Jₙ·Jₙᵀ)
+//! command         u ← towards f + w                  |u| ≤ u_max, |Δu| ≤ Δ_max on every tick
+//! ```
+//!
+//! The gain g follows from the delay of the loop, see [`stability`]; the limits and their anti-windup are in
+//! [`limits`].
+//!
+//! # Symbols and units
+//! | symbol | meaning | unit |
+//! |---|---|---|
+//! | z | needle depth | length of the scene |
+//! | y | target displacement from rest | length |
+//! | n | unit vector orthogonal to the needle axis | – |
+//! | u | paddle displacement | length |
+//! | J | actuation Jacobian dy/du | – |
+//! | g | loop gain per target sample | – |
+//! | d | delay of the loop | target samples |
+//! | λ | eigenvalue of J·Ĵ⁻¹: true over assumed tissue | – |
+//!
+//! Times are nanoseconds (`_ns`) of one monotonic clock, speeds length per second.
+//!
+//! # Glossary
+//! - **Sample**: one measurement in a frame, stamped with sequence number and the time of the measurement.
+//! - **Tick**: one release of the loop. **Knot**: one depth of the table.
+//! - **RUN, HOLD, SAFE**: the paddle is controlled; keeps its position until the reason is gone; keeps its position
+//!   until somebody [re-arms](controller::State::rearm). See [`supervisor`].
+//! - **Adopt**: take the measured paddle position as the first command, so that starting moves nothing.
+//!
+//! # Example
+//! ```
+//! use firmware::{contract, Controller, Inputs, Settings, State};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let bytes: &[u8] = &[];
+//! match contract::decode::<f64, 2>(bytes) {
+//!     Ok(table) => {
+//!         // 1 kHz loop; target at 50 Hz, 20 ms old when it arrives.
+//!         let controller = Controller::new(&table, &Settings::new(1_000_000, 20_000_000, 20_000_000))?;
+//!         let mut state = State::new();
+//!         let command = controller.step(&mut state, &Inputs { tick: 0, time_ns: 0, ..Inputs::default() });
+//!         assert!(!command.is_valid(), "nothing is known about the paddle yet");
+//!     }
+//!     Err(refusal) => println!("{refusal}"), // 0 bytes cannot hold a controller table; ...
+//! }
+//! # Ok(())
+//! # }
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 #![deny(missing_docs)]
@@ -22,10 +84,25 @@
 extern crate std;
 
 pub mod contract;
+pub mod controller;
+pub mod inputs;
+pub mod io;
+pub mod law;
+pub mod ledger;
+pub mod limits;
+mod monitor;
 pub mod scalar;
+pub mod schedule;
+pub mod sequence;
+pub mod settings;
 pub mod stability;
 pub mod supervisor;
 pub mod table_lookup;
+
+pub use controller::{Controller, State};
+pub use inputs::Inputs;
+pub use settings::{Settings, SettingsError};
+pub use supervisor::{Faults, Mode};
 
 #[cfg(test)]
 mod test_support;

@@ -1,0 +1,432 @@
+//! The control law, one tick at a time.
+
+use nalgebra::SVector;
+
+use crate::contract::frames::COMMAND_VALID;
+use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
+use crate::inputs::{Inputs, Stream, check_needle, check_paddle, check_target, seconds};
+use crate::ledger::Ledger;
+use crate::monitor::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, InnovationGate};
+use crate::scalar::Scalar;
+use crate::settings::{AgeLimits, Runtime, Settings, SettingsError};
+use crate::supervisor::{Faults, Mode, Supervisor};
+
+/// Planar tissue: displacements have two components.
+const D: usize = 2;
+
+/// Successive ticks with skipped periods before them that are tolerated: a loop that skips every second period no
+/// longer runs at the rate that its gain was chosen for.
+pub const MAX_SUCCESSIVE_OVERRUNS: u32 = 10;
+
+/// Controller of one paddle: a table and settings, nothing that changes. See the crate documentation for the law.
+#[derive(Clone, Copy, Debug)]
+pub struct Controller<'t, T: Scalar> {
+    table: &'t Table<T, D>,
+    runtime: Runtime<T>,
+}
+
+/// Everything that changes from tick to tick. Equal states and inputs give equal commands, bit by bit.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct State<T: Scalar> {
+    supervisor: Supervisor,
+    mode: Mode,
+    faults: Faults,
+    ledger: Ledger,
+    /// Tick number and time of the last tick, ns.
+    last_tick: Option<(u64, u64)>,
+    successive_overruns: u32,
+    command_sequence: u32,
+    /// RUN has been reached since the start or the last re-arming; ages lead to SAFE from then on.
+    armed: bool,
+    /// Last displacement commanded; `None` until the measured position has been adopted.
+    displacement: Option<SVector<T, D>>,
+    /// Integral of the feedback; `None` until the first tick in RUN makes it continue from the adopted position.
+    integral: Option<SVector<T, D>>,
+    needle: Stream<NeedleSample>,
+    target: Stream<TargetSample>,
+    paddle: Stream<PaddleSample>,
+    target_lost: bool,
+    needle_frozen: FrozenMonitor,
+    target_frozen: FrozenMonitor,
+    gate: InnovationGate,
+    following: FollowingMonitor,
+    divergence: DivergenceMonitor,
+}
+
+impl<T: Scalar> State<T> {
+    /// The state before the first tick: HOLD, disarmed.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Mode after the last tick.
+    pub fn mode(&self) -> Mode {
+        self.mode
+    }
+
+    /// Faults of the last tick, and those that SAFE was entered for.
+    pub fn faults(&self) -> Faults {
+        self.faults
+    }
+
+    /// All accounts.
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// Integral part of the command, length; `None` before RUN.
+    pub fn integral(&self) -> Option<[f64; 2]> {
+        self.integral.as_ref().map(to_frame)
+    }
+
+    /// Leaves SAFE after somebody has looked: accounts go on, everything else starts over. The next command adopts
+    /// the paddle's measured position.
+    pub fn rearm(&mut self) {
+        *self = Self {
+            ledger: self.ledger,
+            last_tick: self.last_tick,
+            command_sequence: self.command_sequence,
+            ..Self::default()
+        };
+    }
+}
+
+impl<'t, T: Scalar> Controller<'t, T> {
+    /// Builds the runtime form of `settings` for `table`, which [`crate::contract::decode`] has validated.
+    ///
+    /// # Errors
+    /// What is wrong with the settings.
+    pub fn new(table: &'t Table<T, D>, settings: &Settings) -> Result<Self, SettingsError> {
+        Ok(Self {
+            table,
+            runtime: Runtime::new(table, settings)?,
+        })
+    }
+
+    /// Loop gain g per target sample in use.
+    pub fn loop_gain(&self) -> f64 {
+        self.runtime.gain.to_f64()
+    }
+
+    /// Delay d that the gain was chosen for, target samples.
+    pub fn delay_samples(&self) -> u32 {
+        self.runtime.delay_samples
+    }
+
+    /// One tick: reads and checks the inputs, decides the mode, and gives the command for the paddle.
+    pub fn step(&self, state: &mut State<T>, inputs: &Inputs) -> PaddleCommand {
+        let mut faults = Faults::NONE;
+        let fresh_target = if start_tick(state, inputs, &mut faults) {
+            self.read_inputs(state, inputs, &mut faults)
+        } else {
+            None
+        };
+        self.check_ages(state, &mut faults);
+        let mut mode = state.supervisor.decide(faults);
+        if mode == Mode::Run {
+            state.armed = true;
+            self.move_paddle(state, inputs, fresh_target, &mut faults);
+            // The law itself may have found a reason to stop; its last command is within the limits.
+            mode = state.supervisor.decide(faults);
+        }
+        state.mode = mode;
+        state.faults = faults | state.supervisor.latched();
+        state.ledger.ticks.end(mode);
+        self.command(state, inputs)
+    }
+
+    /// Reads all streams. Returns a target sample that may be integrated.
+    fn read_inputs(
+        &self,
+        state: &mut State<T>,
+        inputs: &Inputs,
+        faults: &mut Faults,
+    ) -> Option<TargetSample> {
+        if let Some(sample) = &inputs.needle {
+            self.read_needle(state, inputs.time_ns, sample, faults);
+        }
+        if let Some(sample) = &inputs.paddle {
+            self.read_paddle(state, inputs.time_ns, sample, faults);
+        }
+        let target = inputs.target.as_ref();
+        target.and_then(|sample| self.read_target(state, inputs.time_ns, sample, faults))
+    }
+
+    fn read_needle(
+        &self,
+        state: &mut State<T>,
+        now_ns: u64,
+        sample: &NeedleSample,
+        faults: &mut Faults,
+    ) {
+        let before = state.needle.accepted;
+        let ledger = &mut state.ledger.needle;
+        let accepted = state
+            .needle
+            .offer(*sample, sample.sequence, ledger, faults, |previous| {
+                check_needle(
+                    &self.runtime,
+                    now_ns,
+                    sample,
+                    previous,
+                    &mut state.needle_frozen,
+                )
+            });
+        if let (Some(now), Some(before)) = (accepted, before) {
+            state.gate.travel.needle += (now.depth - before.depth).abs();
+        }
+    }
+
+    fn read_target(
+        &self,
+        state: &mut State<T>,
+        now_ns: u64,
+        sample: &TargetSample,
+        faults: &mut Faults,
+    ) -> Option<TargetSample> {
+        let travel = state.gate.needle_travel();
+        let ledger = &mut state.ledger.target;
+        let mut found = Faults::NONE;
+        let accepted =
+            state
+                .target
+                .offer(*sample, sample.sequence, ledger, &mut found, |previous| {
+                    let frozen = &mut state.target_frozen;
+                    check_target(
+                        &self.runtime,
+                        now_ns,
+                        sample,
+                        previous,
+                        &state.gate,
+                        frozen,
+                        travel,
+                    )
+                });
+        *faults |= found;
+        state.target_lost |= found.contains(Faults::TARGET_LOST);
+        if accepted.is_some() {
+            state.target_lost = false;
+            state.gate.accept();
+        }
+        accepted
+    }
+
+    fn read_paddle(
+        &self,
+        state: &mut State<T>,
+        now_ns: u64,
+        sample: &PaddleSample,
+        faults: &mut Faults,
+    ) {
+        let index = self.table.paddle.index;
+        let ledger = &mut state.ledger.paddle;
+        let accepted = state
+            .paddle
+            .offer(*sample, sample.sequence, ledger, faults, |previous| {
+                check_paddle(&self.runtime, now_ns, index, sample, previous)
+            });
+        let Some(sample) = accepted else { return };
+        match &state.displacement {
+            Some(commanded) => {
+                let age = seconds(now_ns.saturating_sub(sample.time_ns));
+                let (measured, commanded) = (&sample.displacement, &to_frame(commanded));
+                let off = state
+                    .following
+                    .update(&self.runtime, measured, commanded, age);
+                faults.set_if(Faults::FOLLOWING_ERROR, off);
+            }
+            // Starting (again) must not move the paddle: the first command is where it is.
+            None => {
+                let measured = from_frame(&sample.displacement);
+                state.displacement = Some(self.runtime.limits.clamp_position(&measured));
+            }
+        }
+    }
+
+    /// Faults from what was accepted last: age, visibility, speed, range.
+    fn check_ages(&self, state: &State<T>, faults: &mut Faults) {
+        let Some((_, now_ns)) = state.last_tick else {
+            return;
+        };
+        let runtime = &self.runtime;
+        let mut check = |time_ns: Option<u64>, limits: AgeLimits, stale: Faults, dead: Faults| {
+            let Some(time_ns) = time_ns else {
+                *faults |= Faults::WAITING;
+                return;
+            };
+            let age_ns = now_ns.saturating_sub(time_ns);
+            faults.set_if(stale, age_ns > limits.hold_ns);
+            faults.set_if(dead, state.armed && age_ns > limits.safe_ns);
+        };
+        let needle_time = state.needle.accepted.map(|sample| sample.time_ns);
+        let target_time = state.target.accepted.map(|sample| sample.time_ns);
+        let paddle_time = state.paddle.accepted.map(|sample| sample.time_ns);
+        check(
+            needle_time,
+            runtime.needle_age,
+            Faults::NEEDLE_STALE,
+            Faults::NEEDLE_DEAD,
+        );
+        check(
+            target_time,
+            runtime.target_age,
+            Faults::TARGET_STALE,
+            Faults::TARGET_DEAD,
+        );
+        check(
+            paddle_time,
+            runtime.paddle_age,
+            Faults::PADDLE_STALE,
+            Faults::PADDLE_DEAD,
+        );
+        faults.set_if(Faults::TARGET_LOST, state.target_lost);
+        if let Some(needle) = &state.needle.accepted {
+            let (start, end) = runtime.table_depth;
+            faults.set_if(
+                Faults::NEEDLE_TOO_FAST,
+                needle.velocity.abs() > runtime.needle_speed,
+            );
+            faults.set_if(
+                Faults::DEPTH_CLAMPED,
+                needle.depth < start || needle.depth > end,
+            );
+        }
+    }
+
+    /// Feed-forward plus integral feedback, within the limits.
+    fn move_paddle(
+        &self,
+        state: &mut State<T>,
+        inputs: &Inputs,
+        fresh_target: Option<TargetSample>,
+        faults: &mut Faults,
+    ) {
+        let runtime = &self.runtime;
+        let (Some(previous), Some(needle)) = (state.displacement, state.needle.accepted) else {
+            return;
+        };
+        // Where the needle will be when the command acts.
+        let lead_ns = inputs
+            .time_ns
+            .saturating_sub(needle.time_ns)
+            .saturating_add(runtime.actuator_delay_ns);
+        let depth = needle.depth + needle.velocity * seconds(lead_ns);
+        let Some(location) = self.table.locate(T::of(depth)) else {
+            return;
+        };
+        let feed_forward = location.paddle_path();
+        let mut integral = state.integral.unwrap_or(previous - feed_forward);
+
+        if let Some(sample) = fresh_target {
+            let n = &self.table.orthogonal;
+            let error = n.dot(&from_frame(&sample.displacement));
+            let direction = runtime.direction.solve(&location.jacobian(), n);
+            let correction = direction * (-runtime.gain * error);
+            let corrected =
+                runtime
+                    .limits
+                    .integrate(&integral, &correction, &feed_forward, &previous);
+            // A correction that saturation swallows proves nothing about the sign of the plant.
+            let taken = (corrected - integral).dot(&correction);
+            let acted = taken > correction.norm_squared() * T::of(0.5);
+            integral = corrected;
+            if acted {
+                let diverges = state
+                    .divergence
+                    .update(runtime, error.to_f64(), needle.velocity);
+                faults.set_if(Faults::DIVERGENCE, diverges);
+            }
+        }
+
+        let limited = runtime
+            .limits
+            .command(&previous, &(feed_forward + integral));
+        if !limited
+            .displacement
+            .iter()
+            .all(|component| component.to_f64().is_finite())
+        {
+            *faults |= Faults::INTERNAL;
+            return;
+        }
+        faults.set_if(Faults::POSITION_LIMITED, limited.position_limited);
+        faults.set_if(Faults::RATE_LIMITED, limited.rate_limited);
+        state.gate.travel.paddle += (limited.displacement - previous).norm().to_f64();
+        state.integral = Some(integral);
+        state.displacement = Some(limited.displacement);
+    }
+
+    /// The command frame for the state after a tick.
+    fn command(&self, state: &mut State<T>, inputs: &Inputs) -> PaddleCommand {
+        let sequence = state.command_sequence;
+        state.command_sequence = sequence.wrapping_add(1);
+        PaddleCommand {
+            sequence,
+            state: state.mode as u32,
+            tick: inputs.tick,
+            time_ns: inputs.time_ns,
+            faults: state.faults.bits(),
+            displacement: state
+                .displacement
+                .as_ref()
+                .map(to_frame)
+                .unwrap_or_default(),
+            needle_sequence: state
+                .needle
+                .accepted
+                .map(|sample| sample.sequence)
+                .unwrap_or_default(),
+            target_sequence: state
+                .target
+                .accepted
+                .map(|sample| sample.sequence)
+                .unwrap_or_default(),
+            paddle_index: self.table.paddle.index,
+            flags: if state.displacement.is_some() {
+                COMMAND_VALID
+            } else {
+                0
+            },
+        }
+    }
+}
+
+/// Enters the tick into the accounts and checks that time goes on. A tick from the past is rejected: nothing of it
+/// is read.
+fn start_tick<T: Scalar>(state: &mut State<T>, inputs: &Inputs, faults: &mut Faults) -> bool {
+    let Some((tick, time_ns)) = state.last_tick else {
+        state.ledger.ticks.start(0);
+        state.last_tick = Some((inputs.tick, inputs.time_ns));
+        return true;
+    };
+    if inputs.tick <= tick || inputs.time_ns < time_ns {
+        state.ledger.ticks.start(0);
+        *faults |= Faults::CLOCK_REVERSED;
+        return false;
+    }
+    let skipped = inputs.tick - tick - 1;
+    state.ledger.ticks.start(skipped);
+    state.last_tick = Some((inputs.tick, inputs.time_ns));
+    state.successive_overruns = if skipped > 0 {
+        state.successive_overruns.saturating_add(1)
+    } else {
+        0
+    };
+    faults.set_if(Faults::TICKS_SKIPPED, skipped > 0);
+    faults.set_if(
+        Faults::OVERRUN,
+        state.successive_overruns >= MAX_SUCCESSIVE_OVERRUNS,
+    );
+    true
+}
+
+fn to_frame<T: Scalar>(vector: &SVector<T, D>) -> [f64; D] {
+    [vector.x.to_f64(), vector.y.to_f64()]
+}
+
+fn from_frame<T: Scalar>(components: &[f64; D]) -> SVector<T, D> {
+    SVector::from(components.map(T::of))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,59 @@
+//! What the loop needs from its surroundings. Lockstep, free-run and bare metal implement these traits and share
+//! [`run_tick`], so that all of them run the same controller.
+
+use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
+use crate::controller::{Controller, State};
+use crate::inputs::Inputs;
+use crate::scalar::Scalar;
+
+/// A clock that never goes back, ns since an arbitrary start. In lockstep the messages are the clock.
+pub trait MonotonicClock {
+    /// Time now, ns.
+    fn now_ns(&mut self) -> u64;
+}
+
+/// Where samples come from. Each call drains the stream and returns its newest sample, or `None` if nothing arrived
+/// since the last call.
+pub trait SampleSource {
+    /// Newest needle sample.
+    fn needle(&mut self) -> Option<NeedleSample>;
+    /// Newest target sample.
+    fn target(&mut self) -> Option<TargetSample>;
+    /// Newest paddle sample.
+    fn paddle(&mut self) -> Option<PaddleSample>;
+}
+
+/// Where commands go. Must not block.
+pub trait CommandSink {
+    /// Why a command could not be sent.
+    type Error;
+
+    /// Sends one command.
+    ///
+    /// # Errors
+    /// The command did not leave; the loop goes on, the receiver sees a gap in the sequence.
+    fn send(&mut self, command: &PaddleCommand) -> Result<(), Self::Error>;
+}
+
+/// One tick: drain the inputs, step, send the command. Returns what the step saw and did, for the record.
+///
+/// # Errors
+/// That of the sink; the controller has stepped nevertheless.
+pub fn run_tick<T: Scalar, L: SampleSource + CommandSink>(
+    controller: &Controller<'_, T>,
+    state: &mut State<T>,
+    tick: u64,
+    time_ns: u64,
+    link: &mut L,
+) -> Result<(Inputs, PaddleCommand), L::Error> {
+    let inputs = Inputs {
+        tick,
+        time_ns,
+        needle: link.needle(),
+        target: link.target(),
+        paddle: link.paddle(),
+    };
+    let command = controller.step(state, &inputs);
+    link.send(&command)?;
+    Ok((inputs, command))
+}

@@ -1,0 +1,107 @@
+//! In which direction the paddle moves to remove an orthogonal error.
+
+use nalgebra::{SMatrix, SVector};
+
+use crate::contract::condition_number;
+use crate::scalar::Scalar;
+
+/// Condition number past which the inverse is damped. Below it the damped solution is the exact one, so that
+/// well-placed paddles pay nothing; above it the paddle's excursion along the weak direction stays bounded.
+pub const DAMPING_CONDITION: f64 = 1e2;
+
+/// Paddle direction per unit of orthogonal target displacement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Direction {
+    /// J⁻¹n: moves the target along n only, its axial position is left alone (the paper, section III.B).
+    #[default]
+    Inverse,
+    /// Jₙᵀ/(Jₙ·Jₙᵀ) with Jₙ = nᵀJ: the shortest paddle motion; the target may also move along the axis.
+    MinimumNorm,
+}
+
+impl Direction {
+    /// Paddle displacement per unit of target displacement along `orthogonal` (n), from the actuation Jacobian J
+    /// (rows target, columns paddle). Zero if the paddle cannot move the target.
+    pub fn solve<T: Scalar, const D: usize>(
+        self,
+        jacobian: &SMatrix<T, D, D>,
+        orthogonal: &SVector<T, D>,
+    ) -> SVector<T, D> {
+        match self {
+            Self::Inverse => damped_inverse(jacobian, orthogonal),
+            Self::MinimumNorm => {
+                let row = jacobian.tr_mul(orthogonal);
+                let squared = row.norm_squared();
+                if squared > T::zero() {
+                    row / squared
+                } else {
+                    row
+                }
+            }
+        }
+    }
+}
+
+/// Damped least squares (JᵀJ + μ²I)⁻¹Jᵀn with μ² = (‖J‖/κ_d)²·(1 − (κ_d/κ)²) past the condition number κ_d, and
+/// μ = 0 up to it; continuous in κ (after Nakamura & Hanafusa, 1986).
+fn damped_inverse<T: Scalar, const D: usize>(
+    jacobian: &SMatrix<T, D, D>,
+    orthogonal: &SVector<T, D>,
+) -> SVector<T, D> {
+    let condition = condition_number(jacobian);
+    if condition <= DAMPING_CONDITION {
+        return jacobian
+            .try_inverse()
+            .map_or_else(SVector::zeros, |inverse| inverse * orthogonal);
+    }
+    let ratio = DAMPING_CONDITION / condition;
+    let scale = jacobian.norm() / T::of(DAMPING_CONDITION);
+    let damping = scale * scale * T::of(1.0 - ratio * ratio);
+    let normal_matrix = jacobian.tr_mul(jacobian) + SMatrix::identity() * damping;
+    normal_matrix
+        .try_inverse()
+        .map_or_else(SVector::zeros, |inverse| {
+            inverse * jacobian.tr_mul(orthogonal)
+        })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix2, Vector2};
+
+    use super::*;
+    use crate::test_support::jacobian;
+
+    #[test]
+    fn the_inverse_leaves_the_axis_alone() {
+        let n = Vector2::x();
+        let moved = jacobian() * Direction::Inverse.solve(&jacobian(), &n);
+        assert!((moved - n).norm() < 1e-14);
+    }
+
+    #[test]
+    fn the_minimum_norm_is_shorter() {
+        let n = Vector2::x();
+        let shortest = Direction::MinimumNorm.solve(&jacobian(), &n);
+        assert!((n.dot(&(jacobian() * shortest)) - 1.0).abs() < 1e-14);
+        assert!(shortest.norm() < Direction::Inverse.solve(&jacobian(), &n).norm());
+    }
+
+    #[test]
+    fn near_singular_directions_stay_bounded() {
+        for exponent in 1..=12 {
+            let smallest = 10f64.powi(-exponent);
+            let n = Vector2::new(0.6, 0.8);
+            let direction = Direction::Inverse.solve(&Matrix2::new(1.0, 0.0, 0.0, smallest), &n);
+            assert!(
+                direction.norm() <= DAMPING_CONDITION,
+                "σ = {smallest}: {}",
+                direction.norm()
+            );
+        }
+        assert_eq!(
+            Direction::Inverse.solve(&Matrix2::<f64>::zeros(), &Vector2::x()),
+            Vector2::zeros()
+        );
+    }
+}

@@ -1,0 +1,129 @@
+//! Accounts: nothing that reaches the controller disappears without a count.
+//!
+//! For each input stream: published = consumed + missed + discarded (by reason), where `published` is what the
+//! sequence numbers say and `missed` are the gaps (overwritten by newer samples, or lost). For the loop:
+//! due ticks = RUN + HOLD + SAFE + skipped.
+
+use crate::supervisor::Mode;
+
+/// Why a received sample was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Discard {
+    /// Older than one already seen.
+    Late = 0,
+    /// A field is NaN, infinite or subnormal.
+    NotFinite = 1,
+    /// A field is outside what the table makes plausible (wrong units among the reasons).
+    OutOfRange = 2,
+    /// Measured in the future, or not after the sample before it.
+    Time = 3,
+    /// Further from the sample before it than motion and noise can explain.
+    Innovation = 4,
+    /// The sensor did not see the target.
+    NotVisible = 5,
+    /// Bit-identical although the needle moved.
+    Frozen = 6,
+    /// From another paddle than the table's.
+    Identity = 7,
+}
+
+/// Number of [`Discard`] reasons.
+pub const DISCARD_REASONS: usize = 8;
+
+/// Account of one input stream.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct StreamLedger {
+    /// Samples that the publisher must have sent, from the sequence numbers.
+    pub published: u64,
+    /// Samples accepted.
+    pub consumed: u64,
+    /// Samples that never arrived: overwritten by newer ones, or lost.
+    pub missed: u64,
+    /// Samples refused, by [`Discard`] as index.
+    pub discarded: [u64; DISCARD_REASONS],
+    /// Deliveries of a sample that had arrived before; not publications of their own.
+    pub duplicates: u64,
+    /// Deliveries too old to be matched with a publication.
+    pub strays: u64,
+}
+
+impl StreamLedger {
+    /// Counts one refusal.
+    pub(crate) fn discard(&mut self, reason: Discard) {
+        if let Some(count) = self.discarded.get_mut(reason as usize) {
+            *count += 1;
+        }
+    }
+
+    /// Refusals for one reason.
+    pub fn discarded_for(&self, reason: Discard) -> u64 {
+        self.discarded.get(reason as usize).copied().unwrap_or(0)
+    }
+
+    /// Publications without an entry: 0 unless the controller is wrong.
+    pub fn unaccounted(&self) -> u64 {
+        let entries = self.consumed + self.missed + self.discarded.iter().sum::<u64>();
+        self.published.abs_diff(entries)
+    }
+}
+
+/// Account of the loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TickLedger {
+    /// Ticks that came due.
+    pub due: u64,
+    /// Ticks that ended in RUN.
+    pub run: u64,
+    /// Ticks that ended in HOLD.
+    pub hold: u64,
+    /// Ticks that ended in SAFE.
+    pub safe: u64,
+    /// Ticks that were never started.
+    pub skipped: u64,
+}
+
+impl TickLedger {
+    /// A tick starts, `skipped` periods after the one that should have.
+    pub(crate) fn start(&mut self, skipped: u64) {
+        self.due = self.due.saturating_add(skipped).saturating_add(1);
+        self.skipped = self.skipped.saturating_add(skipped);
+    }
+
+    /// The tick ends in `mode`.
+    pub(crate) fn end(&mut self, mode: Mode) {
+        match mode {
+            Mode::Hold => self.hold += 1,
+            Mode::Run => self.run += 1,
+            Mode::Safe => self.safe += 1,
+        }
+    }
+
+    /// Due ticks without an entry: 0 unless the controller is wrong.
+    pub fn unaccounted(&self) -> u64 {
+        self.due
+            .abs_diff(self.run + self.hold + self.safe + self.skipped)
+    }
+}
+
+/// All accounts of a controller.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Ledger {
+    /// Needle samples.
+    pub needle: StreamLedger,
+    /// Target samples.
+    pub target: StreamLedger,
+    /// Paddle samples.
+    pub paddle: StreamLedger,
+    /// Ticks of the loop.
+    pub ticks: TickLedger,
+}
+
+impl Ledger {
+    /// Everything without an entry: 0 unless the controller is wrong.
+    pub fn unaccounted(&self) -> u64 {
+        self.needle.unaccounted()
+            + self.target.unaccounted()
+            + self.paddle.unaccounted()
+            + self.ticks.unaccounted()
+    }
+}

@@ -1,0 +1,186 @@
+//! Position and rate limits, and the anti-windup that goes with them.
+//!
+//! Both limits hold for *every* command: `|u| ≤ u_max` and `|u − u_previous| ≤ Δ_max`, up to the rounding of one
+//! addition. The admissible set is convex, so that a step towards an admissible position stays admissible.
+
+use nalgebra::SVector;
+
+use crate::scalar::Scalar;
+
+/// Shape of the admissible positions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PositionLimit {
+    /// Norm of the displacement: a disc; saturation keeps the direction.
+    #[default]
+    Norm,
+    /// Each axis by itself: the largest square inside the disc.
+    Box,
+}
+
+/// Limits of the paddle in runtime form.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits<T: Scalar> {
+    /// Shape of the admissible positions.
+    pub shape: PositionLimit,
+    /// Largest norm of the displacement, length.
+    pub max_displacement: T,
+    /// Largest norm of the change per tick, length.
+    pub max_step: T,
+}
+
+/// A command within the limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limited<T: Scalar, const D: usize> {
+    /// The admissible displacement nearest along the way, length.
+    pub displacement: SVector<T, D>,
+    /// The wish was outside the admissible positions.
+    pub position_limited: bool,
+    /// The wish was further than one tick's step.
+    pub rate_limited: bool,
+}
+
+impl<T: Scalar> Limits<T> {
+    /// Admissible position for the wish `displacement`.
+    pub fn clamp_position<const D: usize>(&self, displacement: &SVector<T, D>) -> SVector<T, D> {
+        match self.shape {
+            PositionLimit::Norm => shorten(displacement, self.max_displacement),
+            PositionLimit::Box => {
+                let half_edge = self.max_displacement / T::of(D as f64).sqrt();
+                displacement.map(|component| component.clamp(-half_edge, half_edge))
+            }
+        }
+    }
+
+    /// The command that goes from `previous` towards `wish` as far as one tick allows; keeps the direction.
+    pub fn command<const D: usize>(
+        &self,
+        previous: &SVector<T, D>,
+        wish: &SVector<T, D>,
+    ) -> Limited<T, D> {
+        let admissible = self.clamp_position(wish);
+        let position_limited = admissible != *wish;
+        let step = admissible - previous;
+        let short_step = shorten(&step, self.max_step);
+        let rate_limited = short_step != step;
+        // Without the rate limit, take the position itself: previous + (wish − previous) would round.
+        let displacement = if rate_limited {
+            previous + short_step
+        } else {
+            admissible
+        };
+        Limited {
+            displacement,
+            position_limited,
+            rate_limited,
+        }
+    }
+
+    /// Integral feedback after `correction`, without windup.
+    ///
+    /// The wish is `feed_forward + integral`, the command before this tick `previous`.
+    /// - A correction that would leave the admissible positions is taken up to their boundary; once outside
+    ///   (the feed-forward may push there), only corrections that lead back are taken.
+    /// - While the paddle is still on its way at full rate, corrections that ask for more of the same are not taken:
+    ///   the error they answer will be gone when the paddle arrives.
+    pub fn integrate<const D: usize>(
+        &self,
+        integral: &SVector<T, D>,
+        correction: &SVector<T, D>,
+        feed_forward: &SVector<T, D>,
+        previous: &SVector<T, D>,
+    ) -> SVector<T, D> {
+        let wish = feed_forward + integral;
+        let pending = self.clamp_position(&wish) - previous;
+        if pending.norm() > self.max_step && pending.dot(correction) > T::zero() {
+            return *integral;
+        }
+        let corrected = wish + correction;
+        let admissible = self.clamp_position(&corrected);
+        if admissible == corrected {
+            return integral + correction;
+        }
+        let excess = (wish - self.clamp_position(&wish)).norm();
+        if excess == T::zero() {
+            admissible - feed_forward
+        } else if (corrected - admissible).norm() < excess {
+            integral + correction
+        } else {
+            *integral
+        }
+    }
+}
+
+/// `vector`, or its direction with norm `limit` if it is longer.
+fn shorten<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> SVector<T, D> {
+    let norm = vector.norm();
+    if norm <= limit {
+        *vector
+    } else {
+        vector * (limit / norm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector2;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const LIMITS: Limits<f64> = Limits {
+        shape: PositionLimit::Norm,
+        max_displacement: 1.0,
+        max_step: 0.1,
+    };
+
+    #[test]
+    fn direction_is_kept() {
+        let limited = LIMITS.command(&Vector2::zeros(), &Vector2::new(3.0, 4.0));
+        assert!((limited.displacement - Vector2::new(0.06, 0.08)).norm() < 1e-15);
+        assert!(limited.position_limited && limited.rate_limited);
+    }
+
+    #[test]
+    fn a_box_limits_each_axis() {
+        let limits = Limits {
+            shape: PositionLimit::Box,
+            ..LIMITS
+        };
+        let clamped = limits.clamp_position(&Vector2::new(9.0, -0.1));
+        assert!((clamped - Vector2::new(0.5f64.sqrt(), -0.1)).norm() < 1e-15);
+    }
+
+    #[test]
+    fn saturation_does_not_wind_up_and_recovery_is_immediate() {
+        let (zero, push) = (Vector2::zeros(), Vector2::new(0.3, 0.0));
+        let mut integral = zero;
+        let mut previous = zero;
+        for _ in 0..1000 {
+            integral = LIMITS.integrate(&integral, &push, &zero, &previous);
+            previous = LIMITS.command(&previous, &integral).displacement;
+            assert!(integral.norm() <= 1.0 + 1e-12);
+        }
+        assert!((previous.x - 1.0).abs() < 1e-12);
+        let back = LIMITS.integrate(&integral, &-push, &zero, &previous);
+        assert!(
+            (back.x - 0.7).abs() < 1e-12,
+            "the first correction back acts in full"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn both_limits_hold_for_any_wish(
+            start in (-0.7..0.7f64, -0.7..0.7f64),
+            wishes in prop::collection::vec((-1e3..1e3f64, -1e3..1e3f64), 1..50),
+        ) {
+            let mut previous = Vector2::new(start.0, start.1);
+            for (x, y) in wishes {
+                let next = LIMITS.command(&previous, &Vector2::new(x, y)).displacement;
+                prop_assert!(next.norm() <= 1.0 + 1e-14);
+                prop_assert!((next - previous).norm() <= 0.1 + 1e-14);
+                previous = next;
+            }
+        }
+    }
+}

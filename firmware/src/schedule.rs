@@ -1,0 +1,206 @@
+//! When the loop runs: absolute releases, overruns, timing in integers.
+//!
+//! The next release is the previous one plus the period, never "now plus the period": nothing drifts. When the next
+//! release is already past at the end of a step, whole periods are skipped and counted, and the loop goes on in its
+//! old phase. It never runs twice to catch up.
+
+/// Minimum, maximum and mean of a duration, ns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DurationStatistics {
+    /// Number of values.
+    pub count: u64,
+    /// Smallest value, ns; 0 without values.
+    pub min_ns: u64,
+    /// Largest value, ns.
+    pub max_ns: u64,
+    /// Sum of values, ns (saturating: full after 584 years).
+    pub sum_ns: u64,
+}
+
+impl DurationStatistics {
+    /// Adds a value.
+    pub fn record(&mut self, duration_ns: u64) {
+        self.min_ns = if self.count == 0 {
+            duration_ns
+        } else {
+            self.min_ns.min(duration_ns)
+        };
+        self.max_ns = self.max_ns.max(duration_ns);
+        self.sum_ns = self.sum_ns.saturating_add(duration_ns);
+        self.count += 1;
+    }
+
+    /// Mean, ns, rounded down; 0 without values.
+    pub const fn mean_ns(&self) -> u64 {
+        match self.sum_ns.checked_div(self.count) {
+            Some(mean) => mean,
+            None => 0,
+        }
+    }
+}
+
+/// One release of the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Release {
+    /// Number of the release since the start, skipped ones included.
+    pub tick: u64,
+    /// When it was due, ns.
+    pub release_ns: u64,
+    /// How late it started, ns.
+    pub release_lateness_ns: u64,
+}
+
+/// Periodic schedule in absolute time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schedule {
+    period_ns: u64,
+    tick: u64,
+    next_release_ns: u64,
+    started_ns: u64,
+    skipped: u64,
+    overruns: u64,
+    deadline_misses: u64,
+    /// Start minus release.
+    pub release_lateness: DurationStatistics,
+    /// End minus start.
+    pub execution_time: DurationStatistics,
+    /// End minus release.
+    pub response_time: DurationStatistics,
+}
+
+impl Schedule {
+    /// A schedule whose tick 0 is due at `first_release_ns`. A period of 0 is taken as 1 ns.
+    pub fn new(first_release_ns: u64, period_ns: u64) -> Self {
+        Self {
+            period_ns: period_ns.max(1),
+            tick: 0,
+            next_release_ns: first_release_ns,
+            started_ns: first_release_ns,
+            skipped: 0,
+            overruns: 0,
+            deadline_misses: 0,
+            release_lateness: DurationStatistics::default(),
+            execution_time: DurationStatistics::default(),
+            response_time: DurationStatistics::default(),
+        }
+    }
+
+    /// When to wake up next, ns.
+    pub const fn next_release_ns(&self) -> u64 {
+        self.next_release_ns
+    }
+
+    /// Periods that never started.
+    pub const fn skipped(&self) -> u64 {
+        self.skipped
+    }
+
+    /// Steps that ended after the next release, and wake-ups a whole period late.
+    pub const fn overruns(&self) -> u64 {
+        self.overruns
+    }
+
+    /// Steps that ended more than a period after their release.
+    pub const fn deadline_misses(&self) -> u64 {
+        self.deadline_misses
+    }
+
+    /// The loop has woken up at `now_ns` and starts its step. Waking up whole periods late (a stopped process) skips
+    /// these.
+    pub fn begin(&mut self, now_ns: u64) -> Release {
+        let late_periods = now_ns.saturating_sub(self.next_release_ns) / self.period_ns;
+        if late_periods > 0 {
+            self.overruns += 1;
+            self.skip(late_periods);
+        }
+        self.started_ns = now_ns;
+        let release_lateness_ns = now_ns.saturating_sub(self.next_release_ns);
+        self.release_lateness.record(release_lateness_ns);
+        Release {
+            tick: self.tick,
+            release_ns: self.next_release_ns,
+            release_lateness_ns,
+        }
+    }
+
+    /// The step has ended at `now_ns`; returns how many periods are skipped before the next release.
+    pub fn finish(&mut self, now_ns: u64) -> u64 {
+        let response_ns = now_ns.saturating_sub(self.next_release_ns);
+        self.execution_time
+            .record(now_ns.saturating_sub(self.started_ns));
+        self.response_time.record(response_ns);
+        self.deadline_misses += u64::from(response_ns > self.period_ns);
+        self.advance(1);
+        let past_ns = now_ns.saturating_sub(self.next_release_ns);
+        let skipped = past_ns.div_ceil(self.period_ns);
+        if skipped > 0 {
+            self.overruns += 1;
+            self.skip(skipped);
+        }
+        skipped
+    }
+
+    fn skip(&mut self, periods: u64) {
+        self.skipped += periods;
+        self.advance(periods);
+    }
+
+    fn advance(&mut self, periods: u64) {
+        self.tick += periods;
+        self.next_release_ns = self
+            .next_release_ns
+            .saturating_add(periods.saturating_mul(self.period_ns));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD: u64 = 1_000_000;
+
+    /// Runs one tick that wakes up on time and takes `execution_ns`; returns the skipped periods.
+    fn tick(schedule: &mut Schedule, execution_ns: u64) -> u64 {
+        let start = schedule.next_release_ns();
+        schedule.begin(start);
+        schedule.finish(start + execution_ns)
+    }
+
+    #[test]
+    fn overruns_skip_whole_periods_and_keep_the_phase() {
+        for (over, skipped) in [(PERIOD / 2, 1), (PERIOD, 1), (7 * PERIOD / 2, 4)] {
+            let mut schedule = Schedule::new(5, PERIOD);
+            assert_eq!(tick(&mut schedule, 1000), 0);
+            assert_eq!(tick(&mut schedule, PERIOD + over), skipped);
+            assert_eq!(
+                schedule.next_release_ns(),
+                5 + (2 + skipped) * PERIOD,
+                "no burst"
+            );
+            assert_eq!(schedule.begin(schedule.next_release_ns()).tick, 2 + skipped);
+            assert_eq!((schedule.overruns(), schedule.deadline_misses()), (1, 1));
+        }
+    }
+
+    #[test]
+    fn a_stopped_process_leaves_one_gap() {
+        let mut schedule = Schedule::new(0, PERIOD);
+        tick(&mut schedule, 1000);
+        let release = schedule.begin(101 * PERIOD + 17);
+        assert_eq!((release.tick, release.release_lateness_ns), (101, 17));
+        assert_eq!((schedule.skipped(), schedule.overruns()), (100, 1));
+    }
+
+    #[test]
+    fn lateness_does_not_drift() {
+        let mut schedule = Schedule::new(0, PERIOD);
+        for _ in 0..1000 {
+            let start = schedule.next_release_ns() + 300_000;
+            schedule.begin(start);
+            schedule.finish(start + 10_000);
+        }
+        assert_eq!(schedule.next_release_ns(), 1000 * PERIOD);
+        assert_eq!(schedule.release_lateness.mean_ns(), 300_000);
+        assert_eq!(schedule.response_time.max_ns, 310_000);
+    }
+}

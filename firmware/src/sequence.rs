@@ -1,0 +1,114 @@
+//! Sequence numbers that wrap: what is new, late, or a duplicate.
+
+use crate::ledger::{Discard, StreamLedger};
+
+/// How far back a late sample is still told from a duplicate.
+const WINDOW: u32 = u64::BITS;
+
+/// What a sequence number says about a delivery.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arrival {
+    /// Newer than all before it.
+    New,
+    /// Arrives after a newer one.
+    Late,
+    /// Has arrived before.
+    Duplicate,
+    /// Older than the window: cannot be told.
+    Stray,
+}
+
+/// Remembers the newest sequence number and which of the 64 before it have arrived.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SequenceTracker {
+    newest: Option<u32>,
+    /// Bit i: the sample `newest − i` has arrived.
+    arrived: u64,
+}
+
+impl SequenceTracker {
+    /// Newest sequence number seen.
+    pub const fn newest(&self) -> Option<u32> {
+        self.newest
+    }
+
+    /// Classifies a delivery and enters everything but its fate if it is new into the ledger.
+    pub(crate) fn register(&mut self, sequence: u32, ledger: &mut StreamLedger) -> Arrival {
+        let Some(newest) = self.newest else {
+            *self = Self {
+                newest: Some(sequence),
+                arrived: 1,
+            };
+            ledger.published += 1;
+            return Arrival::New;
+        };
+        let ahead = sequence.wrapping_sub(newest);
+        // Half of the number range lies ahead, half behind: ages stay right when the counter wraps.
+        if ahead != 0 && ahead <= u32::MAX / 2 {
+            self.newest = Some(sequence);
+            self.arrived = self.arrived.checked_shl(ahead).unwrap_or(0) | 1;
+            ledger.published += u64::from(ahead);
+            ledger.missed += u64::from(ahead - 1);
+            return Arrival::New;
+        }
+        let behind = newest.wrapping_sub(sequence);
+        if behind >= WINDOW {
+            ledger.strays += 1;
+            return Arrival::Stray;
+        }
+        let bit = 1u64 << behind;
+        if self.arrived & bit != 0 || ledger.missed == 0 {
+            ledger.duplicates += 1;
+            return Arrival::Duplicate;
+        }
+        self.arrived |= bit;
+        ledger.missed -= 1;
+        ledger.discard(Discard::Late);
+        Arrival::Late
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Delivers the sequence numbers, counting new ones as consumed.
+    fn deliver(sequences: &[u32]) -> StreamLedger {
+        let (mut tracker, mut ledger) = (SequenceTracker::default(), StreamLedger::default());
+        for &sequence in sequences {
+            if tracker.register(sequence, &mut ledger) == Arrival::New {
+                ledger.consumed += 1;
+            }
+            assert_eq!(ledger.unaccounted(), 0);
+        }
+        ledger
+    }
+
+    #[test]
+    fn gaps_are_counted_exactly() {
+        for gap in [1, 10, 1000] {
+            let ledger = deliver(&[5, 6, 7 + gap, 8 + gap]);
+            assert_eq!(
+                (ledger.missed, ledger.published),
+                (u64::from(gap), 4 + u64::from(gap))
+            );
+        }
+    }
+
+    #[test]
+    fn the_counter_wraps() {
+        let start = u32::MAX - 5;
+        let sequences: std::vec::Vec<u32> = (0..20).map(|i| start.wrapping_add(i)).collect();
+        let ledger = deliver(&sequences);
+        assert_eq!((ledger.consumed, ledger.missed), (20, 0));
+    }
+
+    #[test]
+    fn late_is_not_duplicate() {
+        let ledger = deliver(&[1, 4, 2, 2, 4, 3, 5]);
+        assert_eq!(ledger.consumed, 3);
+        assert_eq!(ledger.discarded_for(Discard::Late), 2);
+        assert_eq!((ledger.duplicates, ledger.missed), (2, 0));
+        assert_eq!(deliver(&[100, 1]).strays, 1);
+    }
+}
