@@ -1,94 +1,28 @@
 //! The control law, one tick at a time.
 
-use nalgebra::SVector;
-
 use crate::contract::frames::COMMAND_VALID;
 use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
-use crate::inputs::{Inputs, Stream, check_needle, check_paddle, check_target, seconds};
-use crate::ledger::Ledger;
-use crate::monitor::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, InnovationGate};
+use crate::inputs::{Inputs, check_needle, check_paddle, check_target, seconds};
+use crate::runtime::{AgeLimits, Runtime};
 use crate::scalar::Scalar;
-use crate::settings::{AgeLimits, Runtime, Settings, SettingsError};
-use crate::supervisor::{Faults, Mode, Supervisor};
+use crate::settings::{Settings, SettingsError};
+use crate::supervisor::{Faults, Mode};
+
+mod state;
+#[cfg(test)]
+mod tests;
+
+pub use state::{MAX_SUCCESSIVE_OVERRUNS, State};
+use state::{from_frame, start_tick, to_frame};
 
 /// Planar tissue: displacements have two components.
 const D: usize = 2;
-
-/// Successive ticks with skipped periods before them that are tolerated: a loop that skips every second period no
-/// longer runs at the rate that its gain was chosen for.
-pub const MAX_SUCCESSIVE_OVERRUNS: u32 = 10;
 
 /// Controller of one paddle: a table and settings, nothing that changes. See the crate documentation for the law.
 #[derive(Clone, Copy, Debug)]
 pub struct Controller<'t, T: Scalar> {
     table: &'t Table<T, D>,
     runtime: Runtime<T>,
-}
-
-/// Everything that changes from tick to tick. Equal states and inputs give equal commands, bit by bit.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct State<T: Scalar> {
-    supervisor: Supervisor,
-    mode: Mode,
-    faults: Faults,
-    ledger: Ledger,
-    /// Tick number and time of the last tick, ns.
-    last_tick: Option<(u64, u64)>,
-    successive_overruns: u32,
-    command_sequence: u32,
-    /// RUN has been reached since the start or the last re-arming; ages lead to SAFE from then on.
-    armed: bool,
-    /// Last displacement commanded; `None` until the measured position has been adopted.
-    displacement: Option<SVector<T, D>>,
-    /// Integral of the feedback; `None` until the first tick in RUN makes it continue from the adopted position.
-    integral: Option<SVector<T, D>>,
-    needle: Stream<NeedleSample>,
-    target: Stream<TargetSample>,
-    paddle: Stream<PaddleSample>,
-    target_lost: bool,
-    needle_frozen: FrozenMonitor,
-    target_frozen: FrozenMonitor,
-    gate: InnovationGate,
-    following: FollowingMonitor,
-    divergence: DivergenceMonitor,
-}
-
-impl<T: Scalar> State<T> {
-    /// The state before the first tick: HOLD, disarmed.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Mode after the last tick.
-    pub fn mode(&self) -> Mode {
-        self.mode
-    }
-
-    /// Faults of the last tick, and those that SAFE was entered for.
-    pub fn faults(&self) -> Faults {
-        self.faults
-    }
-
-    /// All accounts.
-    pub fn ledger(&self) -> &Ledger {
-        &self.ledger
-    }
-
-    /// Integral part of the command, length; `None` before RUN.
-    pub fn integral(&self) -> Option<[f64; 2]> {
-        self.integral.as_ref().map(to_frame)
-    }
-
-    /// Leaves SAFE after somebody has looked: accounts go on, everything else starts over. The next command adopts
-    /// the paddle's measured position.
-    pub fn rearm(&mut self) {
-        *self = Self {
-            ledger: self.ledger,
-            last_tick: self.last_tick,
-            command_sequence: self.command_sequence,
-            ..Self::default()
-        };
-    }
 }
 
 impl<'t, T: Scalar> Controller<'t, T> {
@@ -390,43 +324,3 @@ impl<'t, T: Scalar> Controller<'t, T> {
         }
     }
 }
-
-/// Enters the tick into the accounts and checks that time goes on. A tick from the past is rejected: nothing of it
-/// is read.
-fn start_tick<T: Scalar>(state: &mut State<T>, inputs: &Inputs, faults: &mut Faults) -> bool {
-    let Some((tick, time_ns)) = state.last_tick else {
-        state.ledger.ticks.start(0);
-        state.last_tick = Some((inputs.tick, inputs.time_ns));
-        return true;
-    };
-    if inputs.tick <= tick || inputs.time_ns < time_ns {
-        state.ledger.ticks.start(0);
-        *faults |= Faults::CLOCK_REVERSED;
-        return false;
-    }
-    let skipped = inputs.tick - tick - 1;
-    state.ledger.ticks.start(skipped);
-    state.last_tick = Some((inputs.tick, inputs.time_ns));
-    state.successive_overruns = if skipped > 0 {
-        state.successive_overruns.saturating_add(1)
-    } else {
-        0
-    };
-    faults.set_if(Faults::TICKS_SKIPPED, skipped > 0);
-    faults.set_if(
-        Faults::OVERRUN,
-        state.successive_overruns >= MAX_SUCCESSIVE_OVERRUNS,
-    );
-    true
-}
-
-fn to_frame<T: Scalar>(vector: &SVector<T, D>) -> [f64; D] {
-    [vector.x.to_f64(), vector.y.to_f64()]
-}
-
-fn from_frame<T: Scalar>(components: &[f64; D]) -> SVector<T, D> {
-    SVector::from(components.map(T::of))
-}
-
-#[cfg(test)]
-mod tests;

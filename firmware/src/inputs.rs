@@ -3,9 +3,9 @@
 use crate::contract::{NeedleSample, PaddleSample, TargetSample};
 use crate::ledger::{Discard, StreamLedger};
 use crate::monitor::{FrozenMonitor, InnovationGate};
+use crate::runtime::Runtime;
 use crate::scalar::Scalar;
 use crate::sequence::{Arrival, SequenceTracker};
-use crate::settings::Runtime;
 use crate::supervisor::Faults;
 
 /// What arrived since the previous tick: the newest sample of each stream, or `None`.

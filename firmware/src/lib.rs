@@ -91,6 +91,7 @@ pub mod law;
 pub mod ledger;
 pub mod limits;
 mod monitor;
+mod runtime;
 pub mod scalar;
 pub mod schedule;
 pub mod sequence;

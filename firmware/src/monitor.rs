@@ -2,8 +2,8 @@
 //! a loop that diverges.
 
 use crate::ledger::Discard;
+use crate::runtime::Runtime;
 use crate::scalar::Scalar;
-use crate::settings::Runtime;
 
 /// Identical samples that are still a coincidence.
 const FROZEN_SAMPLES: u32 = 5;

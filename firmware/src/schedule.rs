@@ -4,6 +4,8 @@
 //! release is already past at the end of a step, whole periods are skipped and counted, and the loop goes on in its
 //! old phase. It never runs twice to catch up.
 
+use core::num::NonZeroU64;
+
 /// Minimum, maximum and mean of a duration, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DurationStatistics {
@@ -53,7 +55,8 @@ pub struct Release {
 /// Periodic schedule in absolute time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Schedule {
-    period_ns: u64,
+    /// Not zero by type: dividing by it cannot panic.
+    period_ns: NonZeroU64,
     tick: u64,
     next_release_ns: u64,
     started_ns: u64,
@@ -72,7 +75,7 @@ impl Schedule {
     /// A schedule whose tick 0 is due at `first_release_ns`. A period of 0 is taken as 1 ns.
     pub fn new(first_release_ns: u64, period_ns: u64) -> Self {
         Self {
-            period_ns: period_ns.max(1),
+            period_ns: NonZeroU64::new(period_ns).unwrap_or(NonZeroU64::MIN),
             tick: 0,
             next_release_ns: first_release_ns,
             started_ns: first_release_ns,
@@ -129,10 +132,10 @@ impl Schedule {
         self.execution_time
             .record(now_ns.saturating_sub(self.started_ns));
         self.response_time.record(response_ns);
-        self.deadline_misses += u64::from(response_ns > self.period_ns);
+        self.deadline_misses += u64::from(response_ns > self.period_ns.get());
         self.advance(1);
         let past_ns = now_ns.saturating_sub(self.next_release_ns);
-        let skipped = past_ns.div_ceil(self.period_ns);
+        let skipped = past_ns.saturating_add(self.period_ns.get() - 1) / self.period_ns;
         if skipped > 0 {
             self.overruns += 1;
             self.skip(skipped);
@@ -141,15 +144,15 @@ impl Schedule {
     }
 
     fn skip(&mut self, periods: u64) {
-        self.skipped += periods;
+        self.skipped = self.skipped.saturating_add(periods);
         self.advance(periods);
     }
 
     fn advance(&mut self, periods: u64) {
-        self.tick += periods;
+        self.tick = self.tick.saturating_add(periods);
         self.next_release_ns = self
             .next_release_ns
-            .saturating_add(periods.saturating_mul(self.period_ns));
+            .saturating_add(periods.saturating_mul(self.period_ns.get()));
     }
 }
 

@@ -1,0 +1,255 @@
+//! Settings and table, built once into the numbers that a step uses.
+
+use crate::contract::Table;
+use crate::law::Direction;
+use crate::limits::Limits;
+use crate::scalar::Scalar;
+use crate::settings::{Settings, SettingsError, check, check_periods};
+use crate::stability;
+
+/// Lost target samples that do not interrupt RUN: two in a row happen to every camera, three are an outage.
+const TARGET_SAMPLES_TO_HOLD: u64 = 3;
+/// Missing target samples after which the situation must be looked at.
+const TARGET_SAMPLES_TO_SAFE: u64 = 15;
+/// Loop-rate inputs older than this many ticks lead to HOLD: scheduling hiccups of a few ticks are normal.
+const TICKS_TO_HOLD: u64 = 5;
+/// Nothing goes to SAFE by age sooner: a peer stopped for 100 ms must be able to come back.
+const SAFE_AGE_FLOOR_NS: u64 = 250_000_000;
+/// Depths this far outside the table, as a part of its range, are plausible (clamped); further ones are wrong units.
+const DEPTH_MARGIN: f64 = 1.0;
+/// Target displacements up to this multiple of the table's largest are plausible.
+const TARGET_MARGIN: f64 = 3.0;
+/// Measured paddle positions this far outside the limit are still noise.
+const PADDLE_MARGIN: f64 = 1.1;
+/// Following error at rest, part of the paddle's range: ten times the resolution of ordinary actuators.
+const FOLLOWING_FRACTION: f64 = 0.02;
+
+/// Limits of the age of an input, ns.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct AgeLimits {
+    pub(crate) hold_ns: u64,
+    pub(crate) safe_ns: u64,
+}
+
+/// Settings and table in the form that a step uses.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Runtime<T: Scalar> {
+    pub(crate) limits: Limits<T>,
+    pub(crate) gain: T,
+    pub(crate) direction: Direction,
+    pub(crate) loop_period_ns: u64,
+    pub(crate) actuator_delay_ns: u64,
+    pub(crate) delay_samples: u32,
+    /// Target period, s.
+    pub(crate) target_period: f64,
+    pub(crate) target_noise: f64,
+    pub(crate) needle_age: AgeLimits,
+    pub(crate) target_age: AgeLimits,
+    pub(crate) paddle_age: AgeLimits,
+    /// Depths that the table covers.
+    pub(crate) table_depth: (f64, f64),
+    /// Depths that are plausible.
+    pub(crate) plausible_depth: (f64, f64),
+    pub(crate) needle_speed: f64,
+    /// Largest plausible target displacement, length.
+    pub(crate) target_range: f64,
+    /// Largest plausible measured paddle displacement, length.
+    pub(crate) paddle_range: f64,
+    /// Largest |d(target displacement)/d(depth)|, with or without paddle motion.
+    pub(crate) target_slope: f64,
+    /// Largest ‖J‖.
+    pub(crate) jacobian_norm: f64,
+    pub(crate) following_error: f64,
+    /// Rate limit of the paddle, length/s.
+    pub(crate) paddle_rate: f64,
+}
+
+impl<T: Scalar> Runtime<T> {
+    /// Validates `settings` and combines them with a valid `table`.
+    pub(crate) fn new<const D: usize>(
+        table: &Table<T, D>,
+        settings: &Settings,
+    ) -> Result<Self, SettingsError> {
+        check_periods(settings)?;
+        let delay_samples = settings.delay_samples();
+        if delay_samples > stability::MAX_DELAY_SAMPLES {
+            return Err(SettingsError::Delay {
+                samples: delay_samples,
+            });
+        }
+        let lambda_max = settings
+            .lambda_max
+            .unwrap_or(table.gains.lambda_max.to_f64());
+        check(
+            "lambda_max",
+            "from 1 to 100",
+            (1.0..=100.0).contains(&lambda_max),
+        )?;
+        // Not limited to the stable range: stability is charted on both sides of its limit.
+        let gain = settings
+            .loop_gain
+            .unwrap_or(stability::default_gain(delay_samples, lambda_max));
+        check(
+            "loop gain",
+            "above 0 and at most 2",
+            gain > 0.0 && gain <= 2.0,
+        )?;
+        let noise = settings.target_noise;
+        check(
+            "target noise",
+            "finite and not negative",
+            noise.is_finite() && noise >= 0.0,
+        )?;
+        let max_displacement = table.paddle.max_displacement.to_f64();
+        let following_error = settings
+            .following_error
+            .unwrap_or(FOLLOWING_FRACTION * max_displacement);
+        check(
+            "following error",
+            "finite and positive",
+            following_error.is_finite() && following_error > 0.0,
+        )?;
+
+        let loop_period = settings.loop_period_ns as f64 * 1e-9;
+        let loop_age = AgeLimits {
+            hold_ns: TICKS_TO_HOLD * settings.loop_period_ns,
+            safe_ns: SAFE_AGE_FLOOR_NS.max(10 * TICKS_TO_HOLD * settings.loop_period_ns),
+        };
+        let target_age = AgeLimits {
+            hold_ns: settings.target_latency_ns
+                + TARGET_SAMPLES_TO_HOLD * settings.target_period_ns,
+            safe_ns: SAFE_AGE_FLOOR_NS.max(
+                settings.target_latency_ns + TARGET_SAMPLES_TO_SAFE * settings.target_period_ns,
+            ),
+        };
+        let (start, end) = (
+            table.validity.depth_start.to_f64(),
+            table.validity.depth_end.to_f64(),
+        );
+        let margin = DEPTH_MARGIN * (end - start);
+        let bounds = TableBounds::of(table);
+        Ok(Self {
+            limits: Limits {
+                shape: settings.position_limit,
+                max_displacement: table.paddle.max_displacement,
+                max_step: T::of(table.paddle.max_rate.to_f64() * loop_period),
+            },
+            gain: T::of(gain),
+            direction: settings.direction,
+            loop_period_ns: settings.loop_period_ns,
+            actuator_delay_ns: settings.actuator_delay_ns,
+            delay_samples,
+            target_period: settings.target_period_ns as f64 * 1e-9,
+            target_noise: noise,
+            needle_age: loop_age,
+            target_age,
+            paddle_age: loop_age,
+            table_depth: (start, end),
+            plausible_depth: (start - margin, end + margin),
+            needle_speed: table.validity.needle_speed.to_f64(),
+            target_range: TARGET_MARGIN * bounds.target_displacement
+                + bounds.jacobian_norm * max_displacement,
+            paddle_range: PADDLE_MARGIN * max_displacement,
+            target_slope: bounds.target_slope,
+            jacobian_norm: bounds.jacobian_norm,
+            following_error,
+            paddle_rate: table.paddle.max_rate.to_f64(),
+        })
+    }
+}
+
+/// Largest values over a table.
+struct TableBounds {
+    target_displacement: f64,
+    target_slope: f64,
+    jacobian_norm: f64,
+}
+
+impl TableBounds {
+    fn of<T: Scalar, const D: usize>(table: &Table<T, D>) -> Self {
+        let mut bounds = Self {
+            target_displacement: 0.0,
+            target_slope: 0.0,
+            jacobian_norm: 0.0,
+        };
+        for knot in &table.knots {
+            let moved = knot
+                .target_displacement
+                .norm()
+                .max(knot.static_target_displacement.norm());
+            bounds.target_displacement = bounds.target_displacement.max(moved.to_f64());
+            let slope = knot.target_displacement_slope.norm().to_f64();
+            bounds.target_slope = bounds.target_slope.max(slope);
+            bounds.jacobian_norm = bounds.jacobian_norm.max(knot.jacobian.norm().to_f64());
+        }
+        for pair in table.knots.windows(2) {
+            if let [shallow, deep] = pair {
+                let rise = deep.static_target_displacement - shallow.static_target_displacement;
+                let slope = rise.norm() / (deep.depth - shallow.depth);
+                bounds.target_slope = bounds.target_slope.max(slope.to_f64());
+            }
+        }
+        bounds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_support::table;
+
+    const MS: u64 = 1_000_000;
+
+    #[test]
+    fn delay_counts_the_samples_that_cannot_show_a_correction() {
+        assert_eq!(Settings::new(MS, 20 * MS, 20 * MS).delay_samples(), 1);
+        assert_eq!(Settings::new(MS, 20 * MS, 0).delay_samples(), 0);
+        assert_eq!(Settings::new(MS, 20 * MS, 39 * MS).delay_samples(), 2);
+    }
+
+    #[test]
+    fn impossible_settings_are_refused() {
+        let refuse = |settings| Runtime::new(&table(), &settings).unwrap_err();
+        let good = Settings::new(MS, 20 * MS, 20 * MS);
+        Runtime::new(&table(), &good).unwrap();
+        assert_eq!(
+            refuse(Settings {
+                loop_period_ns: 0,
+                ..good
+            }),
+            SettingsError::Period {
+                field: "loop period"
+            }
+        );
+        assert_eq!(
+            refuse(Settings {
+                target_period_ns: 1,
+                ..good
+            }),
+            SettingsError::TargetFasterThanLoop
+        );
+        assert!(matches!(
+            refuse(Settings {
+                target_latency_ns: 2_000 * MS,
+                ..good
+            }),
+            SettingsError::Delay { .. }
+        ));
+        for gain in [f64::NAN, 0.0, -1.0, 3.0] {
+            assert!(matches!(
+                refuse(Settings {
+                    loop_gain: Some(gain),
+                    ..good
+                }),
+                SettingsError::Range { .. }
+            ));
+        }
+        assert!(matches!(
+            refuse(Settings {
+                target_noise: f64::INFINITY,
+                ..good
+            }),
+            SettingsError::Range { .. }
+        ));
+    }
+}
