@@ -57,3 +57,58 @@ pub fn run_tick<T: Scalar, L: SampleSource + CommandSink>(
     link.send(&command)?;
     Ok((inputs, command))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+    use crate::supervisor::Mode;
+    use crate::test_support::{MS, Plant, table};
+
+    /// The plant of the tests behind the traits.
+    struct Link {
+        plant: Plant,
+        arrived: Inputs,
+    }
+
+    impl SampleSource for Link {
+        fn needle(&mut self) -> Option<NeedleSample> {
+            self.arrived.needle.take()
+        }
+        fn target(&mut self) -> Option<TargetSample> {
+            self.arrived.target.take()
+        }
+        fn paddle(&mut self) -> Option<PaddleSample> {
+            self.arrived.paddle.take()
+        }
+    }
+
+    impl CommandSink for Link {
+        type Error = core::convert::Infallible;
+
+        fn send(&mut self, command: &PaddleCommand) -> Result<(), Self::Error> {
+            self.plant.act(command);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_recorded_run_replays_bit_by_bit() {
+        let table = table();
+        let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+        let (mut state, mut replayed) = (State::<f64>::new(), State::<f64>::new());
+        let mut link = Link {
+            plant: Plant::new(),
+            arrived: Inputs::default(),
+        };
+        for tick in 0..3000 {
+            link.arrived = link.plant.sense();
+            let (inputs, command) =
+                run_tick(&controller, &mut state, tick, tick * MS, &mut link).unwrap();
+            assert_eq!(controller.step(&mut replayed, &inputs), command);
+            assert_eq!(replayed, state);
+        }
+        assert_eq!(state.mode(), Mode::Run);
+        assert_eq!(state.ledger().unaccounted(), 0);
+    }
+}

@@ -5,7 +5,7 @@
 
 use nalgebra::SVector;
 
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, bounded};
 
 /// Shape of the admissible positions.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,7 +46,7 @@ impl<T: Scalar> Limits<T> {
             PositionLimit::Norm => shorten(displacement, self.max_displacement),
             PositionLimit::Box => {
                 let half_edge = self.max_displacement / T::of(D as f64).sqrt();
-                displacement.map(|component| component.clamp(-half_edge, half_edge))
+                displacement.map(|component| bounded(component, -half_edge, half_edge))
             }
         }
     }

@@ -77,3 +77,17 @@ impl Scalar for f64 {
         self
     }
 }
+
+/// `value` moved into `low..=high`.
+///
+/// Instead of `clamp`, which panics for bounds in the wrong order, and of `max` and `min`, whose choice between −0 and
+/// +0 differs from target to target.
+pub(crate) fn bounded<T: Scalar>(value: T, low: T, high: T) -> T {
+    if value < low {
+        low
+    } else if value > high {
+        high
+    } else {
+        value
+    }
+}

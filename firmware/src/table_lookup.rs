@@ -6,7 +6,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use crate::contract::{Knot, Table};
-use crate::scalar::Scalar;
+use crate::scalar::{Scalar, bounded};
 
 /// A depth located in the table: the two knots around it and the position between them.
 #[derive(Clone, Copy, Debug)]
@@ -25,11 +25,12 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     /// Locates `depth` by bisection; `None` only for a table with fewer than two knots, which validation refuses.
     pub fn locate(&self, depth: T) -> Option<Location<'_, T, D>> {
         let (first, last) = (self.knots.first()?, self.knots.last()?);
-        let inside = depth.clamp(first.depth, last.depth);
+        let inside = bounded(depth, first.depth, last.depth);
         let right_index = self
             .knots
             .partition_point(|knot| knot.depth <= inside)
-            .clamp(1, self.knots.len() - 1);
+            .min(self.knots.len().saturating_sub(1))
+            .max(1);
         let (left, right) = (
             self.knots.get(right_index - 1)?,
             self.knots.get(right_index)?,
