@@ -69,7 +69,7 @@ pub(crate) fn table() -> Table<f64, 2> {
 pub(crate) const MS: u64 = 1_000_000;
 
 /// A linear plant with sensors: y = J·u + n·push(z) + axial, paddle one tick behind its command, target sampled every
-/// 20 ms and 20 ms old on arrival.
+/// 20 ms (unless changed) and 20 ms old on arrival.
 pub(crate) struct Plant {
     pub(crate) jacobian: Matrix2<f64>,
     /// Sideways push per unit of depth; the table assumes 0.02.
@@ -84,6 +84,8 @@ pub(crate) struct Plant {
     pub(crate) tick: u64,
     pub(crate) sequence: u32,
     pub(crate) paddle_index: u32,
+    /// Target period, ticks.
+    pub(crate) target_period: u64,
     pending: std::collections::VecDeque<TargetSample>,
     target_sequence: u32,
 }
@@ -101,6 +103,7 @@ impl Plant {
             tick: 0,
             sequence: 0,
             paddle_index: 3,
+            target_period: 20,
             pending: std::collections::VecDeque::new(),
             target_sequence: 0,
         }
@@ -114,7 +117,7 @@ impl Plant {
     /// Inputs of the next tick.
     pub(crate) fn sense(&mut self) -> Inputs {
         let time_ns = self.tick * MS;
-        if self.tick.is_multiple_of(20) {
+        if self.tick.is_multiple_of(self.target_period) {
             self.pending.push_back(TargetSample {
                 sequence: self.target_sequence,
                 flags: TARGET_VISIBLE,

@@ -98,6 +98,28 @@ fn a_wrong_table_is_corrected_by_feedback() {
     }
 }
 
+#[test]
+fn a_slow_target_sensor_makes_no_oscillation() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings::new(MS, 33 * MS, 20 * MS));
+    closed.plant.target_period = 33;
+    closed.plant.speed = 0.0;
+    closed.plant.offset = 1e-3;
+    closed.run(200);
+    let mut last = closed.plant.target().x;
+    for _ in 0..2000 {
+        closed.tick(|_| {});
+        let error = closed.plant.target().x;
+        assert!(
+            error >= -1e-12 && error <= last + 1e-12,
+            "neither overshoot nor return"
+        );
+        last = error;
+    }
+    assert_eq!(closed.state.mode(), Mode::Run);
+    assert!(last < 1e-6);
+}
+
 /// Final size of the orthogonal error at g·λ = `ratio` × limit, relative to its start, with everything linear.
 fn growth(ratio: f64) -> f64 {
     let mut table = table();
