@@ -1,0 +1,103 @@
+//! Nodes on a lattice, fitted to the outline and to every feature of a scene.
+
+use super::Point;
+use crate::scene::geometry::{Location, Point2, distance_to_segment};
+use crate::scene::Scene;
+
+/// Lattice nodes nearer to a feature point than this fraction of the spacing give way to it: two kernels almost on
+/// top of each other add cost and ill-conditioning, and nothing else.
+const CLEARANCE: f64 = 0.25;
+/// A straight feature whose nodes are farther apart than this many spacings gets nodes of its own. The diagonal of a
+/// lattice square is √2 spacings: lattice diagonals are left as they are.
+const MAX_GAP: f64 = 1.5;
+
+/// Points that must be nodes: outline corners, ends of paddles and of the needle contact, corners of the immobile
+/// part, and the target.
+pub fn feature_points(scene: &Scene) -> Vec<Point2> {
+    let mut points = scene.outline.vertices().to_vec();
+    points.extend(scene.paddles.iter().flat_map(|p| p.segment));
+    points.extend(&scene.needle.contact);
+    points.extend(scene.immobile.iter().flatten());
+    points.push(scene.target);
+    points
+}
+
+/// Straight pieces that nodes must follow: outline edges and needle contact.
+fn feature_segments(scene: &Scene) -> Vec<(Point2, Point2)> {
+    let contact = scene.needle.contact.windows(2).map(|s| (s[0], s[1]));
+    scene.outline.edges().chain(contact).collect()
+}
+
+/// Nodes of the given spacing: lattice points inside or on the outline (the lattice starts at the lower left corner of
+/// the bounding box), feature points that the lattice misses, and nodes along outline edges that it does not follow.
+pub fn lattice_nodes(scene: &Scene, spacing: f64) -> Vec<Point<2>> {
+    let outline = &scene.outline;
+    let tolerance = 1e-9 * outline.size();
+    let (low, high) = outline.bounds();
+    let count = |extent: f64| (extent / spacing + 1e-9).floor() as usize + 1;
+    let (columns, rows) = (count(high.x - low.x), count(high.y - low.y));
+    let mut nodes: Vec<Point2> = (0..columns * rows)
+        .map(|n| low + Point2::new((n % columns) as f64, (n / columns) as f64) * spacing)
+        .filter(|p| outline.locate(*p, tolerance) != Location::Outside)
+        .collect();
+
+    let mut fixed: Vec<Point2> = Vec::new();
+    for p in feature_points(scene) {
+        let snap = |nodes: &mut [Point2]| match nodes.iter_mut().find(|x| (**x - p).norm() <= tolerance) {
+            // The feature's own digits, not the lattice's: 3 × 0.1 is not 0.3.
+            Some(x) => {
+                *x = p;
+                true
+            }
+            None => false,
+        };
+        if !snap(&mut nodes) && !snap(&mut fixed) {
+            fixed.push(p);
+        }
+    }
+    for (a, b) in feature_segments(scene) {
+        fill_gaps(a, b, spacing, tolerance, &nodes, &mut fixed);
+    }
+    let features = feature_points(scene);
+    nodes.retain(|x| {
+        let is_feature = features.iter().any(|f| (f - x).norm() <= tolerance);
+        is_feature || fixed.iter().all(|f| (f - x).norm() >= CLEARANCE * spacing)
+    });
+    nodes.extend(fixed);
+    nodes
+}
+
+/// Adds evenly spaced nodes where those on the segment from `a` to `b` leave a gap.
+fn fill_gaps(a: Point2, b: Point2, spacing: f64, tolerance: f64, nodes: &[Point2], fixed: &mut Vec<Point2>) {
+    let length = (b - a).norm();
+    let direction = (b - a) / length;
+    let mut stations: Vec<f64> = nodes
+        .iter()
+        .chain(fixed.iter())
+        .filter(|x| distance_to_segment(**x, a, b) <= tolerance)
+        .map(|x| (x - a).dot(&direction))
+        .collect();
+    stations.sort_by(f64::total_cmp);
+    for pair in stations.windows(2) {
+        let gap = pair[1] - pair[0];
+        if gap > MAX_GAP * spacing {
+            let pieces = (gap / spacing).round().max(2.0);
+            fixed.extend((1..pieces as usize).map(|k| a + direction * (pair[0] + gap * k as f64 / pieces)));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_papers_scenes_have_the_published_node_counts() {
+        for (name, spacing, expected) in
+            [("paper", 0.1, 106), ("paper-hull", 0.1, 126), ("paper", 0.05, 386), ("paper", 0.025, 1471)]
+        {
+            let scene = Scene::bundled(name).unwrap();
+            assert_eq!(lattice_nodes(&scene, spacing).len(), expected, "{name} at {spacing}");
+        }
+    }
+}

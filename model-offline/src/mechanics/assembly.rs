@@ -1,0 +1,214 @@
+//! Assembly of internal force and tangent stiffness in coefficient space, where the tangent is sparse.
+//!
+//! With F_q = I + Σ_I d_I ⊗ g_I(q): internal force `f_I = Σ_q w_q P(F_q) g_I` and tangent stiffness
+//! `(K_IJ)_ik = Σ_q w_q g_I,j A_ijkl(F_q) g_J,l`, total Lagrangian throughout.
+
+use super::Material;
+use super::material::{Matrix, determinant};
+use crate::discretization::Quadrature;
+use crate::solver::linear::Pattern;
+
+/// The materials of a tissue, and how much of each every cell contains.
+#[derive(Debug, Clone)]
+pub struct Tissue {
+    materials: Vec<Material>,
+    /// Per cell: range into `parts`.
+    offsets: Vec<u32>,
+    /// (material, factor on its energy).
+    parts: Vec<(u32, f64)>,
+}
+
+impl Tissue {
+    /// A tissue of one material in every cell.
+    pub fn uniform(material: Material, cells: usize) -> Self {
+        Self { materials: vec![material], offsets: (0..=cells as u32).collect(), parts: vec![(0, 1.0); cells] }
+    }
+
+    /// A tissue from the parts of every cell: (index into `materials`, factor on the energy).
+    pub fn new(materials: Vec<Material>, cells: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
+        let (mut offsets, mut parts) = (vec![0], Vec::new());
+        for cell in cells {
+            parts.extend(cell);
+            offsets.push(parts.len() as u32);
+        }
+        Self { materials, offsets, parts }
+    }
+
+    /// The materials and energy factors of a cell.
+    #[inline]
+    pub fn parts(&self, cell: u32) -> impl Iterator<Item = (&Material, f64)> + '_ {
+        let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
+        self.parts[range].iter().map(|&(m, factor)| (&self.materials[m as usize], factor))
+    }
+
+    /// Whether every material is linear, so that one tangent serves every state.
+    pub fn is_linear(&self) -> bool {
+        self.materials.iter().all(Material::is_linear)
+    }
+
+    /// The same tissue with every law replaced by its small-strain limit.
+    ///
+    /// # Errors
+    /// Never for the laws there are; the signature leaves room for one without a linear limit.
+    pub fn linearised(&self) -> Result<Self, super::MaterialError> {
+        let materials = self.materials.iter().map(Material::linearised).collect::<Result<_, _>>()?;
+        Ok(Self { materials, ..self.clone() })
+    }
+}
+
+/// A configuration that the model does not admit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inverted {
+    /// Integration point.
+    pub point: usize,
+    /// det F there (NaN when the law overflowed).
+    pub det_f: f64,
+}
+
+/// Displacement gradients of all integration points, kept from the force evaluation for the tangent.
+#[derive(Debug, Clone, Default)]
+pub struct State<const D: usize> {
+    gradients: Vec<Matrix<D>>,
+}
+
+impl<const D: usize> State<D> {
+    /// Displacement gradients H = F − I, per integration point.
+    pub fn displacement_gradients(&self) -> &[Matrix<D>] {
+        &self.gradients
+    }
+}
+
+/// Displacement gradient at integration point `q` for coefficients stored node by node.
+#[inline]
+pub fn displacement_gradient<const D: usize>(rule: &Quadrature<D>, q: usize, coefficients: &[f64]) -> Matrix<D> {
+    let point = rule.point(q);
+    let mut h = Matrix::<D>::zeros();
+    for (&i, g) in point.nodes.iter().zip(point.gradients) {
+        let d = &coefficients[i as usize * D..i as usize * D + D];
+        for r in 0..D {
+            for c in 0..D {
+                h[(r, c)] += d[r] * g[c];
+            }
+        }
+    }
+    h
+}
+
+/// Internal force and strain energy at the given coefficients; fills `state` for [`tangent`].
+///
+/// # Errors
+/// [`Inverted`] when det F ≤ 0 or not a number at an integration point; `force` is then not meaningful.
+pub fn internal_force<const D: usize>(
+    rule: &Quadrature<D>,
+    tissue: &Tissue,
+    coefficients: &[f64],
+    state: &mut State<D>,
+    force: &mut [f64],
+) -> Result<f64, Inverted> {
+    force.fill(0.0);
+    state.gradients.clear();
+    let linear = tissue.is_linear();
+    let mut energy = 0.0;
+    for (q, point) in rule.points().enumerate() {
+        let h = displacement_gradient(rule, q, coefficients);
+        state.gradients.push(h);
+        let det_f = determinant(&(Matrix::<D>::identity() + h));
+        if !linear && (det_f <= 0.0 || det_f.is_nan()) {
+            return Err(Inverted { point: q, det_f });
+        }
+        let mut pk1 = Matrix::<D>::zeros();
+        for (material, factor) in tissue.parts(point.cell) {
+            let response = material.respond(&h);
+            energy += point.weight * factor * response.energy;
+            pk1 += response.pk1_stress * (point.weight * factor);
+        }
+        if !pk1.iter().all(|p| p.is_finite()) {
+            return Err(Inverted { point: q, det_f: f64::NAN });
+        }
+        for (&i, g) in point.nodes.iter().zip(point.gradients) {
+            let f = &mut force[i as usize * D..i as usize * D + D];
+            for r in 0..D {
+                for c in 0..D {
+                    f[r] += pk1[(r, c)] * g[c];
+                }
+            }
+        }
+    }
+    Ok(energy)
+}
+
+/// Where every (point, node, node) block of the tangent goes: computed once per pattern, so that assembly is a plain
+/// loop without searches.
+#[derive(Debug, Clone)]
+pub struct Scatter {
+    /// For every point and every ordered pair (row ≥ column) of its nodes: first entry of the block's first column.
+    positions: Vec<u32>,
+}
+
+impl Scatter {
+    /// Finds the place of every block of `rule` in `pattern`.
+    ///
+    /// # Panics
+    /// When the pattern misses a block that the rule produces.
+    pub fn new<const D: usize>(rule: &Quadrature<D>, pattern: &Pattern) -> Self {
+        let mut positions = Vec::with_capacity(rule.pairs() * 13);
+        for point in rule.points() {
+            for (column, &j) in point.nodes.iter().enumerate() {
+                for &i in &point.nodes[column..] {
+                    positions.push(pattern.block_position(i, j).expect("the pattern covers the rule") as u32);
+                }
+            }
+        }
+        Self { positions }
+    }
+}
+
+/// Tangent stiffness at the state that [`internal_force`] left, added into `values` (lower triangle of blocks, laid
+/// out by `pattern`).
+pub fn tangent<const D: usize>(
+    rule: &Quadrature<D>,
+    tissue: &Tissue,
+    state: &State<D>,
+    pattern: &Pattern,
+    scatter: &Scatter,
+    values: &mut [f64],
+) {
+    let mut next = 0;
+    for (point, h) in rule.points().zip(&state.gradients) {
+        let mut a = [[[[0.0; D]; D]; D]; D];
+        for (material, factor) in tissue.parts(point.cell) {
+            let part = material.tangent(h);
+            let scale = point.weight * factor;
+            for (sum, row) in a.iter_mut().flatten().flatten().flatten().zip(part.iter().flatten().flatten().flatten()) {
+                *sum += scale * row;
+            }
+        }
+        for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {
+            // t[i][m][k] = A_imkl g_J,l: shared by all rows of this column.
+            let mut t = [[[0.0; D]; D]; D];
+            for i in 0..D {
+                for m in 0..D {
+                    for k in 0..D {
+                        for l in 0..D {
+                            t[i][m][k] += a[i][m][k][l] * gj[l];
+                        }
+                    }
+                }
+            }
+            let stride = pattern.column_length(j);
+            let rows = &point.gradients[column..];
+            for (gi, &at) in rows.iter().zip(&scatter.positions[next..next + rows.len()]) {
+                for k in 0..D {
+                    let start = at as usize + k * stride;
+                    let block = &mut values[start..start + D];
+                    for i in 0..D {
+                        for m in 0..D {
+                            block[i] += gi[m] * t[i][m][k];
+                        }
+                    }
+                }
+            }
+            next += rows.len();
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Kinematics, materials, and the assembly of internal force and tangent stiffness.
+
+pub mod assembly;
+pub mod material;
+pub use assembly::Tissue;
+
+pub use material::{FungTensors, Material, MaterialError};

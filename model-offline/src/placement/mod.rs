@@ -1,0 +1,9 @@
+//! Where to put the paddle: the actuation Jacobian d(target)/d(paddle), the controllability measure ‖J⁻¹n‖, the static
+//! study, and the rankings for the static and the dynamic approach.
+
+pub mod model;
+pub mod study;
+pub mod table;
+
+pub use model::{Body, ModelError, TissueModel};
+pub use study::{PaddleResult, Placement, StaticStudy, place};

@@ -1,0 +1,198 @@
+//! The controller's table: Jacobians and the feed-forward paddle path along the insertion, from the nonlinear model.
+
+use super::model::{Body, ModelError, TissueModel};
+use super::study::best_direction;
+use crate::solver::equilibrium::{Failure, NewtonSettings};
+use firmware::contract::{Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity};
+use firmware::stability::default_gain;
+use nalgebra::{Matrix2, Vector2};
+
+/// How a table is made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TableOptions {
+    /// Depth knots, at least 2.
+    pub knots: usize,
+    /// Delay of the feedback loop that the suggested gain is for, in target samples.
+    pub delay_samples: u32,
+    /// Largest |λ| of J·Ĵ⁻¹ that the tissue may turn out to have. On the paper's scene, homogeneous tissue and the
+    /// 100-fold inclusion mistaken for each other give 0.8 to 1.25.
+    pub lambda_max: f64,
+}
+
+impl Default for TableOptions {
+    fn default() -> Self {
+        Self { knots: 21, delay_samples: 1, lambda_max: 1.25 }
+    }
+}
+
+/// Why a table could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableBuildError {
+    /// No such paddle in the scene.
+    #[error("the scene has no paddle {0}")]
+    NoSuchPaddle(u32),
+    /// The number of knots is out of range.
+    #[error("a table has 2 to {MAX_KNOTS} knots, not {0}")]
+    Knots(usize),
+    /// The model failed before the second knot.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The paddle would have to go farther than its actuator can.
+    #[error("holding the target at depth {depth:.4} takes a paddle displacement of {needed:.4}, the actuator has {available:.4}: raise [actuator] max_displacement or choose another paddle")]
+    OutOfReach {
+        /// Needle depth.
+        depth: f64,
+        /// Paddle displacement it takes.
+        needed: f64,
+        /// Paddle displacement there is.
+        available: f64,
+    },
+    /// A label does not fit into the table.
+    #[error("label {0:?} is too long for the table")]
+    Label(String),
+    /// The table breaks one of its own rules.
+    #[error("the table is not valid: {0}")]
+    Invalid(TableError),
+}
+
+/// Builds the table of one paddle. When the tissue loses stability on the way, the table ends at the last knot reached
+/// (its validity range says so).
+///
+/// # Errors
+/// [`TableBuildError`].
+pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> Result<Table<f64, 2>, TableBuildError> {
+    if !(2..=MAX_KNOTS).contains(&options.knots) {
+        return Err(TableBuildError::Knots(options.knots));
+    }
+    let scene = model.scene();
+    let position = model.paddle_position(paddle_index).ok_or(TableBuildError::NoSuchPaddle(paddle_index))?;
+    let settings = NewtonSettings::default();
+    let mut fixture = model.body(Some(position), settings).map_err(ModelError::from)?;
+    let mut steered = model.body(Some(position), settings).map_err(ModelError::from)?;
+    let mut knots = heapless::Vec::new();
+    for k in 0..options.knots {
+        let depth = scene.needle.depth * k as f64 / (options.knots - 1) as f64;
+        match knot(&mut fixture, &mut steered, depth, paddle_index, scene.needle.orthogonal()) {
+            Ok(knot) => {
+                let needed = knot.paddle_path.norm();
+                let available = scene.actuator.max_displacement;
+                if needed > available {
+                    return Err(TableBuildError::OutOfReach { depth, needed, available });
+                }
+                // Capacity was checked above.
+                let _ = knots.push(knot);
+            }
+            Err(error) if knots.len() < 2 => return Err(error.into()),
+            Err(_) => break,
+        }
+    }
+    let (first, last) = (&knots[0], &knots[knots.len() - 1]);
+    let table = Table {
+        scene_hash: scene.hash(),
+        units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
+        tissue: label(scene.tissue())?,
+        paddle: Paddle {
+            index: paddle_index,
+            segment: scene.paddles[position].segment,
+            max_displacement: scene.actuator.max_displacement,
+            max_rate: scene.actuator.max_rate,
+        },
+        needle_axis: scene.needle.axis,
+        orthogonal: scene.needle.orthogonal(),
+        target_position: scene.target,
+        validity: Validity {
+            depth_start: first.depth,
+            depth_end: last.depth,
+            paddle_displacement: scene.actuator.max_displacement,
+            needle_speed: scene.actuator.max_needle_speed,
+        },
+        gains: Gains {
+            loop_gain: default_gain(options.delay_samples, options.lambda_max),
+            delay_samples: options.delay_samples,
+            lambda_max: options.lambda_max,
+        },
+        knots,
+    };
+    table.validate().map_err(TableBuildError::Invalid)?;
+    Ok(table)
+}
+
+/// The bytes of a table file.
+///
+/// # Errors
+/// [`TableBuildError::Invalid`] when the table breaks one of its own rules.
+pub fn to_bytes(table: &Table<f64, 2>) -> Result<Vec<u8>, TableBuildError> {
+    let mut bytes = vec![0; MAX_TABLE_BYTES];
+    let length = firmware::contract::encode(table, &mut bytes).map_err(TableBuildError::Invalid)?;
+    bytes.truncate(length);
+    Ok(bytes)
+}
+
+fn label<const N: usize>(text: &str) -> Result<heapless::String<N>, TableBuildError> {
+    heapless::String::try_from(text).map_err(|_| TableBuildError::Label(text.to_owned()))
+}
+
+/// One knot: takes both bodies to the depth, and steers the paddle so that the target is back on the needle's line.
+fn knot(
+    fixture: &mut Body<'_>,
+    steered: &mut Body<'_>,
+    depth: f64,
+    paddle: u32,
+    normal: Vector2<f64>,
+) -> Result<Knot<f64, 2>, ModelError> {
+    fixture.drive(depth, Vector2::zeros())?;
+    // Start where the last knot's slope points to.
+    let (_, direction, sensitivity) = linearise(steered, paddle, normal)?;
+    let ahead = path_slope(direction, sensitivity, normal) * (depth - steered.depth());
+    steered.drive(depth, steered.paddle() + ahead)?;
+    steer(steered, paddle, normal)?;
+    let (jacobian, direction, sensitivity) = linearise(steered, paddle, normal)?;
+    let slope = path_slope(direction, sensitivity, normal);
+    Ok(Knot {
+        depth,
+        jacobian,
+        paddle_path: steered.paddle(),
+        paddle_path_slope: slope,
+        target_displacement: steered.target_displacement(),
+        target_displacement_slope: sensitivity + jacobian * slope,
+        static_target_displacement: fixture.target_displacement(),
+    })
+}
+
+/// d(paddle)/d(depth) that keeps n·(target displacement) at zero, moving the paddle along J⁻¹n.
+fn path_slope(direction: Vector2<f64>, sensitivity: Vector2<f64>, normal: Vector2<f64>) -> Vector2<f64> {
+    -direction * normal.dot(&sensitivity)
+}
+
+fn linearise(
+    body: &mut Body<'_>,
+    paddle: u32,
+    normal: Vector2<f64>,
+) -> Result<(Matrix2<f64>, Vector2<f64>, Vector2<f64>), ModelError> {
+    let jacobian = body.actuation_jacobian()?;
+    let direction = best_direction(&jacobian, normal)
+        .map_err(|condition| ModelError::Uncontrollable { paddle, condition })?;
+    Ok((jacobian, direction, body.depth_sensitivity()?))
+}
+
+/// Newton's method on the paddle displacement: n·(target displacement) = 0 at the present depth.
+fn steer(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<(), ModelError> {
+    let tolerance = 1e-12 * body.scale();
+    let mut error = normal.dot(&body.target_displacement());
+    for _ in 0..12 {
+        if error.abs() <= tolerance {
+            return Ok(());
+        }
+        let (_, direction, _) = linearise(body, paddle, normal)?;
+        body.drive(body.depth(), body.paddle() - direction * error)?;
+        error = normal.dot(&body.target_displacement());
+    }
+    if error.abs() <= 1e6 * tolerance {
+        return Ok(());
+    }
+    Err(ModelError::Solve(Failure {
+        reason: crate::solver::equilibrium::FailureReason::NotConverged,
+        reached: 0.0,
+        detail: format!("the paddle path at depth {:.4} leaves {error:.1e} of orthogonal error", body.depth()),
+    }))
+}

@@ -1,0 +1,346 @@
+//! Planar geometry that scenes and nodal cells are made of: polygons, polylines, segments.
+
+use nalgebra::Vector2;
+
+/// A point or vector of the plane, in scene length units.
+pub type Point2 = Vector2<f64>;
+
+/// The z component of `a × b`: twice the signed area of the triangle (0, a, b).
+#[inline]
+pub fn cross(a: Point2, b: Point2) -> f64 {
+    a.x * b.y - a.y * b.x
+}
+
+/// Where a point lies with respect to a polygon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Location {
+    /// Strictly inside.
+    Inside,
+    /// On the boundary, within the tolerance asked for.
+    OnBoundary,
+    /// Strictly outside.
+    Outside,
+}
+
+/// A simple polygon, vertices in counter-clockwise order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polygon {
+    vertices: Vec<Point2>,
+}
+
+/// Why a list of vertices is not a simple polygon.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PolygonError {
+    /// Fewer than three vertices.
+    #[error("a polygon needs at least three vertices, this one has {0}")]
+    TooFewVertices(usize),
+    /// Two successive vertices coincide.
+    #[error("vertices {0} and {1} coincide; remove one of them")]
+    RepeatedVertex(usize, usize),
+    /// The edges enclose no area.
+    #[error("the polygon encloses no area")]
+    NoArea,
+    /// Two edges that are not neighbours meet, or two neighbours fold back on each other.
+    #[error("edge {first} (from vertex {first}) and edge {second} (from vertex {second}) cross or touch; reorder the vertices so that the outline does not meet itself")]
+    Crossing {
+        /// Index of one edge, counted from its first vertex.
+        first: usize,
+        /// Index of the other edge.
+        second: usize,
+    },
+}
+
+impl Polygon {
+    /// Checks that the vertices form a simple polygon and orients them counter-clockwise.
+    ///
+    /// # Errors
+    /// [`PolygonError`] names the vertex or the edges at fault.
+    pub fn new(mut vertices: Vec<Point2>) -> Result<Self, PolygonError> {
+        let n = vertices.len();
+        if n < 3 {
+            return Err(PolygonError::TooFewVertices(n));
+        }
+        let size = extent(&vertices);
+        for i in 0..n {
+            let next = (i + 1) % n;
+            if (vertices[next] - vertices[i]).norm() <= 1e-12 * size {
+                return Err(PolygonError::RepeatedVertex(i, next));
+            }
+        }
+        if let Some((first, second)) = first_crossing(&vertices, 1e-12 * size) {
+            return Err(PolygonError::Crossing { first, second });
+        }
+        let area = signed_area(&vertices);
+        if area.abs() <= 1e-12 * size * size {
+            return Err(PolygonError::NoArea);
+        }
+        if area < 0.0 {
+            vertices.reverse();
+        }
+        Ok(Self { vertices })
+    }
+
+    /// Vertices, counter-clockwise.
+    pub fn vertices(&self) -> &[Point2] {
+        &self.vertices
+    }
+
+    /// Edges as (start, end), counter-clockwise.
+    pub fn edges(&self) -> impl Iterator<Item = (Point2, Point2)> + '_ {
+        let n = self.vertices.len();
+        (0..n).map(move |i| (self.vertices[i], self.vertices[(i + 1) % n]))
+    }
+
+    /// Enclosed area.
+    pub fn area(&self) -> f64 {
+        signed_area(&self.vertices)
+    }
+
+    /// Lower left and upper right corner of the bounding box.
+    pub fn bounds(&self) -> (Point2, Point2) {
+        bounds(&self.vertices)
+    }
+
+    /// Diagonal of the bounding box: the length that tolerances are relative to.
+    pub fn size(&self) -> f64 {
+        extent(&self.vertices)
+    }
+
+    /// Distance from a point to the nearest edge.
+    pub fn distance_to_boundary(&self, p: Point2) -> f64 {
+        self.edges()
+            .map(|(a, b)| distance_to_segment(p, a, b))
+            .fold(f64::INFINITY, f64::min)
+    }
+
+    /// Classifies a point; within `tolerance` of an edge it is on the boundary.
+    pub fn locate(&self, p: Point2, tolerance: f64) -> Location {
+        if self.distance_to_boundary(p) <= tolerance {
+            Location::OnBoundary
+        } else if self.contains(p) {
+            Location::Inside
+        } else {
+            Location::Outside
+        }
+    }
+
+    /// Even-odd rule; points on the boundary may fall either way.
+    pub fn contains(&self, p: Point2) -> bool {
+        self.edges().fold(false, |inside, (a, b)| {
+            let crosses = (a.y > p.y) != (b.y > p.y)
+                && p.x < (b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x;
+            inside ^ crosses
+        })
+    }
+
+    /// Whether the whole segment lies on the boundary (it may run over several collinear edges).
+    pub fn segment_on_boundary(&self, a: Point2, b: Point2, tolerance: f64) -> bool {
+        let on = |p| self.distance_to_boundary(p) <= tolerance;
+        // The distance to a simple polygon along a segment is piecewise smooth with breaks only where the
+        // foot changes edge; those breaks lie at projections of vertices, so testing between them suffices.
+        let direction = b - a;
+        let length2 = direction.norm_squared();
+        let mut stations: Vec<f64> = self
+            .vertices
+            .iter()
+            .map(|v| (v - a).dot(&direction) / length2)
+            .filter(|s| (0.0..=1.0).contains(s))
+            .collect();
+        stations.extend([0.0, 1.0]);
+        stations.sort_by(f64::total_cmp);
+        stations
+            .windows(2)
+            .all(|s| [s[0], 0.5 * (s[0] + s[1]), s[1]].iter().all(|&t| on(a + direction * t)))
+    }
+}
+
+/// Distance from `p` to the segment from `a` to `b`.
+pub fn distance_to_segment(p: Point2, a: Point2, b: Point2) -> f64 {
+    let d = b - a;
+    let length2 = d.norm_squared();
+    let s = if length2 > 0.0 { ((p - a).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 };
+    (p - a - d * s).norm()
+}
+
+/// Distance from `p` to a polyline.
+pub fn distance_to_polyline(p: Point2, polyline: &[Point2]) -> f64 {
+    polyline.windows(2).map(|s| distance_to_segment(p, s[0], s[1])).fold(f64::INFINITY, f64::min)
+}
+
+/// Signed area of a closed loop of vertices (positive when counter-clockwise).
+pub fn signed_area(vertices: &[Point2]) -> f64 {
+    let n = vertices.len();
+    // Relative to the first vertex: cells far from the origin keep their digits.
+    (1..n.saturating_sub(1))
+        .map(|i| 0.5 * cross(vertices[i] - vertices[0], vertices[i + 1] - vertices[0]))
+        .sum()
+}
+
+/// Lower left and upper right corner of the bounding box of some points.
+pub fn bounds(points: &[Point2]) -> (Point2, Point2) {
+    points.iter().fold(
+        (Point2::repeat(f64::INFINITY), Point2::repeat(f64::NEG_INFINITY)),
+        |(low, high), p| (low.inf(p), high.sup(p)),
+    )
+}
+
+fn extent(points: &[Point2]) -> f64 {
+    let (low, high) = bounds(points);
+    (high - low).norm()
+}
+
+/// First pair of edges that meet other than at a shared vertex, or that fold back on each other there.
+///
+/// A sweep over the edges sorted by their lowest x keeps this near linear for outlines of many vertices.
+fn first_crossing(v: &[Point2], tolerance: f64) -> Option<(usize, usize)> {
+    let n = v.len();
+    let end = |i: usize| v[(i + 1) % n];
+    let mut order: Vec<usize> = (0..n).collect();
+    let low = |i: usize| v[i].x.min(end(i).x);
+    let high = |i: usize| v[i].x.max(end(i).x);
+    order.sort_by(|&i, &j| low(i).total_cmp(&low(j)));
+    let mut active: Vec<usize> = Vec::new();
+    for &i in &order {
+        active.retain(|&j| high(j) + tolerance >= low(i));
+        for &j in &active {
+            let (first, second) = (i.min(j), i.max(j));
+            let neighbours = second == first + 1 || (first == 0 && second == n - 1);
+            let meet = if neighbours {
+                let (shared, p, q) = if second == first + 1 {
+                    (v[second], v[first], end(second))
+                } else {
+                    (v[0], v[n - 1], end(0))
+                };
+                let (a, b) = (p - shared, q - shared);
+                a.dot(&b) > 0.0 && cross(a, b).abs() <= 1e-12 * a.norm() * b.norm()
+            } else {
+                segments_meet(v[i], end(i), v[j], end(j), tolerance)
+            };
+            if meet {
+                return Some((first, second));
+            }
+        }
+        active.push(i);
+    }
+    None
+}
+
+/// Whether two closed segments meet or come closer than `tolerance`.
+pub fn segments_meet(a: Point2, b: Point2, c: Point2, d: Point2, tolerance: f64) -> bool {
+    let side = |p: Point2, q: Point2, r: Point2| cross(q - p, r - p);
+    let straddle = |x: f64, y: f64| (x > 0.0 && y < 0.0) || (x < 0.0 && y > 0.0);
+    if straddle(side(a, b, c), side(a, b, d)) && straddle(side(c, d, a), side(c, d, b)) {
+        return true;
+    }
+    distance_to_segment(a, c, d) <= tolerance
+        || distance_to_segment(b, c, d) <= tolerance
+        || distance_to_segment(c, a, b) <= tolerance
+        || distance_to_segment(d, a, b) <= tolerance
+}
+
+/// Keeps the part of a loop on the side of `origin` opposite to `normal` (Sutherland–Hodgman), carrying a label
+/// per edge; the new edge gets `label`. `vertices[i]` and `labels[i]` describe the edge from vertex i to i + 1.
+///
+/// For a loop that is not convex the result may contain coincident edges that run both ways: every boundary
+/// integral over them cancels, and areas stay exact.
+pub fn clip_half_plane<L: Copy>(
+    loop_in: &[(Point2, L)],
+    origin: Point2,
+    normal: Point2,
+    label: L,
+    out: &mut Vec<(Point2, L)>,
+) {
+    out.clear();
+    let n = loop_in.len();
+    let side = |p: Point2| (p - origin).dot(&normal);
+    for i in 0..n {
+        let (p, edge) = loop_in[i];
+        let (q, _) = loop_in[(i + 1) % n];
+        let (sp, sq) = (side(p), side(q));
+        let crossing = |from: f64, to: f64| p + (q - p) * (from / (from - to));
+        match (sp <= 0.0, sq <= 0.0) {
+            (true, true) => out.push((p, edge)),
+            (true, false) => {
+                out.push((p, edge));
+                if sp < 0.0 {
+                    out.push((crossing(sp, sq), label));
+                } else if let Some(last) = out.last_mut() {
+                    // `p` lies on the line and the loop leaves: the new edge starts right here.
+                    last.1 = label;
+                }
+            }
+            (false, true) => {
+                if sq < 0.0 {
+                    out.push((crossing(sp, sq), edge));
+                }
+            }
+            (false, false) => {}
+        }
+    }
+}
+
+/// Area of a polygon that lies inside a convex loop (counter-clockwise).
+pub fn overlap_area(polygon: &Polygon, convex: &[Point2]) -> f64 {
+    let mut current: Vec<(Point2, ())> = polygon.vertices.iter().map(|&v| (v, ())).collect();
+    let mut next = Vec::with_capacity(current.len() + 4);
+    for i in 0..convex.len() {
+        let (a, b) = (convex[i], convex[(i + 1) % convex.len()]);
+        let d = b - a;
+        clip_half_plane(&current, a, Point2::new(d.y, -d.x), (), &mut next);
+        std::mem::swap(&mut current, &mut next);
+        if current.is_empty() {
+            return 0.0;
+        }
+    }
+    let corners: Vec<Point2> = current.iter().map(|c| c.0).collect();
+    signed_area(&corners).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn polygon(v: &[[f64; 2]]) -> Result<Polygon, PolygonError> {
+        Polygon::new(v.iter().map(|p| Point2::new(p[0], p[1])).collect())
+    }
+
+    #[test]
+    fn either_orientation_gives_the_same_area() {
+        let ccw = polygon(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]).unwrap();
+        let cw = polygon(&[[0.0, 0.0], [0.0, 1.0], [2.0, 1.0], [2.0, 0.0]]).unwrap();
+        assert_eq!(ccw.area(), 2.0);
+        assert_eq!(cw.area(), 2.0);
+    }
+
+    #[test]
+    fn crossing_spike_and_repeated_vertices_are_refused() {
+        let bow_tie = polygon(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0]]);
+        assert!(matches!(bow_tie, Err(PolygonError::Crossing { .. })));
+        let spike = polygon(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+        assert!(matches!(spike, Err(PolygonError::Crossing { .. })));
+        let repeated = polygon(&[[0.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+        assert_eq!(repeated, Err(PolygonError::RepeatedVertex(0, 1)));
+        assert!(polygon(&[[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]]).is_err());
+    }
+
+    #[test]
+    fn location_and_boundary_segments() {
+        let l = polygon(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]).unwrap();
+        assert_eq!(l.locate(Point2::new(0.5, 0.5), 1e-9), Location::Inside);
+        assert_eq!(l.locate(Point2::new(1.5, 1.5), 1e-9), Location::Outside);
+        assert_eq!(l.locate(Point2::new(1.0, 1.5), 1e-9), Location::OnBoundary);
+        assert!(l.segment_on_boundary(Point2::new(0.2, 0.0), Point2::new(1.7, 0.0), 1e-9));
+        assert!(!l.segment_on_boundary(Point2::new(0.0, 2.0), Point2::new(2.0, 0.0), 1e-9));
+    }
+
+    #[test]
+    fn overlap_with_a_non_convex_polygon_is_exact() {
+        let u = polygon(&[
+            [0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0],
+        ])
+        .unwrap();
+        let window: Vec<Point2> =
+            [[0.5, 0.5], [2.5, 0.5], [2.5, 1.5], [0.5, 1.5]].iter().map(|p| Point2::new(p[0], p[1])).collect();
+        assert!((overlap_area(&u, &window) - 1.5).abs() < 1e-14);
+    }
+}

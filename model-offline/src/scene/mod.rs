@@ -1,0 +1,211 @@
+//! Scenes: the file format, its validation, and the planar geometry they are made of.
+
+mod error;
+pub mod geometry;
+pub mod schema;
+mod validate;
+
+pub use error::SceneError;
+pub use geometry::{Point2, Polygon};
+pub use schema::{Basis, Essential, Integration};
+
+use crate::mechanics::Material;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+use std::path::Path;
+
+/// The bundled scenes: name and text.
+pub const BUNDLED: [(&str, &str); 2] = [
+    ("paper", include_str!("../../scenes/paper.toml")),
+    ("paper-hull", include_str!("../../scenes/paper-hull.toml")),
+];
+
+/// A validated scene.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Name used in reports and in the table.
+    pub name: String,
+    /// Label of the length unit.
+    pub length_unit: String,
+    /// Label of the stress unit.
+    pub stress_unit: String,
+    /// The body.
+    pub outline: Polygon,
+    /// What the body is made of.
+    pub material: Material,
+    /// Regions of another stiffness or material.
+    pub inclusions: Vec<Inclusion>,
+    /// Polylines on the boundary that cannot move.
+    pub immobile: Vec<Vec<Point2>>,
+    /// The needle.
+    pub needle: Needle,
+    /// The point to hold still.
+    pub target: Point2,
+    /// The paddle positions to choose from.
+    pub paddles: Vec<Paddle>,
+    /// Limits of the paddle's actuator.
+    pub actuator: Actuator,
+    /// How fine and by which method the tissue is modelled.
+    pub discretization: Discretization,
+}
+
+/// A region of another stiffness or material.
+#[derive(Debug, Clone)]
+pub struct Inclusion {
+    /// The region.
+    pub outline: Polygon,
+    /// Factor on the energy.
+    pub stiffness: f64,
+    /// A material of its own; the body's when absent.
+    pub material: Option<Material>,
+}
+
+/// The needle.
+#[derive(Debug, Clone)]
+pub struct Needle {
+    /// Polyline of tissue that moves with it.
+    pub contact: Vec<Point2>,
+    /// Unit direction of insertion.
+    pub axis: Point2,
+    /// How far it goes.
+    pub depth: f64,
+    /// Into how many increments the insertion is divided.
+    pub increments: u32,
+}
+
+impl Needle {
+    /// Unit vector orthogonal to the axis: the axis turned by 90°, signed so that its larger component is positive.
+    pub fn orthogonal(&self) -> Point2 {
+        let turned = Point2::new(-self.axis.y, self.axis.x);
+        let larger = if turned.x.abs() >= turned.y.abs() { turned.x } else { turned.y };
+        // Adding zero turns a negative zero into a positive one: reports show it.
+        (turned * larger.signum()).map(|v| v + 0.0)
+    }
+}
+
+/// A paddle position.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Paddle {
+    /// Its name in tables and reports.
+    pub index: u32,
+    /// The two ends, both on the boundary.
+    pub segment: [Point2; 2],
+}
+
+/// Limits of the paddle's actuator.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Actuator {
+    /// Largest paddle displacement, length units.
+    pub max_displacement: f64,
+    /// Largest paddle speed, length units per second.
+    pub max_rate: f64,
+    /// Fastest needle the controller keeps compensating, length units per second.
+    pub max_needle_speed: f64,
+}
+
+/// How many nodes: given, or found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resolution {
+    /// Uniform node spacing.
+    Spacing(f64),
+    /// Refine until the controllability measures are within this relative error.
+    Tolerance(f64),
+}
+
+/// How fine and by which method the tissue is modelled.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Discretization {
+    /// How many nodes.
+    pub resolution: Resolution,
+    /// Kernel support over local spacing.
+    pub support: f64,
+    /// Integration rule.
+    pub integration: Integration,
+    /// Basis of the shape functions.
+    pub basis: Basis,
+    /// How essential boundary conditions are imposed.
+    pub essential: Essential,
+}
+
+impl Scene {
+    /// Reads and validates a scene file; a bundled scene's name stands for the bundled text.
+    ///
+    /// # Errors
+    /// [`SceneError`] says what is wrong, where, and what to do.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let file = path.display().to_string();
+        if !path.exists()
+            && let Some((name, text)) = BUNDLED.iter().find(|(name, _)| Path::new(name) == path)
+        {
+            return Self::parse(text, &format!("<bundled {name}.toml>"));
+        }
+        let bytes = std::fs::read(path).map_err(|error| {
+            let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
+            error::Source { file: &file, text: "" }.error(
+                0..0,
+                format!("cannot read the scene: {error}"),
+                format!("give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
+            )
+        })?;
+        match String::from_utf8(bytes) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(error) => {
+                let valid = error.utf8_error().valid_up_to();
+                let text = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
+                Err(error::Source { file: &file, text: &text }.error(
+                    valid..valid,
+                    "this is not a text file: the next byte is not valid UTF-8",
+                    "a scene is a TOML text file; see `model-offline schema` and the bundled scenes",
+                ))
+            }
+        }
+    }
+
+    /// Parses and validates the text of a scene; `file` is the name that errors show.
+    ///
+    /// # Errors
+    /// [`SceneError`] says what is wrong, where, and what to do.
+    pub fn parse(text: &str, file: &str) -> Result<Self, SceneError> {
+        validate::parse(error::Source { file, text })
+    }
+
+    /// The bundled scene of this name.
+    pub fn bundled(name: &str) -> Option<Self> {
+        let (_, text) = BUNDLED.iter().find(|(bundled, _)| *bundled == name)?;
+        Self::parse(text, name).ok()
+    }
+
+    /// The same scene in homogeneous tissue.
+    #[must_use]
+    pub fn without_inclusions(&self) -> Self {
+        Self { inclusions: Vec::new(), ..self.clone() }
+    }
+
+    /// The label of the tissue, as reports and tables carry it.
+    pub fn tissue(&self) -> &'static str {
+        if self.inclusions.is_empty() { "homogeneous" } else { "inclusion" }
+    }
+
+    /// SHA-256 over everything that the model's numbers depend on, with the discretization.
+    pub fn hash(&self) -> [u8; 32] {
+        let point = |p: &Point2| [p.x, p.y];
+        let path = |p: &[Point2]| p.iter().map(point).collect::<Vec<_>>();
+        let content = serde_json::json!({
+            "outline": path(self.outline.vertices()),
+            "material": self.material,
+            "inclusions": self.inclusions.iter()
+                .map(|i| serde_json::json!([path(i.outline.vertices()), i.stiffness, i.material]))
+                .collect::<Vec<_>>(),
+            "immobile": self.immobile.iter().map(|p| path(p)).collect::<Vec<_>>(),
+            "needle": [
+                serde_json::json!(path(&self.needle.contact)), serde_json::json!(point(&self.needle.axis)),
+                serde_json::json!(self.needle.depth), serde_json::json!(self.needle.increments)],
+            "target": point(&self.target),
+            "paddles": self.paddles.iter().map(|p| serde_json::json!([p.index, path(&p.segment)])).collect::<Vec<_>>(),
+            "actuator": self.actuator,
+            "discretization": self.discretization,
+        });
+        Sha256::digest(content.to_string()).into()
+    }
+}

@@ -1,0 +1,303 @@
+//! The scene file as it is written: the public contract, field for field. Validation turns it into a
+//! [`Scene`](super::Scene).
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::ops::Range;
+
+/// A value together with where it stands in the file, so that an error can point at it.
+#[derive(Debug, Clone, Deserialize)]
+#[serde(transparent)]
+pub struct Located<T: serde::de::DeserializeOwned>(
+    #[serde(deserialize_with = "deserialize_spanned")] toml::Spanned<T>,
+);
+
+fn deserialize_spanned<'de, D, T>(deserializer: D) -> Result<toml::Spanned<T>, D::Error>
+where
+    D: serde::Deserializer<'de>,
+    T: serde::de::DeserializeOwned,
+{
+    toml::Spanned::<T>::deserialize(deserializer)
+}
+
+impl<T: serde::de::DeserializeOwned> Located<T> {
+    /// Bytes of the file that the value was read from.
+    pub fn span(&self) -> Range<usize> {
+        self.0.span()
+    }
+
+    /// The value.
+    pub fn get(&self) -> &T {
+        self.0.get_ref()
+    }
+}
+
+impl<T: serde::de::DeserializeOwned + JsonSchema> JsonSchema for Located<T> {
+    fn schema_name() -> Cow<'static, str> {
+        T::schema_name()
+    }
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        T::json_schema(generator)
+    }
+    fn inline_schema() -> bool {
+        T::inline_schema()
+    }
+}
+
+/// A scene: a body of soft tissue, a needle, a target and the paddle positions to choose from. All numbers are in
+/// the scene's own consistent units.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Stillpoint scene")]
+pub struct SceneFile {
+    /// Name, dimension and unit labels.
+    pub scene: SceneSection,
+    /// The body.
+    pub domain: DomainSection,
+    /// What the body is made of.
+    pub material: Located<MaterialSection>,
+    /// Regions of another stiffness or material.
+    #[serde(default)]
+    pub inclusion: Vec<Located<InclusionSection>>,
+    /// The part of the boundary that cannot move.
+    pub immobile: ImmobileSection,
+    /// The needle: which tissue moves with it, where to, and how far.
+    pub needle: NeedleSection,
+    /// The point to hold still.
+    pub target: TargetSection,
+    /// The paddle positions to choose from.
+    #[serde(default)]
+    pub paddle: Vec<Located<PaddleSection>>,
+    /// Limits of the paddle's actuator.
+    #[serde(default)]
+    pub actuator: ActuatorSection,
+    /// How fine and by which method the tissue is modelled.
+    pub discretization: Located<DiscretizationSection>,
+}
+
+/// Name, dimension and unit labels.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSection {
+    /// Name used in reports and in the table.
+    pub name: String,
+    /// 2 = plane strain; 3 = solid (not available from a scene file yet).
+    pub dimension: Located<u32>,
+    /// Labels for reports; nothing is converted.
+    #[serde(default)]
+    pub units: UnitsSection,
+}
+
+/// Unit labels, for reports only.
+#[derive(Debug, Clone, Deserialize, Serialize, JsonSchema, PartialEq)]
+#[serde(deny_unknown_fields)]
+pub struct UnitsSection {
+    /// Length unit, e.g. "mm".
+    #[serde(default = "one")]
+    pub length: String,
+    /// Stress unit, e.g. "kPa".
+    #[serde(default = "one")]
+    pub stress: String,
+}
+
+fn one() -> String {
+    "1".to_owned()
+}
+
+impl Default for UnitsSection {
+    fn default() -> Self {
+        Self { length: one(), stress: one() }
+    }
+}
+
+/// The body.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DomainSection {
+    /// Simple polygon, either orientation.
+    pub outline: Located<Vec<[f64; 2]>>,
+}
+
+/// Material models.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaterialModel {
+    /// Fung's exponential law, the paper's equation 6.
+    Fung,
+    /// Compressible neo-Hookean with an isochoric-volumetric split.
+    NeoHookean,
+    /// St. Venant–Kirchhoff: linear in the Green–Lagrange strain.
+    SaintVenantKirchhoff,
+    /// Linear elasticity at small strain.
+    Linear,
+}
+
+/// One entry `[i, j, k, l, value]` of a fourth-order tensor, indices from 0, as in the paper's Table I.
+pub type TensorEntry = (u32, u32, u32, u32, f64);
+
+/// What tissue is made of. Either the isotropic moduli or, for `fung`, the general tensors `A` and `C`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialSection {
+    /// Which law.
+    pub model: MaterialModel,
+    /// First Lamé parameter λ, stress units.
+    pub lambda: Option<f64>,
+    /// Shear modulus μ, stress units.
+    pub mu: Option<f64>,
+    /// Factor c of Fung's exponential term, stress units.
+    pub c: Option<f64>,
+    /// λ of the exponent, dimensionless.
+    pub lambda_c: Option<f64>,
+    /// μ of the exponent, dimensionless.
+    pub mu_c: Option<f64>,
+    /// General form: entries [i, j, k, l, value] of A, stress units.
+    #[serde(rename = "A")]
+    pub a: Option<Vec<TensorEntry>>,
+    /// General form: entries [i, j, k, l, value] of C, dimensionless.
+    #[serde(rename = "C")]
+    pub c_tensor: Option<Vec<TensorEntry>>,
+    /// Volumetric barrier β, stress units: adds β (ln J)⁴ / 4, felt only under strong volume change.
+    pub barrier: Option<f64>,
+}
+
+/// A region of another stiffness or material.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InclusionSection {
+    /// Simple polygon, either orientation.
+    pub outline: Located<Vec<[f64; 2]>>,
+    /// Factor on the energy (default 1).
+    #[serde(default = "unit_stiffness")]
+    pub stiffness: Located<f64>,
+    /// A material of its own; the body's when absent.
+    pub material: Option<Located<MaterialSection>>,
+}
+
+fn unit_stiffness() -> Located<f64> {
+    Located(toml::Spanned::new(0..0, 1.0))
+}
+
+/// The part of the boundary that cannot move.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ImmobileSection {
+    /// Polylines on the boundary.
+    pub paths: Vec<Located<Vec<[f64; 2]>>>,
+}
+
+/// The needle.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NeedleSection {
+    /// Polyline of tissue that moves with the needle, on the boundary or inside.
+    pub contact: Located<Vec<[f64; 2]>>,
+    /// Direction of insertion; normalised on reading.
+    pub axis: Located<[f64; 2]>,
+    /// How far the needle goes, length units.
+    pub depth: Located<f64>,
+    /// Into how many increments the insertion is divided (default 10).
+    #[serde(default = "ten")]
+    pub increments: Located<u32>,
+}
+
+fn ten() -> Located<u32> {
+    Located(toml::Spanned::new(0..0, 10))
+}
+
+/// The point to hold still.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetSection {
+    /// Where it is before the insertion.
+    pub position: Located<[f64; 2]>,
+}
+
+/// A paddle position.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PaddleSection {
+    /// Its name in tables and reports.
+    pub index: u32,
+    /// The two ends, both on the boundary.
+    pub segment: Located<[[f64; 2]; 2]>,
+}
+
+/// Limits of the paddle's actuator.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ActuatorSection {
+    /// Largest paddle displacement, length units (default: the insertion depth).
+    pub max_displacement: Option<Located<f64>>,
+    /// Largest paddle speed, length units per second (default: the insertion depth per second).
+    pub max_rate: Option<Located<f64>>,
+    /// Fastest needle the controller keeps compensating, length units per second (default: twice the depth per second).
+    pub max_needle_speed: Option<Located<f64>>,
+}
+
+/// Integration rules of the weak form, and finite-element baselines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+#[value(rename_all = "kebab-case")]
+pub enum Integration {
+    /// Direct nodal integration: the gradient at the node.
+    Dni,
+    /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell.
+    Scni,
+    /// Naturally stabilised nodal integration: direct, plus the gradient's own variation over the cell.
+    Nsni,
+    /// Gauss points in the triangles of the nodal cells.
+    Gauss,
+    /// Linear triangles on the same nodes.
+    FemT3,
+    /// Quadratic triangles on the same nodes.
+    FemT6,
+}
+
+/// Monomials that the shape functions reproduce exactly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Basis {
+    /// 1, x, y.
+    #[default]
+    Linear,
+    /// 1, x, y, x², xy, y².
+    Quadratic,
+}
+
+/// How essential boundary conditions are imposed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum Essential {
+    /// Nodal values are held exactly (the paper's transformation method).
+    #[default]
+    Transformation,
+    /// Nitsche's method: weakly, with consistent boundary terms.
+    Nitsche,
+}
+
+/// How fine and by which method the tissue is modelled.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DiscretizationSection {
+    /// Node spacing, length units. Either this or `tolerance`.
+    pub spacing: Option<Located<f64>>,
+    /// Relative error of the controllability measures to refine down to. Either this or `spacing`.
+    pub tolerance: Option<Located<f64>>,
+    /// Kernel support over local spacing (default 2).
+    pub support: Option<Located<f64>>,
+    /// Integration rule (default scni).
+    pub integration: Option<Integration>,
+    /// Basis of the shape functions (default linear).
+    #[serde(default)]
+    pub basis: Basis,
+    /// How essential boundary conditions are imposed (default transformation).
+    #[serde(default)]
+    pub essential: Essential,
+}
+
+/// The JSON Schema of the scene file.
+pub fn json_schema() -> Schema {
+    schemars::schema_for!(SceneFile)
+}

@@ -1,0 +1,476 @@
+//! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
+
+use super::error::{SceneError, Source};
+use super::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
+use super::schema::{
+    DiscretizationSection, InclusionSection, Integration, Located, MaterialModel, MaterialSection, SceneFile,
+};
+use super::{Actuator, Discretization, Inclusion, Needle, Paddle, Resolution, Scene};
+use crate::mechanics::{FungTensors, Material, MaterialError};
+use std::ops::Range;
+
+/// Outlines of more vertices than this are refused: nothing a needle scene needs, and memory stays bounded.
+const MAX_VERTICES: usize = 20_000;
+/// More nodes than this are refused before any memory is taken.
+const MAX_NODES: f64 = 2.0e6;
+
+type Checked<T> = Result<T, SceneError>;
+
+pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
+    if source.text.trim().is_empty() {
+        return Err(source.error(
+            0..0,
+            "the scene file is empty",
+            "start from a bundled scene: model-offline/scenes/paper.toml",
+        ));
+    }
+    let file: SceneFile = toml::from_str(source.text).map_err(|error| {
+        source.error(
+            error.span().unwrap_or(0..0),
+            error.message().to_owned(),
+            "see `model-offline schema` for every key, its type and its meaning",
+        )
+    })?;
+    Validator { source, file: &file }.scene()
+}
+
+struct Validator<'a> {
+    source: Source<'a>,
+    file: &'a SceneFile,
+}
+
+impl Validator<'_> {
+    fn scene(&self) -> Checked<Scene> {
+        let file = self.file;
+        if *file.scene.dimension.get() != 2 {
+            return Err(self.error(
+                file.scene.dimension.span(),
+                format!("dimension {} is not available from a scene file", file.scene.dimension.get()),
+                "use dimension = 2 (plane strain)",
+            ));
+        }
+        let outline = self.polygon(&file.domain.outline, "outline")?;
+        let tolerance = 1e-9 * outline.size();
+        let immobile = self.immobile(&outline, tolerance)?;
+        let needle = self.needle(&outline, &immobile, tolerance)?;
+        let target = self.point(file.target.position.get(), file.target.position.span(), "target")?;
+        self.target(target, &outline, &immobile, &needle, tolerance)?;
+        let paddles = self.paddles(&outline, &immobile, &needle, tolerance)?;
+        let inclusions = file.inclusion.iter().map(|i| self.inclusion(i, &outline)).collect::<Checked<_>>()?;
+        Ok(Scene {
+            name: file.scene.name.clone(),
+            length_unit: file.scene.units.length.clone(),
+            stress_unit: file.scene.units.stress.clone(),
+            material: self.material(&file.material)?,
+            inclusions,
+            immobile,
+            target,
+            paddles,
+            actuator: self.actuator(&needle)?,
+            discretization: self.discretization(&file.discretization, &outline)?,
+            needle,
+            outline,
+        })
+    }
+
+    fn error(&self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> SceneError {
+        self.source.error(span, message, help)
+    }
+
+    fn point(&self, p: &[f64; 2], span: Range<usize>, what: &str) -> Checked<Point2> {
+        if p.iter().all(|v| v.is_finite()) {
+            Ok(Point2::new(p[0], p[1]))
+        } else {
+            Err(self.error(span, format!("{what}: coordinates must be finite numbers"), "replace nan and inf"))
+        }
+    }
+
+    fn path(&self, points: &Located<Vec<[f64; 2]>>, what: &str) -> Checked<Vec<Point2>> {
+        let path: Vec<Point2> =
+            points.get().iter().map(|p| self.point(p, points.span(), what)).collect::<Checked<_>>()?;
+        if path.len() < 2 || path.windows(2).any(|s| s[0] == s[1]) {
+            return Err(self.error(
+                points.span(),
+                format!("{what}: needs at least two points, no two successive ones equal"),
+                "give the points of a polyline: [[x, y], [x, y], ...]",
+            ));
+        }
+        Ok(path)
+    }
+
+    fn polygon(&self, points: &Located<Vec<[f64; 2]>>, what: &str) -> Checked<Polygon> {
+        let count = points.get().len();
+        if count > MAX_VERTICES {
+            return Err(self.error(
+                points.span(),
+                format!("{what}: {count} vertices, at most {MAX_VERTICES} are accepted"),
+                "simplify the polygon: details far below the node spacing change nothing",
+            ));
+        }
+        let vertices = points.get().iter().map(|p| self.point(p, points.span(), what)).collect::<Checked<_>>()?;
+        Polygon::new(vertices).map_err(|error| {
+            self.error(
+                points.span(),
+                format!("{what}: {error}"),
+                "a simple polygon has at least three different vertices, encloses an area and never meets itself",
+            )
+        })
+    }
+
+    fn positive(&self, value: &Located<f64>, what: &str) -> Checked<f64> {
+        let v = *value.get();
+        if v.is_finite() && v > 0.0 {
+            Ok(v)
+        } else {
+            Err(self.error(value.span(), format!("{what} is {v}"), format!("{what} must be a positive finite number")))
+        }
+    }
+
+    fn immobile(&self, outline: &Polygon, tolerance: f64) -> Checked<Vec<Vec<Point2>>> {
+        let paths = &self.file.immobile.paths;
+        if paths.is_empty() {
+            return Err(self.error(
+                self.file.domain.outline.span(),
+                "no part of the boundary is immobile, so nothing holds the body in place",
+                "give at least one polyline in [immobile] paths",
+            ));
+        }
+        paths
+            .iter()
+            .map(|located| {
+                let path = self.path(located, "immobile path")?;
+                if path.windows(2).all(|s| outline.segment_on_boundary(s[0], s[1], tolerance)) {
+                    Ok(path)
+                } else {
+                    Err(self.error(
+                        located.span(),
+                        "this immobile path leaves the boundary of the outline",
+                        "list the outline's vertices along the immobile part, so that every piece lies on an edge",
+                    ))
+                }
+            })
+            .collect()
+    }
+
+    fn needle(&self, outline: &Polygon, immobile: &[Vec<Point2>], tolerance: f64) -> Checked<Needle> {
+        let section = &self.file.needle;
+        let contact = self.path(&section.contact, "needle contact")?;
+        let inside = |p: &Point2| outline.locate(*p, tolerance) != Location::Outside;
+        if !contact.iter().all(inside) {
+            return Err(self.error(
+                section.contact.span(),
+                "the needle contact reaches outside the outline",
+                "the contact is tissue that moves with the needle: put it on the boundary or inside",
+            ));
+        }
+        if contact.windows(2).any(|s| polyline_near(immobile, s, tolerance)) {
+            return Err(self.error(
+                section.contact.span(),
+                "the needle contact touches the immobile part",
+                "tissue cannot move with the needle and be immobile: shorten one of them",
+            ));
+        }
+        let axis = self.point(section.axis.get(), section.axis.span(), "needle axis")?;
+        if axis.norm() < 1e-12 {
+            return Err(self.error(section.axis.span(), "the needle axis has no direction", "e.g. axis = [0.0, -1.0]"));
+        }
+        let increments = *section.increments.get();
+        if !(1..=10_000).contains(&increments) {
+            return Err(self.error(
+                section.increments.span(),
+                format!("increments is {increments}"),
+                "divide the insertion into 1 to 10000 increments",
+            ));
+        }
+        let depth = self.positive(&section.depth, "depth")?;
+        if depth > outline.size() {
+            return Err(self.error(
+                section.depth.span(),
+                format!("depth {depth} is larger than the whole body ({:.4})", outline.size()),
+                "check the units of the depth",
+            ));
+        }
+        Ok(Needle { contact, axis: axis.normalize(), depth, increments })
+    }
+
+    fn target(
+        &self,
+        target: Point2,
+        outline: &Polygon,
+        immobile: &[Vec<Point2>],
+        needle: &Needle,
+        tolerance: f64,
+    ) -> Checked<()> {
+        let span = self.file.target.position.span();
+        if outline.locate(target, tolerance) == Location::Outside {
+            return Err(self.error(span, "the target is outside the outline", "move the target into the body"));
+        }
+        if immobile.iter().any(|path| distance_to_polyline(target, path) <= tolerance) {
+            return Err(self.error(
+                span,
+                "the target is on the immobile part, so it cannot move",
+                "move the target away from the immobile boundary",
+            ));
+        }
+        if distance_to_polyline(target, &needle.contact) <= tolerance {
+            return Err(self.error(
+                span,
+                "the target is on the needle contact, so no paddle can move it",
+                "move the target away from the needle contact",
+            ));
+        }
+        Ok(())
+    }
+
+    fn paddles(
+        &self,
+        outline: &Polygon,
+        immobile: &[Vec<Point2>],
+        needle: &Needle,
+        tolerance: f64,
+    ) -> Checked<Vec<Paddle>> {
+        if self.file.paddle.is_empty() {
+            return Err(self.error(
+                self.file.domain.outline.span(),
+                "the scene has no paddle position",
+                "add at least one [[paddle]] with an index and a segment on the boundary",
+            ));
+        }
+        let mut paddles: Vec<Paddle> = Vec::new();
+        for located in &self.file.paddle {
+            let section = located.get();
+            let span = section.segment.span();
+            let [a, b] = section.segment.get();
+            let segment = [self.point(a, span.clone(), "paddle")?, self.point(b, span.clone(), "paddle")?];
+            let name = format!("paddle {}", section.index);
+            if paddles.iter().any(|p| p.index == section.index) {
+                return Err(self.error(located.span(), format!("{name} is given twice"), "number the paddles"));
+            }
+            if (segment[1] - segment[0]).norm() <= tolerance {
+                return Err(self.error(span, format!("{name} has no length"), "give two different end points"));
+            }
+            if !outline.segment_on_boundary(segment[0], segment[1], tolerance) {
+                return Err(self.error(
+                    span,
+                    format!("{name} is off the boundary"),
+                    "both ends and everything between must lie on an edge of the outline",
+                ));
+            }
+            if polyline_near(immobile, &segment, tolerance) {
+                return Err(self.error(
+                    span,
+                    format!("{name} is on the immobile part"),
+                    "a paddle must be on boundary that can move, and may not touch the immobile part",
+                ));
+            }
+            if needle.contact.windows(2).any(|s| touch(s, &segment, tolerance)) {
+                return Err(self.error(
+                    span,
+                    format!("{name} touches the needle contact"),
+                    "tissue cannot follow both: move the paddle or the contact",
+                ));
+            }
+            paddles.push(Paddle { index: section.index, segment });
+        }
+        Ok(paddles)
+    }
+
+    fn inclusion(&self, located: &Located<InclusionSection>, outline: &Polygon) -> Checked<Inclusion> {
+        let section = located.get();
+        let region = self.polygon(&section.outline, "inclusion")?;
+        if overlap(&region, outline) <= 1e-12 * region.area().min(outline.area()) {
+            return Err(self.error(
+                section.outline.span(),
+                "this inclusion covers nothing of the body",
+                "move it inside the outline or remove it",
+            ));
+        }
+        Ok(Inclusion {
+            outline: region,
+            stiffness: self.positive(&section.stiffness, "stiffness")?,
+            material: section.material.as_ref().map(|m| self.material(m)).transpose()?,
+        })
+    }
+
+    fn material(&self, located: &Located<MaterialSection>) -> Checked<Material> {
+        let m = located.get();
+        let fail = |message: String, help: &str| self.error(located.span(), message, help);
+        let required = |value: Option<f64>, name: &str| {
+            value.ok_or_else(|| fail(format!("material: {name} is missing"), "give every modulus of the law"))
+        };
+        let unused = |keys: &[(&str, bool)]| match keys.iter().find(|k| k.1) {
+            Some((key, _)) => {
+                Err(fail(format!("material: {key} has no meaning for this law"), "remove it, or choose another model"))
+            }
+            None => Ok(()),
+        };
+        let exponential = [
+            ("c", m.c.is_some()),
+            ("lambda_c", m.lambda_c.is_some()),
+            ("mu_c", m.mu_c.is_some()),
+            ("A", m.a.is_some()),
+            ("C", m.c_tensor.is_some()),
+        ];
+        let built = match (m.model, &m.a) {
+            (MaterialModel::Fung, Some(a)) => {
+                unused(&[
+                    ("lambda beside A", m.lambda.is_some()),
+                    ("mu beside A", m.mu.is_some()),
+                    ("lambda_c beside A", m.lambda_c.is_some()),
+                    ("mu_c beside A", m.mu_c.is_some()),
+                ])?;
+                let none = Vec::new();
+                let c_entries = m.c_tensor.as_ref().unwrap_or(&none);
+                FungTensors::from_entries(a, c_entries, m.c.unwrap_or(0.0)).and_then(Material::fung_general)
+            }
+            (MaterialModel::Fung, None) => {
+                unused(&[("C without A", m.c_tensor.is_some())])?;
+                let c = m.c.unwrap_or(0.0);
+                let (lambda_c, mu_c) = if c == 0.0 {
+                    (m.lambda_c.unwrap_or(0.0), m.mu_c.unwrap_or(0.0))
+                } else {
+                    (required(m.lambda_c, "lambda_c")?, required(m.mu_c, "mu_c")?)
+                };
+                Material::fung(required(m.lambda, "lambda")?, required(m.mu, "mu")?, c, lambda_c, mu_c)
+            }
+            (MaterialModel::SaintVenantKirchhoff, _) => {
+                unused(&exponential)?;
+                Material::saint_venant_kirchhoff(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
+            }
+            (MaterialModel::NeoHookean, _) => {
+                unused(&exponential)?;
+                Material::neo_hookean(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
+            }
+            (MaterialModel::Linear, _) => {
+                unused(&exponential)?;
+                Material::linear(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
+            }
+        };
+        let refuse = |error: MaterialError| {
+            fail(format!("material: {error}"), "the law must be stable at rest: moduli finite, mu > 0, lambda + mu > 0")
+        };
+        let material = built.map_err(refuse)?;
+        match m.barrier {
+            Some(beta) => material.with_barrier(beta).map_err(refuse),
+            None => Ok(material),
+        }
+    }
+
+    fn actuator(&self, needle: &Needle) -> Checked<Actuator> {
+        let section = &self.file.actuator;
+        let or = |value: &Option<Located<f64>>, what: &str, default: f64| {
+            value.as_ref().map_or(Ok(default), |v| self.positive(v, what))
+        };
+        Ok(Actuator {
+            max_displacement: or(&section.max_displacement, "max_displacement", needle.depth)?,
+            max_rate: or(&section.max_rate, "max_rate", needle.depth)?,
+            max_needle_speed: or(&section.max_needle_speed, "max_needle_speed", 2.0 * needle.depth)?,
+        })
+    }
+
+    fn discretization(&self, located: &Located<DiscretizationSection>, outline: &Polygon) -> Checked<Discretization> {
+        let section = located.get();
+        let resolution = match (&section.spacing, &section.tolerance) {
+            (Some(_), Some(tolerance)) => {
+                return Err(self.error(
+                    tolerance.span(),
+                    "both spacing and tolerance are given",
+                    "give the spacing, or the tolerance to reach, never both",
+                ));
+            }
+            (None, None) => {
+                return Err(self.error(
+                    located.span(),
+                    "neither spacing nor tolerance is given",
+                    "add spacing = (node spacing) or tolerance = (relative error) to [discretization]",
+                ));
+            }
+            (Some(spacing), None) => {
+                let h = self.positive(spacing, "spacing")?;
+                check_spacing(h, outline).map_err(|(message, help)| self.error(spacing.span(), message, help))?;
+                Resolution::Spacing(h)
+            }
+            (None, Some(tolerance)) => {
+                let t = self.positive(tolerance, "tolerance")?;
+                check_tolerance(t).map_err(|(message, help)| self.error(tolerance.span(), message, help))?;
+                Resolution::Tolerance(t)
+            }
+        };
+        let support = match &section.support {
+            Some(located) => {
+                let support = self.positive(located, "support")?;
+                check_support(support).map_err(|(message, help)| self.error(located.span(), message, help))?;
+                support
+            }
+            None => 2.0,
+        };
+        Ok(Discretization {
+            resolution,
+            support,
+            integration: section.integration.unwrap_or(Integration::Scni),
+            basis: section.basis,
+            essential: section.essential,
+        })
+    }
+}
+
+type Rule = Result<(), (String, String)>;
+
+/// Whether a spacing fits an outline: at least one node row, and not more nodes than memory is meant for.
+pub(crate) fn check_spacing(h: f64, outline: &Polygon) -> Rule {
+    if h > 0.5 * outline.size() {
+        return Err((
+            format!("spacing {h} is too coarse for a body of size {:.4}", outline.size()),
+            "choose a spacing well below the size of the body".to_owned(),
+        ));
+    }
+    let nodes = outline.area() / (h * h);
+    if nodes > MAX_NODES {
+        return Err((
+            format!("spacing {h} would give about {nodes:.1e} nodes, at most {MAX_NODES:.0e} are accepted"),
+            "choose a larger spacing, or a tolerance".to_owned(),
+        ));
+    }
+    Ok(())
+}
+
+/// Whether a tolerance can be asked for.
+pub(crate) fn check_tolerance(t: f64) -> Rule {
+    if (1e-4..=0.5).contains(&t) {
+        Ok(())
+    } else {
+        Err((format!("tolerance is {t}"), "give a relative error between 0.0001 and 0.5".to_owned()))
+    }
+}
+
+/// Whether a kernel support can be used.
+pub(crate) fn check_support(support: f64) -> Rule {
+    if (1.0..=6.0).contains(&support) {
+        Ok(())
+    } else {
+        Err((format!("support is {support}"), "give a kernel support between 1 and 6 spacings; 2 is usual".to_owned()))
+    }
+}
+
+fn touch(a: &[Point2], b: &[Point2; 2], tolerance: f64) -> bool {
+    super::geometry::segments_meet(a[0], a[1], b[0], b[1], tolerance)
+}
+
+fn polyline_near(paths: &[Vec<Point2>], segment: &[Point2], tolerance: f64) -> bool {
+    paths.iter().flat_map(|p| p.windows(2)).any(|s| {
+        super::geometry::segments_meet(s[0], s[1], segment[0], segment[1], tolerance)
+            || distance_to_segment(0.5 * (segment[0] + segment[1]), s[0], s[1]) <= tolerance
+    })
+}
+
+/// Area that two simple polygons share: one is cut into a fan of signed triangles, which are convex.
+fn overlap(a: &Polygon, b: &Polygon) -> f64 {
+    let v = a.vertices();
+    (1..v.len() - 1)
+        .map(|i| {
+            let signed = super::geometry::cross(v[i] - v[0], v[i + 1] - v[0]);
+            let triangle = if signed >= 0.0 { [v[0], v[i], v[i + 1]] } else { [v[0], v[i + 1], v[i]] };
+            if signed == 0.0 { 0.0 } else { signed.signum() * super::geometry::overlap_area(b, &triangle) }
+        })
+        .sum()
+}

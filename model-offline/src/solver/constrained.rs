@@ -1,0 +1,234 @@
+//! Held nodal values as constraints in coefficient space.
+//!
+//! The transformation method re-expresses every shape function in nodal values so that boundary values can be
+//! prescribed; that makes all matrices dense. Minimising the energy over the coefficients d subject to `Λ d = g`, with
+//! Λ_bI = Ψ_I(X_b) for the held nodes b only, gives the same displacement and keeps the tangent sparse. Each Newton
+//! step then solves
+//!
+//! ```text
+//! ⎡ K  Λᵀ ⎤ ⎡ x ⎤   ⎡ rhs ⎤
+//! ⎣ Λ  0  ⎦ ⎣ μ ⎦ = ⎣ gap ⎦
+//! ```
+//!
+//! by the method of multipliers: factorise `K_ρ = K + Λᵀ ρ Λ` (positive definite exactly when K is on the null space
+//! of Λ, for ρ large enough, so Cholesky detects lost stability; same sparsity as K plus the held stencils) and iterate
+//! on μ. The constraint error shrinks by about ρ⁻¹ K per round; a few rounds reach rounding error.
+
+use super::linear::{NotPositiveDefinite, Pattern, SparseCholesky};
+use crate::discretization::Stencil;
+
+/// Penalty over the mean diagonal of the tangent. Large enough that two or three rounds of multipliers reach rounding
+/// error, small enough that the factor of K_ρ keeps its digits.
+const PENALTY: f64 = 1e4;
+/// Rounds of multipliers; each costs one back-substitution.
+const MAX_ROUNDS: usize = 12;
+
+/// Rows Λ_b of the held nodes: `u(X_b) = Σ_I Ψ_I(X_b) d_I`.
+#[derive(Debug, Clone, Default)]
+pub struct HeldRows {
+    offsets: Vec<u32>,
+    nodes: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl HeldRows {
+    /// One row per stencil.
+    pub fn new<'a, const D: usize>(stencils: impl Iterator<Item = &'a Stencil<D>>) -> Self {
+        let mut rows = Self { offsets: vec![0], ..Self::default() };
+        for stencil in stencils {
+            rows.nodes.extend_from_slice(&stencil.nodes);
+            rows.values.extend_from_slice(&stencil.values);
+            rows.offsets.push(rows.nodes.len() as u32);
+        }
+        rows
+    }
+
+    /// Number of held nodes.
+    pub fn len(&self) -> usize {
+        self.offsets.len() - 1
+    }
+
+    /// Whether nothing is held.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    fn row(&self, b: usize) -> (&[u32], &[f64]) {
+        let range = self.offsets[b] as usize..self.offsets[b + 1] as usize;
+        (&self.nodes[range.clone()], &self.values[range])
+    }
+
+    /// The node lists of the rows, for the sparsity pattern.
+    pub fn node_lists(&self) -> impl Iterator<Item = &[u32]> + Clone {
+        (0..self.len()).map(|b| self.row(b).0)
+    }
+
+    /// `out = Λ d`, D numbers per row.
+    pub fn apply<const D: usize>(&self, d: &[f64], out: &mut [f64]) {
+        for (b, out) in out.chunks_exact_mut(D).enumerate() {
+            let (nodes, values) = self.row(b);
+            out.fill(0.0);
+            for (&i, value) in nodes.iter().zip(values) {
+                for (o, x) in out.iter_mut().zip(&d[i as usize * D..]) {
+                    *o += value * x;
+                }
+            }
+        }
+    }
+
+    /// `out += Λᵀ y`.
+    pub fn add_transpose<const D: usize>(&self, y: &[f64], out: &mut [f64]) {
+        for (b, y) in y.chunks_exact(D).enumerate() {
+            let (nodes, values) = self.row(b);
+            for (&i, value) in nodes.iter().zip(values) {
+                for (o, x) in out[i as usize * D..].iter_mut().zip(y) {
+                    *o += value * x;
+                }
+            }
+        }
+    }
+}
+
+/// Solves tangent systems with held rows; see the module documentation.
+#[derive(Debug)]
+pub struct ConstrainedSolver<const D: usize> {
+    pattern: Pattern,
+    cholesky: SparseCholesky,
+    held: HeldRows,
+    penalty: f64,
+    /// Block positions of every pair (row ≥ column) of every held stencil.
+    positions: Vec<u32>,
+    matrix: Vec<f64>,
+    work: Work,
+}
+
+#[derive(Debug, Default)]
+struct Work {
+    solution: Vec<f64>,
+    weighted: Vec<f64>,
+    violation: Vec<f64>,
+}
+
+impl<const D: usize> ConstrainedSolver<D> {
+    /// Analyses the pattern, which must cover the stencils of the held rows.
+    ///
+    /// # Panics
+    /// When the pattern misses a pair of a held stencil.
+    pub fn new(pattern: Pattern, held: HeldRows) -> Self {
+        let cholesky = SparseCholesky::analyse(&pattern);
+        let mut positions = Vec::new();
+        for nodes in held.node_lists() {
+            for (column, &j) in nodes.iter().enumerate() {
+                let find = |&i: &u32| pattern.block_position(i, j).expect("the pattern covers the held rows") as u32;
+                positions.extend(nodes[column..].iter().map(find));
+            }
+        }
+        let work = Work {
+            solution: vec![0.0; pattern.unknowns()],
+            weighted: vec![0.0; held.len() * D],
+            violation: vec![0.0; held.len() * D],
+        };
+        Self { matrix: vec![0.0; pattern.entries()], pattern, cholesky, held, penalty: 0.0, positions, work }
+    }
+
+    /// The sparsity pattern.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// The held rows.
+    pub fn held(&self) -> &HeldRows {
+        &self.held
+    }
+
+    /// Entries of the Cholesky factor.
+    pub fn factor_entries(&self) -> usize {
+        self.cholesky.factor_entries()
+    }
+
+    /// Zeroes the matrix and lets `assemble` add the tangent into it.
+    pub fn assemble(&mut self, assemble: impl FnOnce(&Pattern, &mut [f64])) {
+        self.matrix.fill(0.0);
+        assemble(&self.pattern, &mut self.matrix);
+    }
+
+    /// Mean diagonal entry of the matrix as assembled.
+    pub fn mean_diagonal(&self) -> f64 {
+        let n = self.pattern.unknowns();
+        (0..n).map(|u| self.matrix[self.pattern.diagonal_position(u)]).sum::<f64>() / n as f64
+    }
+
+    /// Factorises the assembled tangent with the held rows' penalty. The penalty is fixed by the first call.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] when the tangent is not, on the displacements that the held values leave free.
+    pub fn factorise(&mut self) -> Result<(), NotPositiveDefinite> {
+        if self.penalty == 0.0 {
+            self.penalty = PENALTY * self.mean_diagonal();
+        }
+        let mut next = 0;
+        for b in 0..self.held.len() {
+            let (nodes, values) = self.held.row(b);
+            for (column, &j) in nodes.iter().enumerate() {
+                let stride = self.pattern.column_length(j);
+                for value in &values[column..] {
+                    let weight = self.penalty * value * values[column];
+                    for k in 0..D {
+                        self.matrix[self.positions[next] as usize + k * stride + k] += weight;
+                    }
+                    next += 1;
+                }
+            }
+        }
+        self.cholesky.factorise(&self.pattern, &self.matrix)
+    }
+
+    /// Adds `shift` to the diagonal of the matrix that the last [`factorise`](Self::factorise) refused, and tries again.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] when the shift is still too small.
+    pub fn factorise_shifted(&mut self, shift: f64) -> Result<(), NotPositiveDefinite> {
+        for u in 0..self.pattern.unknowns() {
+            self.matrix[self.pattern.diagonal_position(u)] += shift;
+        }
+        self.cholesky.factorise(&self.pattern, &self.matrix)
+    }
+
+    /// Solves `K x + Λᵀ μ = rhs`, `Λ x = gap` with the last factor. `mu` comes in as a first guess (zeros will do) and
+    /// leaves as the multipliers; the constraint is met to `tolerance` (length units) or to rounding error.
+    pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, x: &mut [f64], mu: &mut [f64]) {
+        let Work { solution, weighted, violation } = &mut self.work;
+        // First round: K_ρ x = rhs + Λᵀ (ρ gap − μ).
+        solution.copy_from_slice(rhs);
+        for ((w, g), m) in weighted.iter_mut().zip(gap).zip(mu.iter()) {
+            *w = self.penalty * g - m;
+        }
+        self.held.add_transpose::<D>(weighted, solution);
+        self.cholesky.solve(solution, 1);
+        x.copy_from_slice(solution);
+        let mut previous = f64::INFINITY;
+        for _ in 0..MAX_ROUNDS {
+            self.held.apply::<D>(x, violation);
+            let mut largest = 0.0_f64;
+            for ((v, g), m) in violation.iter_mut().zip(gap).zip(mu.iter_mut()) {
+                *v -= g;
+                *m += self.penalty * *v;
+                largest = largest.max(v.abs());
+            }
+            if largest <= tolerance || largest > 0.5 * previous {
+                break;
+            }
+            previous = largest;
+            // The first equation holds with the new μ; correct x so that the constraint does too.
+            for (w, v) in weighted.iter_mut().zip(violation.iter()) {
+                *w = -self.penalty * v;
+            }
+            solution.fill(0.0);
+            self.held.add_transpose::<D>(weighted, solution);
+            self.cholesky.solve(solution, 1);
+            for (x, s) in x.iter_mut().zip(solution.iter()) {
+                *x += s;
+            }
+        }
+    }
+}

@@ -1,0 +1,429 @@
+//! Static equilibrium under held nodal values: Newton's method on the total Lagrangian weak form, with line search on
+//! the energy and adaptive cutback of the increment.
+//!
+//! All loading is by prescribed displacement, so an equilibrium is a stationary point of the strain energy over the
+//! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
+//! tangent is not positive definite is reported as lost stability, never passed off as an answer.
+
+use super::constrained::{ConstrainedSolver, HeldRows};
+use super::linear::Pattern;
+use crate::discretization::Quadrature;
+use crate::mechanics::assembly::{self, Inverted, Scatter, State, Tissue};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// Settings of Newton's method. The defaults are meant for everyone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NewtonSettings {
+    /// Residual force over reaction force at convergence.
+    pub residual_tolerance: f64,
+    /// Last Newton step over the model's node spacing at convergence.
+    pub step_tolerance: f64,
+    /// Iterations per increment before it is cut.
+    pub max_iterations: u32,
+    /// How often an increment may be halved before the solver gives up.
+    pub max_cutbacks: u32,
+    /// Whether steps that raise the energy are shortened.
+    pub line_search: bool,
+    /// Whether a converged state with an indefinite tangent ends the run.
+    pub require_stability: bool,
+    /// Keep the last factor while each iteration still gains a factor of four: cheap for small steps.
+    pub reuse_tangent: bool,
+}
+
+impl Default for NewtonSettings {
+    fn default() -> Self {
+        Self {
+            residual_tolerance: 1e-9,
+            step_tolerance: 1e-8,
+            max_iterations: 25,
+            max_cutbacks: 8,
+            line_search: true,
+            require_stability: true,
+            reuse_tangent: false,
+        }
+    }
+}
+
+/// Why no equilibrium was found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, thiserror::Error)]
+#[serde(rename_all = "kebab-case")]
+pub enum FailureReason {
+    /// det F ≤ 0 at an integration point.
+    #[error("element-inverted")]
+    ElementInverted,
+    /// The equilibrium is not stable: its tangent is not positive definite.
+    #[error("lost-stability")]
+    LostStability,
+    /// The tangent at rest is singular: the body is not held, or the rule has zero-energy modes.
+    #[error("singular-tangent")]
+    SingularTangent,
+    /// Newton's method did not converge.
+    #[error("not-converged")]
+    NotConverged,
+}
+
+/// A failed solve; the equilibrium is left at the last converged state.
+#[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
+#[error("{reason}: {detail}")]
+pub struct Failure {
+    /// What happened.
+    pub reason: FailureReason,
+    /// Fraction of the way from the last state to the prescribed one that was reached.
+    pub reached: f64,
+    /// Numbers behind the reason.
+    pub detail: String,
+}
+
+/// What a successful solve cost.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Newton iterations (tangent solves).
+    pub iterations: u32,
+    /// Factorisations.
+    pub factorisations: u32,
+    /// Times the increment was halved.
+    pub cutbacks: u32,
+}
+
+/// A body in equilibrium, and the means to take it to the next.
+#[derive(Debug)]
+pub struct Equilibrium<const D: usize> {
+    rule: Arc<Quadrature<D>>,
+    tissue: Tissue,
+    scatter: Scatter,
+    solver: ConstrainedSolver<D>,
+    settings: NewtonSettings,
+    /// Length that step tolerances are relative to.
+    spacing: f64,
+    at: Snapshot<D>,
+    /// Whether the factor belongs to the current state.
+    factor_is_current: bool,
+    factor_exists: bool,
+    residuals: Vec<f64>,
+    effort: Effort,
+}
+
+/// Everything that a failed increment must give back.
+#[derive(Debug, Clone)]
+struct Snapshot<const D: usize> {
+    coefficients: Vec<f64>,
+    multipliers: Vec<f64>,
+    prescribed: Vec<f64>,
+    force: Vec<f64>,
+    energy: f64,
+    state: State<D>,
+}
+
+enum Attempt {
+    Converged,
+    Failed(FailureReason, String),
+}
+
+impl<const D: usize> Equilibrium<D> {
+    /// A body at rest: `nodes` coefficients vectors, integrated by `rule`, made of `tissue`, with `held` rows whose
+    /// values will be prescribed. `spacing` is a typical node spacing.
+    ///
+    /// # Errors
+    /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
+    pub fn at_rest(
+        rule: Arc<Quadrature<D>>,
+        tissue: Tissue,
+        held: HeldRows,
+        nodes: usize,
+        spacing: f64,
+        settings: NewtonSettings,
+    ) -> Result<Self, Failure> {
+        let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(held.node_lists());
+        let pattern = Pattern::new(D, nodes, lists);
+        let scatter = Scatter::new(&rule, &pattern);
+        let at = Snapshot {
+            coefficients: vec![0.0; nodes * D],
+            multipliers: vec![0.0; held.len() * D],
+            prescribed: vec![0.0; held.len() * D],
+            force: vec![0.0; nodes * D],
+            energy: 0.0,
+            state: State::default(),
+        };
+        let solver = ConstrainedSolver::new(pattern, held);
+        let mut body = Self {
+            rule,
+            tissue,
+            scatter,
+            solver,
+            settings,
+            spacing,
+            at,
+            factor_is_current: false,
+            factor_exists: false,
+            residuals: Vec::new(),
+            effort: Effort::default(),
+        };
+        body.evaluate().map_err(|_| body.failure(FailureReason::ElementInverted, 0.0, "at rest".into()))?;
+        if !body.refactorise() {
+            return Err(body.failure(
+                FailureReason::SingularTangent,
+                0.0,
+                "the tangent at rest is not positive definite: hold more of the boundary, or use a rule without zero-energy modes".into(),
+            ));
+        }
+        Ok(body)
+    }
+
+    /// Changes the settings for the solves to come.
+    pub fn set_settings(&mut self, settings: NewtonSettings) {
+        self.settings = settings;
+    }
+
+    /// Nodal coefficients d, D numbers per node.
+    pub fn coefficients(&self) -> &[f64] {
+        &self.at.coefficients
+    }
+
+    /// Forces that hold the held nodes, D numbers per row: −μ.
+    pub fn reactions(&self) -> impl Iterator<Item = f64> + '_ {
+        self.at.multipliers.iter().map(|m| -m)
+    }
+
+    /// Strain energy.
+    pub fn energy(&self) -> f64 {
+        self.at.energy
+    }
+
+    /// Displacement gradients at the integration points.
+    pub fn state(&self) -> &State<D> {
+        &self.at.state
+    }
+
+    /// The integration rule.
+    pub fn rule(&self) -> &Arc<Quadrature<D>> {
+        &self.rule
+    }
+
+    /// The tissue.
+    pub fn tissue(&self) -> &Tissue {
+        &self.tissue
+    }
+
+    /// Relative residuals of the last solve, iteration by iteration.
+    pub fn residual_history(&self) -> &[f64] {
+        &self.residuals
+    }
+
+    /// Work done since the body was made.
+    pub fn effort(&self) -> Effort {
+        self.effort
+    }
+
+    /// Entries of the Cholesky factor.
+    pub fn factor_entries(&self) -> usize {
+        self.solver.factor_entries()
+    }
+
+    /// Takes the held values from where they are to `prescribed` (D numbers per row), cutting the way into pieces where
+    /// it must.
+    ///
+    /// # Errors
+    /// [`Failure`] with the reason; the body is then at the last state that converged on the way.
+    pub fn drive(&mut self, prescribed: &[f64]) -> Result<(), Failure> {
+        let start = self.at.prescribed.clone();
+        let (mut reached, mut step) = (0.0_f64, 1.0_f64);
+        let mut cuts = 0;
+        while reached < 1.0 {
+            let next = (reached + step).min(1.0);
+            let goal: Vec<f64> = if next >= 1.0 {
+                prescribed.to_vec()
+            } else {
+                start.iter().zip(prescribed).map(|(a, b)| a + (b - a) * next).collect()
+            };
+            let last = self.at.clone();
+            match self.attempt(&goal) {
+                Attempt::Converged => {
+                    reached = next;
+                    // Grow back after success, so that one hard spot does not slow down the rest.
+                    step *= 2.0;
+                }
+                Attempt::Failed(reason, detail) => {
+                    self.at = last;
+                    self.factor_is_current = false;
+                    if cuts >= self.settings.max_cutbacks {
+                        return Err(self.failure(reason, reached, detail));
+                    }
+                    cuts += 1;
+                    self.effort.cutbacks += 1;
+                    step = 0.5 * (next - reached);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Response of the coefficients to unit rates of the held values at the current state: solves
+    /// `K x + Λᵀ μ = 0, Λ x = rates`. This is the exact linearisation of the equilibrium.
+    ///
+    /// # Errors
+    /// [`Failure`] when the tangent at the current state is not positive definite.
+    pub fn sensitivity(&mut self, rates: &[f64]) -> Result<Vec<f64>, Failure> {
+        if !self.factor_is_current && !self.refactorise() {
+            return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
+        }
+        let n = self.at.coefficients.len();
+        let (mut x, mut mu) = (vec![0.0; n], vec![0.0; rates.len()]);
+        self.solver.solve(&vec![0.0; n], rates, 1e-14, &mut x, &mut mu);
+        Ok(x)
+    }
+
+    fn failure(&self, reason: FailureReason, reached: f64, detail: String) -> Failure {
+        Failure { reason, reached, detail }
+    }
+
+    fn evaluate(&mut self) -> Result<(), Inverted> {
+        let at = &mut self.at;
+        at.energy =
+            assembly::internal_force(&self.rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
+        Ok(())
+    }
+
+    /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
+    fn refactorise(&mut self) -> bool {
+        let (rule, tissue, state, scatter) = (&self.rule, &self.tissue, &self.at.state, &self.scatter);
+        self.solver.assemble(|pattern, values| assembly::tangent(rule, tissue, state, pattern, scatter, values));
+        self.effort.factorisations += 1;
+        self.factor_is_current = self.solver.factorise().is_ok();
+        self.factor_exists |= self.factor_is_current;
+        self.factor_is_current
+    }
+
+    /// A factor to step with when the tangent is indefinite: shifted until it is positive definite, so that the step
+    /// still goes downhill.
+    fn refactorise_shifted(&mut self) -> bool {
+        let mut shift = 1e-4 * self.solver.mean_diagonal().abs();
+        for _ in 0..12 {
+            self.effort.factorisations += 1;
+            if self.solver.factorise_shifted(shift).is_ok() {
+                return true;
+            }
+            shift *= 4.0;
+        }
+        false
+    }
+
+    /// Newton's method towards one set of prescribed values.
+    fn attempt(&mut self, prescribed: &[f64]) -> Attempt {
+        let n = self.at.coefficients.len();
+        let (mut step, mut rhs) = (vec![0.0; n], vec![0.0; n]);
+        let mut gap = vec![0.0; prescribed.len()];
+        let mut mu = self.at.multipliers.clone();
+        let may_reuse = self.settings.reuse_tangent || self.tissue.is_linear();
+        let mut factor_usable = self.factor_is_current || (may_reuse && self.factor_exists);
+        let mut indefinite = false;
+        let mut last_residual = f64::INFINITY;
+        self.residuals.clear();
+        for iteration in 0..self.settings.max_iterations {
+            if !factor_usable {
+                indefinite = !self.refactorise();
+                if indefinite && !self.refactorise_shifted() {
+                    return Attempt::Failed(FailureReason::LostStability, "tangent indefinite, no shift helps".into());
+                }
+            }
+            self.solver.held().apply::<D>(&self.at.coefficients, &mut gap);
+            for (g, p) in gap.iter_mut().zip(prescribed) {
+                *g = p - *g;
+            }
+            let feasible = gap.iter().all(|g| g.abs() <= 1e-10 * self.spacing);
+            for (r, f) in rhs.iter_mut().zip(&self.at.force) {
+                *r = -f;
+            }
+            self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, &mut step, &mut mu);
+            self.effort.iterations += 1;
+            let slope: f64 = step.iter().zip(&self.at.force).map(|(x, f)| x * f).sum();
+            match self.search(&step, feasible.then_some(slope)) {
+                Ok(()) => {}
+                Err((reason, detail)) => return Attempt::Failed(reason, detail),
+            }
+            self.factor_is_current = false;
+            let largest = step.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            if !largest.is_finite() {
+                return Attempt::Failed(FailureReason::NotConverged, "step is not a number".into());
+            }
+            let residual = self.relative_residual(&mu);
+            self.residuals.push(residual);
+            let linear = self.tissue.is_linear();
+            if residual <= self.settings.residual_tolerance
+                && (linear || largest <= self.settings.step_tolerance * self.spacing || residual <= 1e-12)
+            {
+                self.at.multipliers.copy_from_slice(&mu);
+                self.at.prescribed.copy_from_slice(prescribed);
+                if linear {
+                    self.factor_is_current = true;
+                    return Attempt::Converged;
+                }
+                if self.settings.reuse_tangent && !indefinite {
+                    return Attempt::Converged;
+                }
+                if self.settings.require_stability && !self.refactorise() {
+                    return Attempt::Failed(
+                        FailureReason::LostStability,
+                        "the equilibrium found is not a minimum of the energy".into(),
+                    );
+                }
+                return Attempt::Converged;
+            }
+            if iteration + 1 == self.settings.max_iterations {
+                let detail = format!("residual {residual:.1e} after {} iterations", iteration + 1);
+                return Attempt::Failed(FailureReason::NotConverged, detail);
+            }
+            factor_usable = linear || (may_reuse && !indefinite && residual < 0.25 * last_residual);
+            last_residual = residual;
+        }
+        Attempt::Failed(FailureReason::NotConverged, "no iterations allowed".into())
+    }
+
+    /// Takes the step, shortened until the configuration is admissible and (when the held values are already met and
+    /// `slope` is given) the energy has decreased enough (Armijo).
+    fn search(&mut self, step: &[f64], slope: Option<f64>) -> Result<(), (FailureReason, String)> {
+        const SUFFICIENT: f64 = 1e-4;
+        let start = self.at.coefficients.clone();
+        let energy = self.at.energy;
+        // Differences of energies below this are rounding.
+        let noise = 1e-12 * energy.abs().max(1e-300);
+        let mut length = 1.0;
+        let shortest = if self.settings.line_search && slope.is_some() { 1.0 / 256.0 } else { 1.0 };
+        loop {
+            for ((d, s), x) in self.at.coefficients.iter_mut().zip(&start).zip(step) {
+                *d = s + length * x;
+            }
+            let outcome = self.evaluate();
+            let decreased = match (&outcome, slope) {
+                (Ok(()), Some(slope)) if self.settings.line_search => {
+                    self.at.energy <= energy + SUFFICIENT * length * slope + noise
+                }
+                (Ok(()), _) => true,
+                (Err(_), _) => false,
+            };
+            if decreased {
+                return Ok(());
+            }
+            length *= 0.5;
+            if length < shortest {
+                return Err(match outcome {
+                    Err(inverted) => (
+                        FailureReason::ElementInverted,
+                        format!("det F = {:.3e} at integration point {}", inverted.det_f, inverted.point),
+                    ),
+                    Ok(()) => (FailureReason::NotConverged, "no step along Newton's direction lowers the energy".into()),
+                });
+            }
+        }
+    }
+
+    /// ‖f + Λᵀ μ‖ over ‖Λᵀ μ‖.
+    fn relative_residual(&self, mu: &[f64]) -> f64 {
+        let mut reaction = vec![0.0; self.at.force.len()];
+        self.solver.held().add_transpose::<D>(mu, &mut reaction);
+        let norm2 = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>();
+        let scale = norm2(&mut reaction.iter().copied());
+        let residual = norm2(&mut reaction.iter().zip(&self.at.force).map(|(r, f)| r + f));
+        if scale > 0.0 { (residual / scale).sqrt() } else { residual.sqrt() }
+    }
+}
