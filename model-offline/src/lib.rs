@@ -1,4 +1,5 @@
 //! Tissue model, paddle placement and controller tables.
+pub mod cli;
 pub mod discretization;
 pub mod mechanics;
 pub mod output;

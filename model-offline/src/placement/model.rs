@@ -27,7 +27,9 @@ pub enum ModelError {
     #[error("no node lies on the {0}; refine the discretization")]
     NothingHeld(String),
     /// The paddle cannot move the target orthogonally to the needle.
-    #[error("paddle {paddle}: the actuation Jacobian is singular (condition {condition:.1e}): this paddle cannot control the target")]
+    #[error(
+        "paddle {paddle}: the actuation Jacobian is singular (condition {condition:.1e}): this paddle cannot control the target"
+    )]
     Uncontrollable {
         /// Paddle index.
         paddle: u32,
@@ -80,7 +82,9 @@ impl TissueModel {
             Integration::Dni => integration::direct_nodal(&shape, &cells)?,
             Integration::Scni => integration::stabilised_conforming_nodal(&shape, &cells)?,
             other => {
-                return Err(ModelError::Unsupported(format!("integration {other:?} is not available yet: use dni or scni")));
+                return Err(ModelError::Unsupported(format!(
+                    "integration {other:?} is not available yet: use dni or scni"
+                )));
             }
         };
         let tolerance = 1e-9 * scene.outline.size();
@@ -92,11 +96,19 @@ impl TissueModel {
                 .map(|x| shape.at(x, false))
                 .collect();
             let held = held?;
-            if held.is_empty() { Err(ModelError::NothingHeld(name.to_owned())) } else { Ok(held) }
+            if held.is_empty() {
+                Err(ModelError::NothingHeld(name.to_owned()))
+            } else {
+                Ok(held)
+            }
         };
         let mut immobile = Vec::new();
         for x in cloud.positions() {
-            if scene.immobile.iter().any(|path| distance_to_polyline(*x, path) <= tolerance) {
+            if scene
+                .immobile
+                .iter()
+                .any(|path| distance_to_polyline(*x, path) <= tolerance)
+            {
                 immobile.push(shape.at(x, false)?);
             }
         }
@@ -127,7 +139,11 @@ impl TissueModel {
     /// The same nodes and shape functions with the tissue of another scene that differs in its materials only.
     #[must_use]
     pub fn with_tissue_of(&self, scene: &Scene) -> Self {
-        Self { tissue: tissue_of(scene, &self.cells), scene: scene.clone(), ..self.clone() }
+        Self {
+            tissue: tissue_of(scene, &self.cells),
+            scene: scene.clone(),
+            ..self.clone()
+        }
     }
 
     /// The scene.
@@ -176,14 +192,20 @@ impl TissueModel {
     /// [`ShapeError`], which building the model has ruled out already.
     pub fn nodal_displacements(&self, coefficients: &[f64]) -> Result<Vec<Point2>, ShapeError> {
         let shape = ShapeFunctions::new(&self.cloud, self.scene.discretization.basis);
-        self.positions().iter().map(|x| Ok(shape.at(x, false)?.interpolate(coefficients))).collect()
+        self.positions()
+            .iter()
+            .map(|x| Ok(shape.at(x, false)?.interpolate(coefficients)))
+            .collect()
     }
 
     /// Displacement of any point of the body for given coefficients.
     pub fn displacement_at(&self, x: &Point2, coefficients: &[f64]) -> Point2 {
         let shape = ShapeFunctions::new(&self.cloud, self.scene.discretization.basis);
         // Building the model evaluated shape functions all over the body; only far outside it can this fail.
-        shape.at(x, false).map_or_else(|_| Point2::zeros(), |stencil| stencil.interpolate(coefficients))
+        shape.at(x, false).map_or_else(
+            |_| Point2::zeros(),
+            |stencil| stencil.interpolate(coefficients),
+        )
     }
 
     /// Position of a paddle in the scene's list, by its index.
@@ -195,7 +217,11 @@ impl TissueModel {
     ///
     /// # Errors
     /// [`Failure`] when the tangent at rest is singular.
-    pub fn body(&self, paddle: Option<usize>, settings: NewtonSettings) -> Result<Body<'_>, Failure> {
+    pub fn body(
+        &self,
+        paddle: Option<usize>,
+        settings: NewtonSettings,
+    ) -> Result<Body<'_>, Failure> {
         let none = Vec::new();
         let paddle = paddle.map_or(&none, |p| &self.paddles[p]);
         let held = HeldRows::new(self.immobile.iter().chain(&self.needle).chain(paddle));
@@ -207,7 +233,13 @@ impl TissueModel {
             self.spacing,
             settings,
         )?;
-        Ok(Body { model: self, equilibrium, paddle_rows: paddle.len(), depth: 0.0, paddle: Vector2::zeros() })
+        Ok(Body {
+            model: self,
+            equilibrium,
+            paddle_rows: paddle.len(),
+            depth: 0.0,
+            paddle: Vector2::zeros(),
+        })
     }
 }
 
@@ -307,7 +339,9 @@ impl Body<'_> {
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Failure> {
         let prescribed = self.held_values(depth, paddle);
         let outcome = self.equilibrium.drive(&prescribed);
-        let reached = outcome.as_ref().map_or_else(|failure| failure.reached, |()| 1.0);
+        let reached = outcome
+            .as_ref()
+            .map_or_else(|failure| failure.reached, |()| 1.0);
         self.depth += (depth - self.depth) * reached;
         self.paddle += (paddle - self.paddle) * reached;
         if outcome.is_ok() {
@@ -319,7 +353,9 @@ impl Body<'_> {
 
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector2<f64> {
-        self.model.target.interpolate(self.equilibrium.coefficients())
+        self.model
+            .target
+            .interpolate(self.equilibrium.coefficients())
     }
 
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle held, by exact linearisation.
@@ -350,7 +386,8 @@ impl Body<'_> {
     /// Values of all held rows, in the order immobile, needle, paddle.
     fn held_values(&self, depth: f64, paddle: Vector2<f64>) -> Vec<f64> {
         let model = self.model;
-        let mut values = vec![0.0; 2 * (model.immobile.len() + model.needle.len() + self.paddle_rows)];
+        let mut values =
+            vec![0.0; 2 * (model.immobile.len() + model.needle.len() + self.paddle_rows)];
         let (_, rest) = values.split_at_mut(2 * model.immobile.len());
         let (needle_values, paddle_values) = rest.split_at_mut(2 * model.needle.len());
         for pair in needle_values.chunks_exact_mut(2) {

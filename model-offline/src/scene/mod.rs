@@ -77,7 +77,11 @@ impl Needle {
     /// Unit vector orthogonal to the axis: the axis turned by 90°, signed so that its larger component is positive.
     pub fn orthogonal(&self) -> Point2 {
         let turned = Point2::new(-self.axis.y, self.axis.x);
-        let larger = if turned.x.abs() >= turned.y.abs() { turned.x } else { turned.y };
+        let larger = if turned.x.abs() >= turned.y.abs() {
+            turned.x
+        } else {
+            turned.y
+        };
         // Adding zero turns a negative zero into a positive one: reports show it.
         (turned * larger.signum()).map(|v| v + 0.0)
     }
@@ -128,6 +132,18 @@ pub struct Discretization {
     pub essential: Essential,
 }
 
+/// Whether a discretization that did not come from the file fits the scene.
+///
+/// # Errors
+/// What is wrong, and what to do.
+pub fn check_override(scene: &Scene) -> Result<(), (String, String)> {
+    match scene.discretization.resolution {
+        Resolution::Spacing(h) => validate::check_spacing(h, &scene.outline)?,
+        Resolution::Tolerance(t) => validate::check_tolerance(t)?,
+    }
+    validate::check_support(scene.discretization.support)
+}
+
 impl Scene {
     /// Reads and validates a scene file; a bundled scene's name stands for the bundled text.
     ///
@@ -142,10 +158,17 @@ impl Scene {
         }
         let bytes = std::fs::read(path).map_err(|error| {
             let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
-            error::Source { file: &file, text: "" }.error(
+            error::Source {
+                file: &file,
+                text: "",
+            }
+            .error(
                 0..0,
                 format!("cannot read the scene: {error}"),
-                format!("give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
+                format!(
+                    "give the path of a scene file, or one of the bundled scenes: {}",
+                    known.join(", ")
+                ),
             )
         })?;
         match String::from_utf8(bytes) {
@@ -179,12 +202,19 @@ impl Scene {
     /// The same scene in homogeneous tissue.
     #[must_use]
     pub fn without_inclusions(&self) -> Self {
-        Self { inclusions: Vec::new(), ..self.clone() }
+        Self {
+            inclusions: Vec::new(),
+            ..self.clone()
+        }
     }
 
     /// The label of the tissue, as reports and tables carry it.
     pub fn tissue(&self) -> &'static str {
-        if self.inclusions.is_empty() { "homogeneous" } else { "inclusion" }
+        if self.inclusions.is_empty() {
+            "homogeneous"
+        } else {
+            "inclusion"
+        }
     }
 
     /// SHA-256 over everything that the model's numbers depend on, with the discretization.

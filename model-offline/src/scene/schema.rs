@@ -107,7 +107,10 @@ fn one() -> String {
 
 impl Default for UnitsSection {
     fn default() -> Self {
-        Self { length: one(), stress: one() }
+        Self {
+            length: one(),
+            stress: one(),
+        }
     }
 }
 
@@ -237,7 +240,9 @@ pub struct ActuatorSection {
 }
 
 /// Integration rules of the weak form, and finite-element baselines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 #[value(rename_all = "kebab-case")]
 pub enum Integration {
@@ -256,7 +261,19 @@ pub enum Integration {
 }
 
 /// Monomials that the shape functions reproduce exactly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Default,
+    Deserialize,
+    Serialize,
+    JsonSchema,
+    clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
     /// 1, x, y.
@@ -267,7 +284,19 @@ pub enum Basis {
 }
 
 /// How essential boundary conditions are imposed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Default,
+    Deserialize,
+    Serialize,
+    JsonSchema,
+    clap::ValueEnum,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum Essential {
     /// Nodal values are held exactly (the paper's transformation method).

@@ -1,0 +1,541 @@
+//! The command line of `model-offline`.
+
+use crate::output::{self, OutputError};
+use crate::placement::table::{self, TableBuildError, TableOptions};
+use crate::placement::{ModelError, Placement, TissueModel, study};
+use crate::scene::schema::{self, Basis, Essential, Integration};
+use crate::scene::{Resolution, Scene, SceneError, check_override};
+use crate::solver::equilibrium::{Failure, NewtonSettings};
+use clap::{Args, Parser, Subcommand};
+use nalgebra::Vector2;
+use std::io::IsTerminal as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Tissue model, paddle placement and controller tables for needle insertion.
+#[derive(Debug, Parser)]
+#[command(name = "model-offline", version, about, max_term_width = 100)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Full placement study: every paddle, as a fixture and as an actuator.
+    #[command(
+        after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json"
+    )]
+    Place {
+        /// Scene file, or the name of a bundled scene (paper, paper-hull).
+        scene: PathBuf,
+        /// Leave the inclusions out: homogeneous tissue.
+        #[arg(long)]
+        without_inclusion: bool,
+        /// Write the study as JSON.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// Write the controller table of the best dynamic paddle.
+        #[arg(long, value_name = "FILE")]
+        table: Option<PathBuf>,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// One equilibrium: needle at a depth, one paddle displaced.
+    #[command(
+        after_help = "Example:\n  model-offline solve paper --paddle 3 --depth 0.1 --vtu body.vtu --svg body.svg"
+    )]
+    Solve {
+        /// Scene file, or the name of a bundled scene.
+        scene: PathBuf,
+        /// Index of the paddle that is attached.
+        #[arg(long)]
+        paddle: u32,
+        /// Needle depth, length units.
+        #[arg(long)]
+        depth: f64,
+        /// Paddle displacement, length units.
+        #[arg(
+            long,
+            value_name = "X,Y",
+            value_delimiter = ',',
+            num_args = 1,
+            allow_hyphen_values = true
+        )]
+        paddle_displacement: Option<Vec<f64>>,
+        /// Leave the inclusions out: homogeneous tissue.
+        #[arg(long)]
+        without_inclusion: bool,
+        /// Write the result as JSON.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// Write displacement, strain, stress and det F for ParaView.
+        #[arg(long, value_name = "FILE")]
+        vtu: Option<PathBuf>,
+        /// Draw the deformed body.
+        #[arg(long, value_name = "FILE")]
+        svg: Option<PathBuf>,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// Controller table of one paddle.
+    #[command(after_help = "Example:\n  model-offline table paper --paddle 3 -o paddle3.table")]
+    Table {
+        /// Scene file, or the name of a bundled scene.
+        scene: PathBuf,
+        /// Paddle index (default: the best dynamic paddle).
+        #[arg(long)]
+        paddle: Option<u32>,
+        /// Where to write the table.
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Depth knots.
+        #[arg(long, default_value_t = TableOptions::default().knots)]
+        knots: usize,
+        /// Leave the inclusions out: homogeneous tissue.
+        #[arg(long)]
+        without_inclusion: bool,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// What a table holds, checked.
+    #[command(after_help = "Example:\n  model-offline inspect paddle3.table")]
+    Inspect {
+        /// Table file.
+        table: PathBuf,
+        /// Write the contents as JSON.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+    },
+    /// JSON Schema of the scene file.
+    #[command(after_help = "Example:\n  model-offline schema > scene.schema.json")]
+    Schema,
+}
+
+/// Flags that override `[discretization]`, and how to run.
+#[derive(Debug, Args)]
+struct Common {
+    /// Node spacing, length units.
+    #[arg(long, value_name = "H", conflicts_with = "tolerance")]
+    spacing: Option<f64>,
+    /// Relative error of the controllability measures to refine down to.
+    #[arg(long, value_name = "T")]
+    tolerance: Option<f64>,
+    /// Kernel support over local spacing.
+    #[arg(long)]
+    support: Option<f64>,
+    /// Integration rule.
+    #[arg(long)]
+    integration: Option<Integration>,
+    /// Basis of the shape functions.
+    #[arg(long)]
+    basis: Option<Basis>,
+    /// How essential boundary conditions are imposed.
+    #[arg(long)]
+    essential: Option<Essential>,
+    /// Threads to use (default: all).
+    #[arg(long)]
+    threads: Option<usize>,
+    /// No progress and no summary.
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum CliError {
+    /// The scene is bad.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(#[from] SceneError),
+    /// An argument is bad.
+    #[error("{0}")]
+    #[diagnostic(help("{1}"))]
+    Usage(String, String),
+    /// The table file cannot be used.
+    #[error("{}: {reason}", path.display())]
+    BadTable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The model cannot be made or solved.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The table cannot be made.
+    #[error(transparent)]
+    Table(#[from] TableBuildError),
+    /// No equilibrium.
+    #[error("no equilibrium: {failure}; last converged state at depth {depth:.4}")]
+    #[diagnostic(help(
+        "the tissue law loses stability under strong compression: reduce the depth, or add a barrier to the material"
+    ))]
+    Solve {
+        /// Why.
+        failure: Failure,
+        /// Depth of the last converged state.
+        depth: f64,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+impl CliError {
+    /// 2 for bad input or usage, 1 for a computation that failed.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::Usage(..) | Self::BadTable { .. } => 2,
+            Self::Table(TableBuildError::NoSuchPaddle(_) | TableBuildError::Knots(_)) => 2,
+            _ => 1,
+        }
+    }
+
+    fn reason(&self) -> String {
+        match self {
+            Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => {
+                failure.reason.to_string()
+            }
+            Self::Model(ModelError::Uncontrollable { .. }) => "singular-jacobian".into(),
+            Self::Model(ModelError::Shape(_)) => "singular-moment-matrix".into(),
+            _ => "failed".into(),
+        }
+    }
+}
+
+impl Common {
+    fn scene(&self, path: &Path, without_inclusion: bool) -> Result<Scene, CliError> {
+        let mut scene = Scene::read(path)?;
+        if without_inclusion {
+            scene = scene.without_inclusions();
+        }
+        let spec = &mut scene.discretization;
+        if let Some(h) = self.spacing {
+            spec.resolution = Resolution::Spacing(h);
+        }
+        if let Some(t) = self.tolerance {
+            spec.resolution = Resolution::Tolerance(t);
+        }
+        spec.support = self.support.unwrap_or(spec.support);
+        spec.integration = self.integration.unwrap_or(spec.integration);
+        spec.basis = self.basis.unwrap_or(spec.basis);
+        spec.essential = self.essential.unwrap_or(spec.essential);
+        check_override(&scene).map_err(|(message, help)| CliError::Usage(message, help))?;
+        Ok(scene)
+    }
+
+    fn threads(&self) -> usize {
+        self.threads
+            .unwrap_or_else(|| {
+                std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+            })
+            .max(1)
+    }
+
+    fn progress(&self, steps: u64) -> indicatif::ProgressBar {
+        if self.quiet || !std::io::stderr().is_terminal() {
+            return indicatif::ProgressBar::hidden();
+        }
+        let style = indicatif::ProgressStyle::with_template(
+            "{wide_bar} {pos}/{len} increments, {eta} left",
+        );
+        let bar = indicatif::ProgressBar::new(steps);
+        if let Ok(style) = style {
+            bar.with_style(style)
+        } else {
+            bar
+        }
+    }
+}
+
+/// Runs a command.
+///
+/// # Errors
+/// [`CliError`], whose [`exit_code`](CliError::exit_code) is the process's.
+pub fn run(cli: Cli) -> Result<(), CliError> {
+    match cli.command {
+        Command::Place {
+            scene,
+            without_inclusion,
+            json,
+            table,
+            common,
+        } => {
+            let scene = common.scene(&scene, without_inclusion)?;
+            let outcome = place(&scene, &common, table.as_deref());
+            match outcome {
+                Ok((document, summary)) => {
+                    if let Some(path) = json {
+                        output::write_whole(&path, pretty(&document).as_bytes())?;
+                    }
+                    if !common.quiet {
+                        print!("{summary}");
+                    }
+                    Ok(())
+                }
+                Err(error) => Err(report_failure(error, json.as_deref(), &scene)),
+            }
+        }
+        Command::Solve {
+            scene,
+            paddle,
+            depth,
+            paddle_displacement,
+            without_inclusion,
+            json,
+            vtu,
+            svg,
+            common,
+        } => {
+            let scene = common.scene(&scene, without_inclusion)?;
+            let displacement = match paddle_displacement.as_deref() {
+                None => Vector2::zeros(),
+                Some([x, y]) if x.is_finite() && y.is_finite() => Vector2::new(*x, *y),
+                Some(_) => {
+                    return Err(CliError::Usage(
+                        "--paddle-displacement takes two finite numbers".into(),
+                        "e.g. --paddle-displacement 0.01,-0.002".into(),
+                    ));
+                }
+            };
+            if !depth.is_finite() || depth < 0.0 {
+                return Err(CliError::Usage(
+                    format!("--depth is {depth}"),
+                    "give a depth of 0 or more".into(),
+                ));
+            }
+            let files = SolveFiles {
+                json: json.as_deref(),
+                vtu: vtu.as_deref(),
+                svg: svg.as_deref(),
+            };
+            solve(&scene, paddle, depth, displacement, &files, common.quiet)
+                .map_err(|error| report_failure(error, json.as_deref(), &scene))
+        }
+        Command::Table {
+            scene,
+            paddle,
+            output,
+            knots,
+            without_inclusion,
+            common,
+        } => {
+            let scene = common.scene(&scene, without_inclusion)?;
+            let model = TissueModel::new(&scene)?;
+            let options = TableOptions {
+                knots,
+                ..TableOptions::default()
+            };
+            let paddle = match paddle {
+                Some(index) => index,
+                None => study::best_dynamic(&model, common.threads())?,
+            };
+            let table = table::build(&model, paddle, &options)?;
+            let bytes = table::to_bytes(&table)?;
+            output::write_whole(&output, &bytes)?;
+            if !common.quiet {
+                println!(
+                    "{}: {} bytes\n{}",
+                    output.display(),
+                    bytes.len(),
+                    crate::output::table_text::summary(&table)
+                );
+            }
+            Ok(())
+        }
+        Command::Inspect { table, json } => {
+            let bad = |reason: String| CliError::BadTable {
+                path: table.clone(),
+                reason,
+            };
+            let bytes = std::fs::read(&table).map_err(|e| bad(e.to_string()))?;
+            let contents =
+                crate::output::table_text::read(&bytes).map_err(|e| bad(e.to_string()))?;
+            if let Some(path) = json {
+                output::write_whole(
+                    &path,
+                    pretty(&crate::output::table_text::json(&contents)).as_bytes(),
+                )?;
+            }
+            println!("{}: {} bytes, checked", table.display(), bytes.len());
+            println!("{}", crate::output::table_text::summary(&contents));
+            Ok(())
+        }
+        Command::Schema => {
+            println!("{}", pretty(&schema::json_schema()));
+            Ok(())
+        }
+    }
+}
+
+fn pretty(value: &impl serde::Serialize) -> String {
+    // Values made of numbers, strings and lists always serialise.
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+}
+
+/// A failed computation is told in the JSON too, so that a script sees the reason.
+fn report_failure(error: CliError, json: Option<&Path>, scene: &Scene) -> CliError {
+    if error.exit_code() == 1
+        && let Some(path) = json
+    {
+        let document = serde_json::json!({
+            "scene": scene.name, "tissue": scene.tissue(),
+            "failure": {"reason": error.reason(), "detail": error.to_string()},
+        });
+        if let Err(output) = output::write_whole(path, pretty(&document).as_bytes()) {
+            return output.into();
+        }
+    }
+    error
+}
+
+fn place(
+    scene: &Scene,
+    common: &Common,
+    table: Option<&Path>,
+) -> Result<(serde_json::Value, String), CliError> {
+    let start = Instant::now();
+    let model = TissueModel::new(scene)?;
+    let bar = common.progress(study::progress_steps(&model));
+    let placement = study::place(&model, NewtonSettings::default(), common.threads(), &|| {
+        bar.inc(1)
+    })?;
+    bar.finish_and_clear();
+    if let Some(path) = table {
+        let built = table::build(&model, placement.optimum.dynamic, &TableOptions::default())?;
+        output::write_whole(path, &table::to_bytes(&built)?)?;
+    }
+    let wall_s = start.elapsed().as_secs_f64();
+    let document = serde_json::json!({
+        "scene": scene.name,
+        "tissue": scene.tissue(),
+        "nodes": model.nodes(),
+        "dofs": model.dofs(),
+        "integration": scene.discretization.integration,
+        "wall_s": wall_s,
+        "paddles": placement.paddles,
+        "optimum": placement.optimum,
+    });
+    Ok((document, summary(scene, &model, &placement, wall_s)))
+}
+
+fn summary(scene: &Scene, model: &TissueModel, placement: &Placement, wall_s: f64) -> String {
+    use std::fmt::Write as _;
+    let mut out = format!(
+        "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖   J⁻¹n                  max orthogonal (fixture)\n",
+        scene.name,
+        scene.tissue(),
+        model.nodes(),
+        1e3 * wall_s
+    );
+    for p in &placement.paddles {
+        let mark = |best: u32| if p.index == best { "*" } else { " " };
+        let stopped = p.fixture.failure.as_ref().map_or(String::new(), |f| {
+            format!("  stopped at depth {:.4}: {}", f.depth, f.reason)
+        });
+        let _ = writeln!(
+            out,
+            "{:>7}  {:8.4}{} ({:8.4}, {:8.4})  {:12.6}{}{stopped}",
+            p.index,
+            p.controllability_measure,
+            mark(placement.optimum.dynamic),
+            p.best_direction[0],
+            p.best_direction[1],
+            p.fixture.max_orthogonal,
+            mark(placement.optimum.fixture),
+        );
+    }
+    let _ = writeln!(
+        out,
+        "\nbest as a fixture: paddle {}; best as an actuator: paddle {}",
+        placement.optimum.fixture, placement.optimum.dynamic
+    );
+    out
+}
+
+struct SolveFiles<'a> {
+    json: Option<&'a Path>,
+    vtu: Option<&'a Path>,
+    svg: Option<&'a Path>,
+}
+
+fn solve(
+    scene: &Scene,
+    paddle: u32,
+    depth: f64,
+    displacement: Vector2<f64>,
+    files: &SolveFiles<'_>,
+    quiet: bool,
+) -> Result<(), CliError> {
+    let model = TissueModel::new(scene)?;
+    let position = model.paddle_position(paddle).ok_or_else(|| {
+        let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
+        CliError::Usage(
+            format!("the scene has no paddle {paddle}"),
+            format!("choose one of {}", known.join(", ")),
+        )
+    })?;
+    let mut body = model
+        .body(Some(position), NewtonSettings::default())
+        .map_err(ModelError::from)?;
+    // In pieces of the scene's increment: the path matters near the limits of stability.
+    let pieces = (depth / scene.needle.depth * f64::from(scene.needle.increments))
+        .ceil()
+        .max(1.0);
+    for piece in 1..=pieces as u32 {
+        let share = f64::from(piece) / pieces;
+        if let Err(failure) = body.drive(depth * share, displacement * share) {
+            return Err(CliError::Solve {
+                failure,
+                depth: body.depth(),
+            });
+        }
+    }
+    let target = body.target_displacement();
+    let orthogonal = target.dot(&scene.needle.orthogonal());
+    let jacobian = body
+        .actuation_jacobian()
+        .map_err(|failure| CliError::Solve {
+            failure,
+            depth: body.depth(),
+        })?;
+    let nodal = model
+        .nodal_displacements(body.equilibrium().coefficients())
+        .map_err(ModelError::from)?;
+    let point = |p: &Vector2<f64>| [p.x, p.y];
+    if let Some(path) = files.json {
+        let document = serde_json::json!({
+            "scene": scene.name, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
+            "integration": scene.discretization.integration,
+            "paddle": paddle, "depth": depth, "paddle_displacement": point(&displacement),
+            "target_displacement": point(&target), "orthogonal": orthogonal,
+            "jacobian": study::rows(&jacobian),
+            "strain_energy": body.equilibrium().energy(),
+            "newton_iterations": body.equilibrium().effort().iterations,
+            "node_positions": model.positions().iter().map(point).collect::<Vec<_>>(),
+            "node_displacements": nodal.iter().map(point).collect::<Vec<_>>(),
+            "failure": null,
+        });
+        output::write_whole(path, pretty(&document).as_bytes())?;
+    }
+    if let Some(path) = files.vtu {
+        output::write_whole(path, output::vtu::vtu(&model, &body).as_bytes())?;
+    }
+    if let Some(path) = files.svg {
+        output::write_whole(path, output::svg::svg(&model, &body).as_bytes())?;
+    }
+    if !quiet {
+        println!(
+            "{} · {} tissue · paddle {paddle} at ({}, {}) · depth {depth}\ntarget displacement ({:.8}, {:.8}), orthogonal {:.8}",
+            scene.name,
+            scene.tissue(),
+            displacement.x,
+            displacement.y,
+            target.x,
+            target.y,
+            orthogonal
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,100 @@
+//! A controller table as text and JSON, for people and scripts.
+
+use firmware::contract::{Header, Table, TableError, decode};
+use firmware::scalar::ScalarKind;
+use std::fmt::Write as _;
+
+/// Reads and checks a table of either scalar type.
+///
+/// # Errors
+/// [`TableError`] says which check refused it.
+pub fn read(bytes: &[u8]) -> Result<Table<f64, 2>, TableError> {
+    match Header::read(bytes)?.scalar {
+        ScalarKind::F32 => Ok(decode::<f32, 2>(bytes)?.cast()),
+        ScalarKind::F64 => decode::<f64, 2>(bytes),
+    }
+}
+
+/// SHA-256 in hexadecimal.
+pub fn hex(hash: &[u8]) -> String {
+    hash.iter().fold(String::new(), |mut s, b| {
+        let _ = write!(s, "{b:02x}");
+        s
+    })
+}
+
+/// A screen's worth about a table.
+pub fn summary(table: &Table<f64, 2>) -> String {
+    let mut out = format!(
+        "paddle {} · {} tissue · {} knots, depth {:.4} to {:.4}\nscene {}\n\
+         limits: displacement {:.4}, rate {:.4} per s, needle speed {:.4} per s; loop gain {:.4} (delay {} samples, model error {:.2})\n\n\
+            depth   paddle path            J⁻¹n norm   axial target   fixture orthogonal\n",
+        table.paddle.index,
+        table.tissue,
+        table.knots.len(),
+        table.validity.depth_start,
+        table.validity.depth_end,
+        hex(&table.scene_hash),
+        table.paddle.max_displacement,
+        table.paddle.max_rate,
+        table.validity.needle_speed,
+        table.gains.loop_gain,
+        table.gains.delay_samples,
+        table.gains.lambda_max,
+    );
+    for knot in &table.knots {
+        let measure = knot
+            .jacobian
+            .try_inverse()
+            .map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
+        let _ = writeln!(
+            out,
+            "{:8.4}  ({:9.6}, {:9.6})  {:9.4}  {:12.6}  {:16.6}",
+            knot.depth,
+            knot.paddle_path.x,
+            knot.paddle_path.y,
+            measure,
+            knot.target_displacement.dot(&table.needle_axis),
+            knot.static_target_displacement.dot(&table.orthogonal),
+        );
+    }
+    out
+}
+
+/// The whole table as JSON.
+pub fn json(table: &Table<f64, 2>) -> serde_json::Value {
+    let v = |v: &nalgebra::Vector2<f64>| [v.x, v.y];
+    serde_json::json!({
+        "scene_hash": hex(&table.scene_hash),
+        "tissue": table.tissue.as_str(),
+        "units": {"length": table.units.length.as_str(), "stress": table.units.stress.as_str()},
+        "paddle": {
+            "index": table.paddle.index,
+            "segment": [v(&table.paddle.segment[0]), v(&table.paddle.segment[1])],
+            "max_displacement": table.paddle.max_displacement,
+            "max_rate": table.paddle.max_rate,
+        },
+        "needle_axis": v(&table.needle_axis),
+        "orthogonal": v(&table.orthogonal),
+        "target_position": v(&table.target_position),
+        "validity": {
+            "depth": [table.validity.depth_start, table.validity.depth_end],
+            "paddle_displacement": table.validity.paddle_displacement,
+            "needle_speed": table.validity.needle_speed,
+        },
+        "gains": {
+            "loop_gain": table.gains.loop_gain,
+            "delay_samples": table.gains.delay_samples,
+            "lambda_max": table.gains.lambda_max,
+        },
+        "knots": table.knots.iter().map(|k| serde_json::json!({
+            "depth": k.depth,
+            "jacobian": crate::placement::study::rows(&k.jacobian),
+            "paddle_path": v(&k.paddle_path),
+            "paddle_path_slope": v(&k.paddle_path_slope),
+            "target_displacement": v(&k.target_displacement),
+            "target_displacement_slope": v(&k.target_displacement_slope),
+            "static_target_displacement": v(&k.static_target_displacement),
+        })).collect::<Vec<_>>(),
+    })
+}

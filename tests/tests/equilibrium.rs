@@ -1,0 +1,241 @@
+//! The equilibrium solver on the paper's scene: Newton's tail, Jacobians, invariances, typed failures.
+
+use model_offline::placement::{TissueModel, place};
+use model_offline::scene::schema::Integration;
+use model_offline::scene::{Resolution, Scene};
+use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
+use nalgebra::{Matrix2, Vector2};
+
+fn model(integration: Integration) -> TissueModel {
+    let mut scene = Scene::bundled("paper").unwrap();
+    scene.discretization.integration = integration;
+    TissueModel::new(&scene).unwrap()
+}
+
+#[test]
+fn newton_converges_quadratically() {
+    let model = model(Integration::Scni);
+    let mut body = model
+        .body(
+            Some(2),
+            NewtonSettings {
+                residual_tolerance: 1e-13,
+                ..Default::default()
+            },
+        )
+        .unwrap();
+    body.drive(0.02, Vector2::zeros()).unwrap();
+    let history: Vec<f64> = body
+        .equilibrium()
+        .residual_history()
+        .iter()
+        .copied()
+        .filter(|r| *r < 0.1 && *r > 1e-12)
+        .collect();
+    assert!(history.len() >= 2, "{history:?}");
+    for pair in history.windows(2) {
+        // log r grows by about two per iteration; rounding ends it.
+        assert!(
+            pair[1] < 10.0 * pair[0].powf(1.7) || pair[1] < 1e-11,
+            "{history:?}"
+        );
+    }
+}
+
+#[test]
+fn exact_jacobian_agrees_with_resolved_finite_differences_at_depth() {
+    for integration in [Integration::Dni, Integration::Scni] {
+        let model = model(integration);
+        for depth in [0.0, 0.05] {
+            let mut body = model
+                .body(
+                    Some(2),
+                    NewtonSettings {
+                        residual_tolerance: 1e-12,
+                        ..Default::default()
+                    },
+                )
+                .unwrap();
+            body.drive(depth, Vector2::zeros()).unwrap();
+            let exact = body.actuation_jacobian().unwrap();
+            let mut difference = Matrix2::zeros();
+            let step = 1e-4;
+            for axis in 0..2 {
+                let push = Vector2::ith(axis, step);
+                body.drive(depth, push).unwrap();
+                let ahead = body.target_displacement();
+                body.drive(depth, -push).unwrap();
+                difference.set_column(axis, &((ahead - body.target_displacement()) / (2.0 * step)));
+                body.drive(depth, Vector2::zeros()).unwrap();
+            }
+            assert!(
+                (exact - difference).norm() < 1e-6,
+                "{integration:?} {depth}: {exact} {difference}"
+            );
+        }
+    }
+}
+
+#[test]
+fn exact_jacobian_agrees_with_the_papers_small_displacements() {
+    // The paper displaces the paddle "with a small amount": one-sided, 1 % of the paddle's distance to the target.
+    let model = model(Integration::Scni);
+    let mut body = model.body(Some(2), NewtonSettings::default()).unwrap();
+    let exact = body.actuation_jacobian().unwrap();
+    for axis in 0..2 {
+        body.drive(0.0, Vector2::ith(axis, 0.005)).unwrap();
+        let estimate = body.target_displacement() / 0.005;
+        assert!((estimate - exact.column(axis)).norm() < 0.01 * exact.norm());
+        body.drive(0.0, Vector2::zeros()).unwrap();
+    }
+}
+
+#[test]
+fn held_values_are_met_and_a_rigid_translation_costs_nothing() {
+    let scene = Scene::bundled("paper").unwrap();
+    let model = TissueModel::new(&scene).unwrap();
+    let mut body = model.body(Some(0), NewtonSettings::default()).unwrap();
+    body.drive(0.03, Vector2::new(0.004, -0.002)).unwrap();
+    let nodal = model
+        .nodal_displacements(body.equilibrium().coefficients())
+        .unwrap();
+    for (x, u) in model.positions().iter().zip(&nodal) {
+        if x.x == 1.0 {
+            assert!(u.norm() < 1e-12, "immobile node {x:?} moved by {u:?}");
+        }
+        if x.y == 1.0 && (0.4..=0.6).contains(&x.x) {
+            assert!((u - Vector2::new(0.0, -0.03)).norm() < 1e-12);
+        }
+    }
+    let shape: Vec<f64> = model.positions().iter().flat_map(|_| [0.3, -0.7]).collect();
+    for q in 0..model.rule().len() {
+        let h = model_offline::mechanics::assembly::displacement_gradient(model.rule(), q, &shape);
+        assert!(h.norm() < 1e-12, "partition of unity at point {q}: {h}");
+    }
+}
+
+#[test]
+fn the_answer_turns_with_the_scene() {
+    // The paper's scene turned by 90 degrees about the origin: a lattice maps onto itself, every number must follow.
+    let text = model_offline::scene::BUNDLED[0].1;
+    let straight = Scene::parse(text, "straight").unwrap();
+    let turn = |p: Vector2<f64>| Vector2::new(-p.y, p.x);
+    let mut turned = straight.clone();
+    turned.outline = model_offline::scene::Polygon::new(
+        straight
+            .outline
+            .vertices()
+            .iter()
+            .map(|p| turn(*p))
+            .collect(),
+    )
+    .unwrap();
+    for inclusion in &mut turned.inclusions {
+        inclusion.outline = model_offline::scene::Polygon::new(
+            inclusion
+                .outline
+                .vertices()
+                .iter()
+                .map(|p| turn(*p))
+                .collect(),
+        )
+        .unwrap();
+    }
+    turned
+        .immobile
+        .iter_mut()
+        .flatten()
+        .for_each(|p| *p = turn(*p));
+    turned.needle.contact.iter_mut().for_each(|p| *p = turn(*p));
+    turned.needle.axis = turn(turned.needle.axis);
+    turned.target = turn(turned.target);
+    for paddle in &mut turned.paddles {
+        paddle.segment = paddle.segment.map(turn);
+    }
+    let solve = |scene: &Scene| {
+        let model = TissueModel::new(scene).unwrap();
+        let mut body = model.body(Some(3), NewtonSettings::default()).unwrap();
+        body.drive(0.05, Vector2::zeros()).unwrap();
+        (
+            body.target_displacement(),
+            body.actuation_jacobian().unwrap(),
+        )
+    };
+    let ((u, j), (v, k)) = (solve(&straight), solve(&turned));
+    let q = Matrix2::new(0.0, -1.0, 1.0, 0.0);
+    assert!((q * u - v).norm() < 1e-10, "{u} {v}");
+    assert!((q * j * q.transpose() - k).norm() < 1e-9);
+}
+
+#[test]
+fn results_do_not_depend_on_the_number_of_threads() {
+    let model = model(Integration::Dni);
+    let one = place(&model, NewtonSettings::default(), 1, &|| {}).unwrap();
+    let four = place(&model, NewtonSettings::default(), 4, &|| {}).unwrap();
+    assert_eq!(one, four);
+}
+
+#[test]
+fn too_deep_is_a_typed_failure_with_the_last_converged_state() {
+    let mut scene = Scene::bundled("paper").unwrap().without_inclusions();
+    scene.needle.depth = 0.4;
+    scene.needle.increments = 40;
+    let model = TissueModel::new(&scene).unwrap();
+    let placement = place(&model, NewtonSettings::default(), 2, &|| {}).unwrap();
+    for paddle in &placement.paddles {
+        let failure = paddle
+            .fixture
+            .failure
+            .as_ref()
+            .expect("the law loses stability before depth 0.4");
+        assert!(failure.depth > 0.08 && failure.depth < 0.3, "{failure:?}");
+        assert_eq!(failure.depth, paddle.fixture.reached_depth);
+        assert!(matches!(
+            failure.reason,
+            FailureReason::LostStability
+                | FailureReason::ElementInverted
+                | FailureReason::NotConverged
+        ));
+    }
+}
+
+#[test]
+fn a_paddle_that_failed_never_ranks_above_one_that_reached_the_depth() {
+    let mut scene = Scene::bundled("paper").unwrap().without_inclusions();
+    scene.discretization.resolution = Resolution::Spacing(0.1);
+    scene.needle.depth = 0.13;
+    scene.needle.increments = 13;
+    let model = TissueModel::new(&scene).unwrap();
+    let placement = place(&model, NewtonSettings::default(), 2, &|| {}).unwrap();
+    let best = placement
+        .paddles
+        .iter()
+        .find(|p| p.index == placement.optimum.fixture)
+        .unwrap();
+    if placement
+        .paddles
+        .iter()
+        .any(|p| p.fixture.failure.is_none())
+    {
+        assert!(best.fixture.failure.is_none());
+    }
+}
+
+#[test]
+fn the_paddles_forces_balance_those_of_needle_and_wall() {
+    let model = model(Integration::Scni);
+    let mut body = model.body(Some(2), NewtonSettings::default()).unwrap();
+    body.drive(0.05, Vector2::new(0.002, 0.001)).unwrap();
+    let total = body.equilibrium().reactions().enumerate().fold(
+        Vector2::zeros(),
+        |mut sum: Vector2<f64>, (k, r)| {
+            sum[k % 2] += r;
+            sum
+        },
+    );
+    let largest = body
+        .equilibrium()
+        .reactions()
+        .fold(0.0_f64, |m, r| m.max(r.abs()));
+    assert!(total.norm() < 1e-8 * largest, "{total} of {largest}");
+}
