@@ -31,10 +31,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
     /// # Errors
     /// What is wrong with the settings.
     pub fn new(table: &'t Table<T, D>, settings: &Settings) -> Result<Self, SettingsError> {
-        Ok(Self {
-            table,
-            runtime: Runtime::new(table, settings)?,
-        })
+        Ok(Self { table, runtime: Runtime::new(table, settings)? })
     }
 
     /// Loop gain g per target sample in use.
@@ -50,11 +47,8 @@ impl<'t, T: Scalar> Controller<'t, T> {
     /// One tick: reads and checks the inputs, decides the mode, and gives the command for the paddle.
     pub fn step(&self, state: &mut State<T>, inputs: &Inputs) -> PaddleCommand {
         let mut faults = Faults::NONE;
-        let fresh_target = if start_tick(state, inputs, &mut faults) {
-            self.read_inputs(state, inputs, &mut faults)
-        } else {
-            None
-        };
+        let fresh_target =
+            if start_tick(state, inputs, &mut faults) { self.read_inputs(state, inputs, &mut faults) } else { None };
         self.check_ages(state, &mut faults);
         let mut mode = state.supervisor.decide(faults);
         if mode == Mode::Run {
@@ -70,12 +64,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
     }
 
     /// Reads all streams. Returns a target sample that may be integrated.
-    fn read_inputs(
-        &self,
-        state: &mut State<T>,
-        inputs: &Inputs,
-        faults: &mut Faults,
-    ) -> Option<TargetSample> {
+    fn read_inputs(&self, state: &mut State<T>, inputs: &Inputs, faults: &mut Faults) -> Option<TargetSample> {
         if let Some(sample) = &inputs.needle {
             self.read_needle(state, inputs.time_ns, sample, faults);
         }
@@ -86,26 +75,12 @@ impl<'t, T: Scalar> Controller<'t, T> {
         target.and_then(|sample| self.read_target(state, inputs.time_ns, sample, faults))
     }
 
-    fn read_needle(
-        &self,
-        state: &mut State<T>,
-        now_ns: u64,
-        sample: &NeedleSample,
-        faults: &mut Faults,
-    ) {
+    fn read_needle(&self, state: &mut State<T>, now_ns: u64, sample: &NeedleSample, faults: &mut Faults) {
         let before = state.needle.accepted;
         let ledger = &mut state.ledger.needle;
-        let accepted = state
-            .needle
-            .offer(*sample, sample.sequence, ledger, faults, |previous| {
-                check_needle(
-                    &self.runtime,
-                    now_ns,
-                    sample,
-                    previous,
-                    &mut state.needle_frozen,
-                )
-            });
+        let accepted = state.needle.offer(*sample, sample.sequence, ledger, faults, |previous| {
+            check_needle(&self.runtime, now_ns, sample, previous, &mut state.needle_frozen)
+        });
         if let (Some(now), Some(before)) = (accepted, before) {
             state.gate.travel.needle += (now.depth - before.depth).abs();
         }
@@ -121,21 +96,10 @@ impl<'t, T: Scalar> Controller<'t, T> {
         let travel = state.gate.needle_travel();
         let ledger = &mut state.ledger.target;
         let mut found = Faults::NONE;
-        let accepted =
-            state
-                .target
-                .offer(*sample, sample.sequence, ledger, &mut found, |previous| {
-                    let frozen = &mut state.target_frozen;
-                    check_target(
-                        &self.runtime,
-                        now_ns,
-                        sample,
-                        previous,
-                        &state.gate,
-                        frozen,
-                        travel,
-                    )
-                });
+        let accepted = state.target.offer(*sample, sample.sequence, ledger, &mut found, |previous| {
+            let frozen = &mut state.target_frozen;
+            check_target(&self.runtime, now_ns, sample, previous, &state.gate, frozen, travel)
+        });
         *faults |= found;
         state.target_lost |= found.contains(Faults::TARGET_LOST);
         if accepted.is_some() {
@@ -145,28 +109,18 @@ impl<'t, T: Scalar> Controller<'t, T> {
         accepted
     }
 
-    fn read_paddle(
-        &self,
-        state: &mut State<T>,
-        now_ns: u64,
-        sample: &PaddleSample,
-        faults: &mut Faults,
-    ) {
+    fn read_paddle(&self, state: &mut State<T>, now_ns: u64, sample: &PaddleSample, faults: &mut Faults) {
         let index = self.table.paddle.index;
         let ledger = &mut state.ledger.paddle;
-        let accepted = state
-            .paddle
-            .offer(*sample, sample.sequence, ledger, faults, |previous| {
-                check_paddle(&self.runtime, now_ns, index, sample, previous)
-            });
+        let accepted = state.paddle.offer(*sample, sample.sequence, ledger, faults, |previous| {
+            check_paddle(&self.runtime, now_ns, index, sample, previous)
+        });
         let Some(sample) = accepted else { return };
         match &state.displacement {
             Some(commanded) => {
                 let age = seconds(now_ns.saturating_sub(sample.time_ns));
                 let (measured, commanded) = (&sample.displacement, &to_frame(commanded));
-                let off = state
-                    .following
-                    .update(&self.runtime, measured, commanded, age);
+                let off = state.following.update(&self.runtime, measured, commanded, age);
                 faults.set_if(Faults::FOLLOWING_ERROR, off);
             }
             // Starting (again) must not move the paddle: the first command is where it is.
@@ -195,35 +149,14 @@ impl<'t, T: Scalar> Controller<'t, T> {
         let needle_time = state.needle.accepted.map(|sample| sample.time_ns);
         let target_time = state.target.accepted.map(|sample| sample.time_ns);
         let paddle_time = state.paddle.accepted.map(|sample| sample.time_ns);
-        check(
-            needle_time,
-            runtime.needle_age,
-            Faults::NEEDLE_STALE,
-            Faults::NEEDLE_DEAD,
-        );
-        check(
-            target_time,
-            runtime.target_age,
-            Faults::TARGET_STALE,
-            Faults::TARGET_DEAD,
-        );
-        check(
-            paddle_time,
-            runtime.paddle_age,
-            Faults::PADDLE_STALE,
-            Faults::PADDLE_DEAD,
-        );
+        check(needle_time, runtime.needle_age, Faults::NEEDLE_STALE, Faults::NEEDLE_DEAD);
+        check(target_time, runtime.target_age, Faults::TARGET_STALE, Faults::TARGET_DEAD);
+        check(paddle_time, runtime.paddle_age, Faults::PADDLE_STALE, Faults::PADDLE_DEAD);
         faults.set_if(Faults::TARGET_LOST, state.target_lost);
         if let Some(needle) = &state.needle.accepted {
             let (start, end) = runtime.table_depth;
-            faults.set_if(
-                Faults::NEEDLE_TOO_FAST,
-                needle.velocity.abs() > runtime.needle_speed,
-            );
-            faults.set_if(
-                Faults::DEPTH_CLAMPED,
-                needle.depth < start || needle.depth > end,
-            );
+            faults.set_if(Faults::NEEDLE_TOO_FAST, needle.velocity.abs() > runtime.needle_speed);
+            faults.set_if(Faults::DEPTH_CLAMPED, needle.depth < start || needle.depth > end);
         }
     }
 
@@ -240,10 +173,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
             return;
         };
         // Where the needle will be when the command acts.
-        let lead_ns = inputs
-            .time_ns
-            .saturating_sub(needle.time_ns)
-            .saturating_add(runtime.actuator_delay_ns);
+        let lead_ns = inputs.time_ns.saturating_sub(needle.time_ns).saturating_add(runtime.actuator_delay_ns);
         let depth = needle.depth + needle.velocity * seconds(lead_ns);
         let Some(location) = self.table.locate(T::of(depth)) else {
             return;
@@ -256,30 +186,19 @@ impl<'t, T: Scalar> Controller<'t, T> {
             let error = n.dot(&from_frame(&sample.displacement));
             let direction = runtime.direction.solve(&location.jacobian(), n);
             let correction = direction * (-runtime.gain * error);
-            let corrected =
-                runtime
-                    .limits
-                    .integrate(&integral, &correction, &feed_forward, &previous);
+            let corrected = runtime.limits.integrate(&integral, &correction, &feed_forward, &previous);
             // A correction that saturation swallows proves nothing about the sign of the plant.
             let taken = (corrected - integral).dot(&correction);
             let acted = taken > correction.norm_squared() * T::of(0.5);
             integral = corrected;
             if acted {
-                let diverges = state
-                    .divergence
-                    .update(runtime, error.to_f64(), needle.velocity);
+                let diverges = state.divergence.update(runtime, error.to_f64(), needle.velocity);
                 faults.set_if(Faults::DIVERGENCE, diverges);
             }
         }
 
-        let limited = runtime
-            .limits
-            .command(&previous, &(feed_forward + integral));
-        if !limited
-            .displacement
-            .iter()
-            .all(|component| component.to_f64().is_finite())
-        {
+        let limited = runtime.limits.command(&previous, &(feed_forward + integral));
+        if !limited.displacement.iter().all(|component| component.to_f64().is_finite()) {
             *faults |= Faults::INTERNAL;
             return;
         }
@@ -300,27 +219,11 @@ impl<'t, T: Scalar> Controller<'t, T> {
             tick: inputs.tick,
             time_ns: inputs.time_ns,
             faults: state.faults.bits(),
-            displacement: state
-                .displacement
-                .as_ref()
-                .map(to_frame)
-                .unwrap_or_default(),
-            needle_sequence: state
-                .needle
-                .accepted
-                .map(|sample| sample.sequence)
-                .unwrap_or_default(),
-            target_sequence: state
-                .target
-                .accepted
-                .map(|sample| sample.sequence)
-                .unwrap_or_default(),
+            displacement: state.displacement.as_ref().map(to_frame).unwrap_or_default(),
+            needle_sequence: state.needle.accepted.map(|sample| sample.sequence).unwrap_or_default(),
+            target_sequence: state.target.accepted.map(|sample| sample.sequence).unwrap_or_default(),
             paddle_index: self.table.paddle.index,
-            flags: if state.displacement.is_some() {
-                COMMAND_VALID
-            } else {
-                0
-            },
+            flags: if state.displacement.is_some() { COMMAND_VALID } else { 0 },
         }
     }
 }

@@ -141,11 +141,7 @@ pub(crate) fn check_target<T: Scalar>(
     };
     gate.check(runtime, &previous.displacement, &sample.displacement)?;
     let (start, end) = runtime.table_depth;
-    frozen.check(
-        sample.displacement == previous.displacement,
-        needle_travel,
-        end - start,
-    )
+    frozen.check(sample.displacement == previous.displacement, needle_travel, end - start)
 }
 
 /// Checks a paddle sample.
@@ -170,14 +166,8 @@ pub(crate) fn check_paddle<T: Scalar>(
 /// Zero or a normal number. Subnormals are no measurement: they come from garbage read as a float, and slow some
 /// processors down by a factor of a hundred.
 fn check_numbers(values: &[f64]) -> Result<(), Discard> {
-    let good = values
-        .iter()
-        .all(|value| *value == 0.0 || value.is_normal());
-    if good {
-        Ok(())
-    } else {
-        Err(Discard::NotFinite)
-    }
+    let good = values.iter().all(|value| *value == 0.0 || value.is_normal());
+    if good { Ok(()) } else { Err(Discard::NotFinite) }
 }
 
 /// Measured after the sample before it and not in the future. One period of tolerance: the sensor may stamp a sample

@@ -46,13 +46,7 @@ pub fn run_tick<T: Scalar, L: SampleSource + CommandSink>(
     time_ns: u64,
     link: &mut L,
 ) -> Result<(Inputs, PaddleCommand), L::Error> {
-    let inputs = Inputs {
-        tick,
-        time_ns,
-        needle: link.needle(),
-        target: link.target(),
-        paddle: link.paddle(),
-    };
+    let inputs = Inputs { tick, time_ns, needle: link.needle(), target: link.target(), paddle: link.paddle() };
     let command = controller.step(state, &inputs);
     link.send(&command)?;
     Ok((inputs, command))
@@ -97,14 +91,10 @@ mod tests {
         let table = table();
         let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
         let (mut state, mut replayed) = (State::<f64>::new(), State::<f64>::new());
-        let mut link = Link {
-            plant: Plant::new(),
-            arrived: Inputs::default(),
-        };
+        let mut link = Link { plant: Plant::new(), arrived: Inputs::default() };
         for tick in 0..3000 {
             link.arrived = link.plant.sense();
-            let (inputs, command) =
-                run_tick(&controller, &mut state, tick, tick * MS, &mut link).unwrap();
+            let (inputs, command) = run_tick(&controller, &mut state, tick, tick * MS, &mut link).unwrap();
             assert_eq!(controller.step(&mut replayed, &inputs), command);
             assert_eq!(replayed, state);
         }

@@ -32,11 +32,7 @@ impl Direction {
             Self::MinimumNorm => {
                 let row = jacobian.tr_mul(orthogonal);
                 let squared = row.norm_squared();
-                if squared > T::zero() {
-                    row / squared
-                } else {
-                    row
-                }
+                if squared > T::zero() { row / squared } else { row }
             }
         }
     }
@@ -44,25 +40,16 @@ impl Direction {
 
 /// Damped least squares (JᵀJ + μ²I)⁻¹Jᵀn with μ² = (‖J‖/κ_d)²·(1 − (κ_d/κ)²) past the condition number κ_d, and
 /// μ = 0 up to it; continuous in κ (after Nakamura & Hanafusa, 1986).
-fn damped_inverse<T: Scalar, const D: usize>(
-    jacobian: &SMatrix<T, D, D>,
-    orthogonal: &SVector<T, D>,
-) -> SVector<T, D> {
+fn damped_inverse<T: Scalar, const D: usize>(jacobian: &SMatrix<T, D, D>, orthogonal: &SVector<T, D>) -> SVector<T, D> {
     let condition = condition_number(jacobian);
     if condition <= DAMPING_CONDITION {
-        return jacobian
-            .try_inverse()
-            .map_or_else(SVector::zeros, |inverse| inverse * orthogonal);
+        return jacobian.try_inverse().map_or_else(SVector::zeros, |inverse| inverse * orthogonal);
     }
     let ratio = DAMPING_CONDITION / condition;
     let scale = jacobian.norm() / T::of(DAMPING_CONDITION);
     let damping = scale * scale * T::of(1.0 - ratio * ratio);
     let normal_matrix = jacobian.tr_mul(jacobian) + SMatrix::identity() * damping;
-    normal_matrix
-        .try_inverse()
-        .map_or_else(SVector::zeros, |inverse| {
-            inverse * jacobian.tr_mul(orthogonal)
-        })
+    normal_matrix.try_inverse().map_or_else(SVector::zeros, |inverse| inverse * jacobian.tr_mul(orthogonal))
 }
 
 #[cfg(test)]
@@ -93,15 +80,8 @@ mod tests {
             let smallest = 10f64.powi(-exponent);
             let n = Vector2::new(0.6, 0.8);
             let direction = Direction::Inverse.solve(&Matrix2::new(1.0, 0.0, 0.0, smallest), &n);
-            assert!(
-                direction.norm() <= DAMPING_CONDITION,
-                "σ = {smallest}: {}",
-                direction.norm()
-            );
+            assert!(direction.norm() <= DAMPING_CONDITION, "σ = {smallest}: {}", direction.norm());
         }
-        assert_eq!(
-            Direction::Inverse.solve(&Matrix2::<f64>::zeros(), &Vector2::x()),
-            Vector2::zeros()
-        );
+        assert_eq!(Direction::Inverse.solve(&Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
     }
 }

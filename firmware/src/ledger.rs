@@ -100,8 +100,7 @@ impl TickLedger {
 
     /// Due ticks without an entry: 0 unless the controller is wrong.
     pub fn unaccounted(&self) -> u64 {
-        self.due
-            .abs_diff(self.run + self.hold + self.safe + self.skipped)
+        self.due.abs_diff(self.run + self.hold + self.safe + self.skipped)
     }
 }
 
@@ -121,9 +120,6 @@ pub struct Ledger {
 impl Ledger {
     /// Everything without an entry: 0 unless the controller is wrong.
     pub fn unaccounted(&self) -> u64 {
-        self.needle.unaccounted()
-            + self.target.unaccounted()
-            + self.paddle.unaccounted()
-            + self.ticks.unaccounted()
+        self.needle.unaccounted() + self.target.unaccounted() + self.paddle.unaccounted() + self.ticks.unaccounted()
     }
 }

@@ -52,27 +52,15 @@ impl<T: Scalar> Limits<T> {
     }
 
     /// The command that goes from `previous` towards `wish` as far as one tick allows; keeps the direction.
-    pub fn command<const D: usize>(
-        &self,
-        previous: &SVector<T, D>,
-        wish: &SVector<T, D>,
-    ) -> Limited<T, D> {
+    pub fn command<const D: usize>(&self, previous: &SVector<T, D>, wish: &SVector<T, D>) -> Limited<T, D> {
         let admissible = self.clamp_position(wish);
         let position_limited = admissible != *wish;
         let step = admissible - previous;
         let short_step = shorten(&step, self.max_step);
         let rate_limited = short_step != step;
         // Without the rate limit, take the position itself: previous + (wish − previous) would round.
-        let displacement = if rate_limited {
-            previous + short_step
-        } else {
-            admissible
-        };
-        Limited {
-            displacement,
-            position_limited,
-            rate_limited,
-        }
+        let displacement = if rate_limited { previous + short_step } else { admissible };
+        Limited { displacement, position_limited, rate_limited }
     }
 
     /// Integral feedback after `correction`, without windup.
@@ -113,11 +101,7 @@ impl<T: Scalar> Limits<T> {
 /// `vector`, or its direction with norm `limit` if it is longer.
 fn shorten<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> SVector<T, D> {
     let norm = vector.norm();
-    if norm <= limit {
-        *vector
-    } else {
-        vector * (limit / norm)
-    }
+    if norm <= limit { *vector } else { vector * (limit / norm) }
 }
 
 #[cfg(test)]
@@ -127,11 +111,7 @@ mod tests {
 
     use super::*;
 
-    const LIMITS: Limits<f64> = Limits {
-        shape: PositionLimit::Norm,
-        max_displacement: 1.0,
-        max_step: 0.1,
-    };
+    const LIMITS: Limits<f64> = Limits { shape: PositionLimit::Norm, max_displacement: 1.0, max_step: 0.1 };
 
     #[test]
     fn direction_is_kept() {
@@ -142,10 +122,7 @@ mod tests {
 
     #[test]
     fn a_box_limits_each_axis() {
-        let limits = Limits {
-            shape: PositionLimit::Box,
-            ..LIMITS
-        };
+        let limits = Limits { shape: PositionLimit::Box, ..LIMITS };
         let clamped = limits.clamp_position(&Vector2::new(9.0, -0.1));
         assert!((clamped - Vector2::new(0.5f64.sqrt(), -0.1)).norm() < 1e-15);
     }
@@ -162,10 +139,7 @@ mod tests {
         }
         assert!((previous.x - 1.0).abs() < 1e-12);
         let back = LIMITS.integrate(&integral, &-push, &zero, &previous);
-        assert!(
-            (back.x - 0.7).abs() < 1e-12,
-            "the first correction back acts in full"
-        );
+        assert!((back.x - 0.7).abs() < 1e-12, "the first correction back acts in full");
     }
 
     proptest! {

@@ -19,12 +19,7 @@ pub(crate) struct FrozenMonitor {
 
 impl FrozenMonitor {
     /// Enters whether the value is bit-identical and how far the needle went since the sample before it, length.
-    pub(crate) fn check(
-        &mut self,
-        identical: bool,
-        travel: f64,
-        depth_range: f64,
-    ) -> Result<(), Discard> {
+    pub(crate) fn check(&mut self, identical: bool, travel: f64, depth_range: f64) -> Result<(), Discard> {
         if !identical {
             *self = Self::default();
             return Ok(());
@@ -91,11 +86,7 @@ impl InnovationGate {
         let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;
         let gate = noise + GATE_MOTION * motion + GATE_FLOOR * runtime.target_range;
         let (dx, dy) = (current[0] - previous[0], current[1] - previous[1]);
-        if dx * dx + dy * dy > gate * gate {
-            Err(Discard::Innovation)
-        } else {
-            Ok(())
-        }
+        if dx * dx + dy * dy > gate * gate { Err(Discard::Innovation) } else { Ok(()) }
     }
 }
 
@@ -118,18 +109,11 @@ impl FollowingMonitor {
         age: f64,
     ) -> bool {
         // What the command may have moved since the measured position was asked for.
-        let delay = runtime
-            .actuator_delay_ns
-            .saturating_add(runtime.loop_period_ns) as f64
-            * 1e-9;
+        let delay = runtime.actuator_delay_ns.saturating_add(runtime.loop_period_ns) as f64 * 1e-9;
         let admitted = runtime.following_error + runtime.paddle_rate * (age + delay);
         let (dx, dy) = (measured[0] - commanded[0], measured[1] - commanded[1]);
         let off = dx * dx + dy * dy > admitted * admitted;
-        self.successive = if off {
-            self.successive.saturating_add(1)
-        } else {
-            0
-        };
+        self.successive = if off { self.successive.saturating_add(1) } else { 0 };
         self.successive >= FOLLOWING_SAMPLES
     }
 }
@@ -160,12 +144,7 @@ pub(crate) struct DivergenceMonitor {
 
 impl DivergenceMonitor {
     /// Enters a sample whose correction acts; returns whether the loop diverges.
-    pub(crate) fn update<T: Scalar>(
-        &mut self,
-        runtime: &Runtime<T>,
-        error: f64,
-        needle_speed: f64,
-    ) -> bool {
+    pub(crate) fn update<T: Scalar>(&mut self, runtime: &Runtime<T>, error: f64, needle_speed: f64) -> bool {
         let gain = runtime.gain.to_f64();
         self.peak_speed = self.peak_speed.max(needle_speed.abs());
         let lag_time = (f64::from(runtime.delay_samples) + 1.0 / gain) * runtime.target_period;
@@ -173,20 +152,11 @@ impl DivergenceMonitor {
             .max(DIVERGENCE_SIGMAS * runtime.target_noise)
             .max(DIVERGENCE_FLOOR * runtime.target_range);
         let magnitude = error.abs();
-        if self.samples == 0
-            || f64::from(self.samples) * gain > DIVERGENCE_WINDOW
-            || magnitude < self.start_error
-        {
-            *self = Self {
-                samples: 0,
-                start_error: magnitude,
-                predicted: 0.0,
-                ..*self
-            };
+        if self.samples == 0 || f64::from(self.samples) * gain > DIVERGENCE_WINDOW || magnitude < self.start_error {
+            *self = Self { samples: 0, start_error: magnitude, predicted: 0.0, ..*self };
         }
         self.samples += 1;
-        let diverges =
-            magnitude > DIVERGENCE_GROWTH * floor.max(self.start_error) && self.predicted >= floor;
+        let diverges = magnitude > DIVERGENCE_GROWTH * floor.max(self.start_error) && self.predicted >= floor;
         self.predicted += gain * magnitude;
         diverges
     }

@@ -66,49 +66,22 @@ pub(crate) struct Runtime<T: Scalar> {
 
 impl<T: Scalar> Runtime<T> {
     /// Validates `settings` and combines them with a valid `table`.
-    pub(crate) fn new<const D: usize>(
-        table: &Table<T, D>,
-        settings: &Settings,
-    ) -> Result<Self, SettingsError> {
+    pub(crate) fn new<const D: usize>(table: &Table<T, D>, settings: &Settings) -> Result<Self, SettingsError> {
         check_periods(settings)?;
         let delay_samples = settings.delay_samples();
         if delay_samples > stability::MAX_DELAY_SAMPLES {
-            return Err(SettingsError::Delay {
-                samples: delay_samples,
-            });
+            return Err(SettingsError::Delay { samples: delay_samples });
         }
-        let lambda_max = settings
-            .lambda_max
-            .unwrap_or(table.gains.lambda_max.to_f64());
-        check(
-            "lambda_max",
-            "from 1 to 100",
-            (1.0..=100.0).contains(&lambda_max),
-        )?;
+        let lambda_max = settings.lambda_max.unwrap_or(table.gains.lambda_max.to_f64());
+        check("lambda_max", "from 1 to 100", (1.0..=100.0).contains(&lambda_max))?;
         // Not limited to the stable range: stability is charted on both sides of its limit.
-        let gain = settings
-            .loop_gain
-            .unwrap_or(stability::default_gain(delay_samples, lambda_max));
-        check(
-            "loop gain",
-            "above 0 and at most 2",
-            gain > 0.0 && gain <= 2.0,
-        )?;
+        let gain = settings.loop_gain.unwrap_or(stability::default_gain(delay_samples, lambda_max));
+        check("loop gain", "above 0 and at most 2", gain > 0.0 && gain <= 2.0)?;
         let noise = settings.target_noise;
-        check(
-            "target noise",
-            "finite and not negative",
-            noise.is_finite() && noise >= 0.0,
-        )?;
+        check("target noise", "finite and not negative", noise.is_finite() && noise >= 0.0)?;
         let max_displacement = table.paddle.max_displacement.to_f64();
-        let following_error = settings
-            .following_error
-            .unwrap_or(FOLLOWING_FRACTION * max_displacement);
-        check(
-            "following error",
-            "finite and positive",
-            following_error.is_finite() && following_error > 0.0,
-        )?;
+        let following_error = settings.following_error.unwrap_or(FOLLOWING_FRACTION * max_displacement);
+        check("following error", "finite and positive", following_error.is_finite() && following_error > 0.0)?;
 
         let loop_period = settings.loop_period_ns as f64 * 1e-9;
         let loop_age = AgeLimits {
@@ -116,16 +89,11 @@ impl<T: Scalar> Runtime<T> {
             safe_ns: SAFE_AGE_FLOOR_NS.max(10 * TICKS_TO_HOLD * settings.loop_period_ns),
         };
         let target_age = AgeLimits {
-            hold_ns: settings.target_latency_ns
-                + TARGET_SAMPLES_TO_HOLD * settings.target_period_ns,
-            safe_ns: SAFE_AGE_FLOOR_NS.max(
-                settings.target_latency_ns + TARGET_SAMPLES_TO_SAFE * settings.target_period_ns,
-            ),
+            hold_ns: settings.target_latency_ns + TARGET_SAMPLES_TO_HOLD * settings.target_period_ns,
+            safe_ns: SAFE_AGE_FLOOR_NS
+                .max(settings.target_latency_ns + TARGET_SAMPLES_TO_SAFE * settings.target_period_ns),
         };
-        let (start, end) = (
-            table.validity.depth_start.to_f64(),
-            table.validity.depth_end.to_f64(),
-        );
+        let (start, end) = (table.validity.depth_start.to_f64(), table.validity.depth_end.to_f64());
         let margin = DEPTH_MARGIN * (end - start);
         let bounds = TableBounds::of(table);
         Ok(Self {
@@ -147,8 +115,7 @@ impl<T: Scalar> Runtime<T> {
             table_depth: (start, end),
             plausible_depth: (start - margin, end + margin),
             needle_speed: table.validity.needle_speed.to_f64(),
-            target_range: TARGET_MARGIN * bounds.target_displacement
-                + bounds.jacobian_norm * max_displacement,
+            target_range: TARGET_MARGIN * bounds.target_displacement + bounds.jacobian_norm * max_displacement,
             paddle_range: PADDLE_MARGIN * max_displacement,
             target_slope: bounds.target_slope,
             jacobian_norm: bounds.jacobian_norm,
@@ -167,16 +134,9 @@ struct TableBounds {
 
 impl TableBounds {
     fn of<T: Scalar, const D: usize>(table: &Table<T, D>) -> Self {
-        let mut bounds = Self {
-            target_displacement: 0.0,
-            target_slope: 0.0,
-            jacobian_norm: 0.0,
-        };
+        let mut bounds = Self { target_displacement: 0.0, target_slope: 0.0, jacobian_norm: 0.0 };
         for knot in &table.knots {
-            let moved = knot
-                .target_displacement
-                .norm()
-                .max(knot.static_target_displacement.norm());
+            let moved = knot.target_displacement.norm().max(knot.static_target_displacement.norm());
             bounds.target_displacement = bounds.target_displacement.max(moved.to_f64());
             let slope = knot.target_displacement_slope.norm().to_f64();
             bounds.target_slope = bounds.target_slope.max(slope);
@@ -212,44 +172,12 @@ mod tests {
         let refuse = |settings| Runtime::new(&table(), &settings).unwrap_err();
         let good = Settings::new(MS, 20 * MS, 20 * MS);
         Runtime::new(&table(), &good).unwrap();
-        assert_eq!(
-            refuse(Settings {
-                loop_period_ns: 0,
-                ..good
-            }),
-            SettingsError::Period {
-                field: "loop period"
-            }
-        );
-        assert_eq!(
-            refuse(Settings {
-                target_period_ns: 1,
-                ..good
-            }),
-            SettingsError::TargetFasterThanLoop
-        );
-        assert!(matches!(
-            refuse(Settings {
-                target_latency_ns: 2_000 * MS,
-                ..good
-            }),
-            SettingsError::Delay { .. }
-        ));
+        assert_eq!(refuse(Settings { loop_period_ns: 0, ..good }), SettingsError::Period { field: "loop period" });
+        assert_eq!(refuse(Settings { target_period_ns: 1, ..good }), SettingsError::TargetFasterThanLoop);
+        assert!(matches!(refuse(Settings { target_latency_ns: 2_000 * MS, ..good }), SettingsError::Delay { .. }));
         for gain in [f64::NAN, 0.0, -1.0, 3.0] {
-            assert!(matches!(
-                refuse(Settings {
-                    loop_gain: Some(gain),
-                    ..good
-                }),
-                SettingsError::Range { .. }
-            ));
+            assert!(matches!(refuse(Settings { loop_gain: Some(gain), ..good }), SettingsError::Range { .. }));
         }
-        assert!(matches!(
-            refuse(Settings {
-                target_noise: f64::INFINITY,
-                ..good
-            }),
-            SettingsError::Range { .. }
-        ));
+        assert!(matches!(refuse(Settings { target_noise: f64::INFINITY, ..good }), SettingsError::Range { .. }));
     }
 }

@@ -38,9 +38,7 @@ impl ScalarKind {
 ///
 /// The control law uses only `+ − × ÷ √` and comparisons. IEEE 754 rounds all of these correctly, so the same
 /// inputs give the same bits on every target.
-pub trait Scalar:
-    RealField + Copy + Debug + Display + Default + Serialize + DeserializeOwned
-{
+pub trait Scalar: RealField + Copy + Debug + Display + Default + Serialize + DeserializeOwned {
     /// Kind written into the table header.
     const KIND: ScalarKind;
     /// How far the norm of a unit vector may be from 1: a few rounding errors of this type.

@@ -22,11 +22,7 @@ pub struct DurationStatistics {
 impl DurationStatistics {
     /// Adds a value.
     pub fn record(&mut self, duration_ns: u64) {
-        self.min_ns = if self.count == 0 {
-            duration_ns
-        } else {
-            self.min_ns.min(duration_ns)
-        };
+        self.min_ns = if self.count == 0 { duration_ns } else { self.min_ns.min(duration_ns) };
         self.max_ns = self.max_ns.max(duration_ns);
         self.sum_ns = self.sum_ns.saturating_add(duration_ns);
         self.count += 1;
@@ -119,18 +115,13 @@ impl Schedule {
         self.started_ns = now_ns;
         let release_lateness_ns = now_ns.saturating_sub(self.next_release_ns);
         self.release_lateness.record(release_lateness_ns);
-        Release {
-            tick: self.tick,
-            release_ns: self.next_release_ns,
-            release_lateness_ns,
-        }
+        Release { tick: self.tick, release_ns: self.next_release_ns, release_lateness_ns }
     }
 
     /// The step has ended at `now_ns`; returns how many periods are skipped before the next release.
     pub fn finish(&mut self, now_ns: u64) -> u64 {
         let response_ns = now_ns.saturating_sub(self.next_release_ns);
-        self.execution_time
-            .record(now_ns.saturating_sub(self.started_ns));
+        self.execution_time.record(now_ns.saturating_sub(self.started_ns));
         self.response_time.record(response_ns);
         self.deadline_misses += u64::from(response_ns > self.period_ns.get());
         self.advance(1);
@@ -150,9 +141,7 @@ impl Schedule {
 
     fn advance(&mut self, periods: u64) {
         self.tick = self.tick.saturating_add(periods);
-        self.next_release_ns = self
-            .next_release_ns
-            .saturating_add(periods.saturating_mul(self.period_ns.get()));
+        self.next_release_ns = self.next_release_ns.saturating_add(periods.saturating_mul(self.period_ns.get()));
     }
 }
 
@@ -175,11 +164,7 @@ mod tests {
             let mut schedule = Schedule::new(5, PERIOD);
             assert_eq!(tick(&mut schedule, 1000), 0);
             assert_eq!(tick(&mut schedule, PERIOD + over), skipped);
-            assert_eq!(
-                schedule.next_release_ns(),
-                5 + (2 + skipped) * PERIOD,
-                "no burst"
-            );
+            assert_eq!(schedule.next_release_ns(), 5 + (2 + skipped) * PERIOD, "no burst");
             assert_eq!(schedule.begin(schedule.next_release_ns()).tick, 2 + skipped);
             assert_eq!((schedule.overruns(), schedule.deadline_misses()), (1, 1));
         }

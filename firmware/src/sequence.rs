@@ -35,10 +35,7 @@ impl SequenceTracker {
     /// Classifies a delivery and enters everything but its fate if it is new into the ledger.
     pub(crate) fn register(&mut self, sequence: u32, ledger: &mut StreamLedger) -> Arrival {
         let Some(newest) = self.newest else {
-            *self = Self {
-                newest: Some(sequence),
-                arrived: 1,
-            };
+            *self = Self { newest: Some(sequence), arrived: 1 };
             ledger.published += 1;
             return Arrival::New;
         };
@@ -88,10 +85,7 @@ mod tests {
     fn gaps_are_counted_exactly() {
         for gap in [1, 10, 1000] {
             let ledger = deliver(&[5, 6, 7 + gap, 8 + gap]);
-            assert_eq!(
-                (ledger.missed, ledger.published),
-                (u64::from(gap), 4 + u64::from(gap))
-            );
+            assert_eq!((ledger.missed, ledger.published), (u64::from(gap), 4 + u64::from(gap)));
         }
     }
 

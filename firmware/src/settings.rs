@@ -53,10 +53,7 @@ impl Settings {
     /// A correction for a measurement at t acts from t + latency + one tick + actuator delay on; all samples measured
     /// up to then, ⌊that / target period⌋ of them, do not show it.
     pub const fn delay_samples(&self) -> u32 {
-        let late_ns = self
-            .target_latency_ns
-            .saturating_add(self.loop_period_ns)
-            .saturating_add(self.actuator_delay_ns);
+        let late_ns = self.target_latency_ns.saturating_add(self.loop_period_ns).saturating_add(self.actuator_delay_ns);
         match late_ns.checked_div(self.target_period_ns) {
             Some(samples) if samples < u32::MAX as u64 => samples as u32,
             _ => u32::MAX,
@@ -93,10 +90,7 @@ impl fmt::Display for SettingsError {
         match *self {
             Self::Period { field } => write!(f, "{field} must be above 0 and at most 10 s"),
             Self::TargetFasterThanLoop => {
-                write!(
-                    f,
-                    "the target sensor is faster than the loop: raise the loop rate"
-                )
+                write!(f, "the target sensor is faster than the loop: raise the loop rate")
             }
             Self::Delay { samples } => write!(
                 f,
@@ -116,21 +110,13 @@ pub const LONGEST_PERIOD_NS: u64 = 10_000_000_000;
 pub(crate) fn check_periods(settings: &Settings) -> Result<(), SettingsError> {
     let admitted = 1..=LONGEST_PERIOD_NS;
     if !admitted.contains(&settings.loop_period_ns) {
-        return Err(SettingsError::Period {
-            field: "loop period",
-        });
+        return Err(SettingsError::Period { field: "loop period" });
     }
     if !admitted.contains(&settings.target_period_ns) {
-        return Err(SettingsError::Period {
-            field: "target period",
-        });
+        return Err(SettingsError::Period { field: "target period" });
     }
-    if settings.target_latency_ns > LONGEST_PERIOD_NS
-        || settings.actuator_delay_ns > LONGEST_PERIOD_NS
-    {
-        return Err(SettingsError::Period {
-            field: "latency and actuator delay",
-        });
+    if settings.target_latency_ns > LONGEST_PERIOD_NS || settings.actuator_delay_ns > LONGEST_PERIOD_NS {
+        return Err(SettingsError::Period { field: "latency and actuator delay" });
     }
     if settings.target_period_ns < settings.loop_period_ns {
         return Err(SettingsError::TargetFasterThanLoop);
@@ -138,14 +124,6 @@ pub(crate) fn check_periods(settings: &Settings) -> Result<(), SettingsError> {
     Ok(())
 }
 
-pub(crate) fn check(
-    field: &'static str,
-    admitted: &'static str,
-    holds: bool,
-) -> Result<(), SettingsError> {
-    if holds {
-        Ok(())
-    } else {
-        Err(SettingsError::Range { field, admitted })
-    }
+pub(crate) fn check(field: &'static str, admitted: &'static str, holds: bool) -> Result<(), SettingsError> {
+    if holds { Ok(()) } else { Err(SettingsError::Range { field, admitted }) }
 }

@@ -9,11 +9,7 @@ use core::f64::consts::FRAC_PI_2;
 /// Limit of g·|λ| for an eigenvalue with angle `argument` (rad) and a delay of `delay_samples`; 0 at and past 90°.
 pub fn gain_limit(argument: f64, delay_samples: u32) -> f64 {
     let margin = FRAC_PI_2 - argument.abs();
-    if margin > 0.0 {
-        2.0 * libm::sin(margin / f64::from(2 * delay_samples.min(MAX_DELAY_SAMPLES) + 1))
-    } else {
-        0.0
-    }
+    if margin > 0.0 { 2.0 * libm::sin(margin / f64::from(2 * delay_samples.min(MAX_DELAY_SAMPLES) + 1)) } else { 0.0 }
 }
 
 /// Longest delay that the analysis is asked for, target samples. A loop older than this is not worth closing:
@@ -24,11 +20,7 @@ pub const MAX_DELAY_SAMPLES: u32 = 64;
 /// fastest without overshoot. The characteristic equation zᵈ⁺¹ − zᵈ + gλ = 0 has its double root at z = d/(d+1).
 pub fn critically_damped_gain(delay_samples: u32) -> f64 {
     let d = f64::from(delay_samples.min(MAX_DELAY_SAMPLES));
-    if d == 0.0 {
-        1.0
-    } else {
-        libm::pow(d / (d + 1.0), d) / (d + 1.0)
-    }
+    if d == 0.0 { 1.0 } else { libm::pow(d / (d + 1.0), d) / (d + 1.0) }
 }
 
 /// Default gain: the smaller of critical damping and half the stability limit, over the largest |λ| that model
@@ -53,10 +45,7 @@ mod tests {
         for (degrees, limits) in rows {
             for (delay, limit) in delays.into_iter().zip(limits) {
                 let computed = gain_limit(degrees.to_radians(), delay);
-                assert!(
-                    (computed - limit).abs() < 5.1e-4,
-                    "{degrees}° d={delay}: {computed}"
-                );
+                assert!((computed - limit).abs() < 5.1e-4, "{degrees}° d={delay}: {computed}");
             }
         }
         assert_eq!(gain_limit(FRAC_PI_2, 0), 0.0);
@@ -89,14 +78,8 @@ mod tests {
     fn simulation_agrees_on_both_sides_of_the_limit() {
         for delay in [0usize, 1, 2, 3, 5, 10] {
             let limit = gain_limit(0.0, delay as u32);
-            assert!(
-                residual(0.98 * limit, delay) < 1e-3,
-                "delay {delay} should settle"
-            );
-            assert!(
-                residual(1.02 * limit, delay) > 1e3,
-                "delay {delay} should diverge"
-            );
+            assert!(residual(0.98 * limit, delay) < 1e-3, "delay {delay} should settle");
+            assert!(residual(1.02 * limit, delay) > 1e3, "delay {delay} should diverge");
         }
     }
 }

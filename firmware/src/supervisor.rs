@@ -167,11 +167,7 @@ impl fmt::Display for Faults {
                 separator = " | ";
             }
         }
-        if separator.is_empty() {
-            f.write_str("NONE")
-        } else {
-            Ok(())
-        }
+        if separator.is_empty() { f.write_str("NONE") } else { Ok(()) }
     }
 }
 
@@ -219,10 +215,7 @@ mod tests {
             assert!(all.intersection(*code).is_empty());
             all |= *code;
         }
-        assert_eq!(
-            (Faults::TARGET_LOST | Faults::OVERRUN).to_string(),
-            "TARGET_LOST | OVERRUN"
-        );
+        assert_eq!((Faults::TARGET_LOST | Faults::OVERRUN).to_string(), "TARGET_LOST | OVERRUN");
         assert_eq!(Faults::NONE.to_string(), "NONE");
     }
 

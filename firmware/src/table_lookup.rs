@@ -26,23 +26,11 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     pub fn locate(&self, depth: T) -> Option<Location<'_, T, D>> {
         let (first, last) = (self.knots.first()?, self.knots.last()?);
         let inside = bounded(depth, first.depth, last.depth);
-        let right_index = self
-            .knots
-            .partition_point(|knot| knot.depth <= inside)
-            .min(self.knots.len().saturating_sub(1))
-            .max(1);
-        let (left, right) = (
-            self.knots.get(right_index - 1)?,
-            self.knots.get(right_index)?,
-        );
+        let right_index =
+            self.knots.partition_point(|knot| knot.depth <= inside).min(self.knots.len().saturating_sub(1)).max(1);
+        let (left, right) = (self.knots.get(right_index - 1)?, self.knots.get(right_index)?);
         let interval = right.depth - left.depth;
-        Some(Location {
-            left,
-            right,
-            interval,
-            fraction: (inside - left.depth) / interval,
-            clamped: inside != depth,
-        })
+        Some(Location { left, right, interval, fraction: (inside - left.depth) / interval, clamped: inside != depth })
     }
 }
 
@@ -58,22 +46,14 @@ impl<T: Scalar, const D: usize> Location<'_, T, D> {
     /// Target displacement along the feed-forward path, length.
     pub fn target_displacement(&self) -> SVector<T, D> {
         self.hermite(
-            (
-                &self.left.target_displacement,
-                &self.left.target_displacement_slope,
-            ),
-            (
-                &self.right.target_displacement,
-                &self.right.target_displacement_slope,
-            ),
+            (&self.left.target_displacement, &self.left.target_displacement_slope),
+            (&self.right.target_displacement, &self.right.target_displacement_slope),
         )
     }
 
     /// Target displacement with the paddle held at zero, length.
     pub fn static_target_displacement(&self) -> SVector<T, D> {
-        self.left
-            .static_target_displacement
-            .lerp(&self.right.static_target_displacement, self.fraction)
+        self.left.static_target_displacement.lerp(&self.right.static_target_displacement, self.fraction)
     }
 
     /// Actuation Jacobian; rows target, columns paddle.

@@ -4,8 +4,7 @@ use nalgebra::{Matrix2, Vector2};
 
 use crate::contract::frames::TARGET_VISIBLE;
 use crate::contract::{
-    Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample, Units,
-    Validity,
+    Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample, Units, Validity,
 };
 use crate::inputs::Inputs;
 
@@ -36,10 +35,7 @@ pub(crate) fn table() -> Table<f64, 2> {
         .collect();
     Table {
         scene_hash: [7; 32],
-        units: Units {
-            length: "1".try_into().unwrap(),
-            stress: "1".try_into().unwrap(),
-        },
+        units: Units { length: "1".try_into().unwrap(), stress: "1".try_into().unwrap() },
         tissue: "homogeneous".try_into().unwrap(),
         paddle: Paddle {
             index: 3,
@@ -50,17 +46,8 @@ pub(crate) fn table() -> Table<f64, 2> {
         needle_axis: Vector2::new(0.0, -1.0),
         orthogonal: n,
         target_position: Vector2::new(0.5, 0.5),
-        validity: Validity {
-            depth_start: 0.0,
-            depth_end: 0.1,
-            paddle_displacement: 0.05,
-            needle_speed: 0.1,
-        },
-        gains: Gains {
-            loop_gain: 0.25,
-            delay_samples: 1,
-            lambda_max: 1.0,
-        },
+        validity: Validity { depth_start: 0.0, depth_end: 0.1, paddle_displacement: 0.05, needle_speed: 0.1 },
+        gains: Gains { loop_gain: 0.25, delay_samples: 1, lambda_max: 1.0 },
         knots,
     }
 }
@@ -110,8 +97,7 @@ impl Plant {
     }
 
     pub(crate) fn target(&self) -> Vector2<f64> {
-        self.jacobian * self.paddle
-            + Vector2::new(self.push * self.depth + self.offset, -0.1 * self.depth)
+        self.jacobian * self.paddle + Vector2::new(self.push * self.depth + self.offset, -0.1 * self.depth)
     }
 
     /// Inputs of the next tick.
@@ -126,10 +112,7 @@ impl Plant {
             });
             self.target_sequence = self.target_sequence.wrapping_add(1);
         }
-        let arrived = self
-            .pending
-            .front()
-            .is_some_and(|sample| sample.time_ns + 20 * MS <= time_ns);
+        let arrived = self.pending.front().is_some_and(|sample| sample.time_ns + 20 * MS <= time_ns);
         let inputs = Inputs {
             tick: self.tick,
             time_ns,
@@ -140,11 +123,7 @@ impl Plant {
                 depth: self.depth,
                 velocity: self.speed,
             }),
-            target: if arrived {
-                self.pending.pop_front()
-            } else {
-                None
-            },
+            target: if arrived { self.pending.pop_front() } else { None },
             paddle: Some(PaddleSample {
                 sequence: self.sequence,
                 paddle_index: self.paddle_index,

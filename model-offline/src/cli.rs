@@ -23,9 +23,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Full placement study: every paddle, as a fixture and as an actuator.
-    #[command(
-        after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json"
-    )]
+    #[command(after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json")]
     Place {
         /// Scene file, or the name of a bundled scene (paper, paper-hull).
         scene: PathBuf,
@@ -55,13 +53,7 @@ enum Command {
         #[arg(long)]
         depth: f64,
         /// Paddle displacement, length units.
-        #[arg(
-            long,
-            value_name = "X,Y",
-            value_delimiter = ',',
-            num_args = 1,
-            allow_hyphen_values = true
-        )]
+        #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
         paddle_displacement: Option<Vec<f64>>,
         /// Leave the inclusions out: homogeneous tissue.
         #[arg(long)]
@@ -194,9 +186,7 @@ impl CliError {
 
     fn reason(&self) -> String {
         match self {
-            Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => {
-                failure.reason.to_string()
-            }
+            Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => failure.reason.to_string(),
             Self::Model(ModelError::Uncontrollable { .. }) => "singular-jacobian".into(),
             Self::Model(ModelError::Shape(_)) => "singular-moment-matrix".into(),
             _ => "failed".into(),
@@ -226,26 +216,16 @@ impl Common {
     }
 
     fn threads(&self) -> usize {
-        self.threads
-            .unwrap_or_else(|| {
-                std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-            })
-            .max(1)
+        self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).max(1)
     }
 
     fn progress(&self, steps: u64) -> indicatif::ProgressBar {
         if self.quiet || !std::io::stderr().is_terminal() {
             return indicatif::ProgressBar::hidden();
         }
-        let style = indicatif::ProgressStyle::with_template(
-            "{wide_bar} {pos}/{len} increments, {eta} left",
-        );
+        let style = indicatif::ProgressStyle::with_template("{wide_bar} {pos}/{len} increments, {eta} left");
         let bar = indicatif::ProgressBar::new(steps);
-        if let Ok(style) = style {
-            bar.with_style(style)
-        } else {
-            bar
-        }
+        if let Ok(style) = style { bar.with_style(style) } else { bar }
     }
 }
 
@@ -255,13 +235,7 @@ impl Common {
 /// [`CliError`], whose [`exit_code`](CliError::exit_code) is the process's.
 pub fn run(cli: Cli) -> Result<(), CliError> {
     match cli.command {
-        Command::Place {
-            scene,
-            without_inclusion,
-            json,
-            table,
-            common,
-        } => {
+        Command::Place { scene, without_inclusion, json, table, common } => {
             let scene = common.scene(&scene, without_inclusion)?;
             let outcome = place(&scene, &common, table.as_deref());
             match outcome {
@@ -277,17 +251,7 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
                 Err(error) => Err(report_failure(error, json.as_deref(), &scene)),
             }
         }
-        Command::Solve {
-            scene,
-            paddle,
-            depth,
-            paddle_displacement,
-            without_inclusion,
-            json,
-            vtu,
-            svg,
-            common,
-        } => {
+        Command::Solve { scene, paddle, depth, paddle_displacement, without_inclusion, json, vtu, svg, common } => {
             let scene = common.scene(&scene, without_inclusion)?;
             let displacement = match paddle_displacement.as_deref() {
                 None => Vector2::zeros(),
@@ -300,33 +264,16 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
                 }
             };
             if !depth.is_finite() || depth < 0.0 {
-                return Err(CliError::Usage(
-                    format!("--depth is {depth}"),
-                    "give a depth of 0 or more".into(),
-                ));
+                return Err(CliError::Usage(format!("--depth is {depth}"), "give a depth of 0 or more".into()));
             }
-            let files = SolveFiles {
-                json: json.as_deref(),
-                vtu: vtu.as_deref(),
-                svg: svg.as_deref(),
-            };
+            let files = SolveFiles { json: json.as_deref(), vtu: vtu.as_deref(), svg: svg.as_deref() };
             solve(&scene, paddle, depth, displacement, &files, common.quiet)
                 .map_err(|error| report_failure(error, json.as_deref(), &scene))
         }
-        Command::Table {
-            scene,
-            paddle,
-            output,
-            knots,
-            without_inclusion,
-            common,
-        } => {
+        Command::Table { scene, paddle, output, knots, without_inclusion, common } => {
             let scene = common.scene(&scene, without_inclusion)?;
             let model = TissueModel::new(&scene)?;
-            let options = TableOptions {
-                knots,
-                ..TableOptions::default()
-            };
+            let options = TableOptions { knots, ..TableOptions::default() };
             let paddle = match paddle {
                 Some(index) => index,
                 None => study::best_dynamic(&model, common.threads())?,
@@ -335,28 +282,16 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             let bytes = table::to_bytes(&table)?;
             output::write_whole(&output, &bytes)?;
             if !common.quiet {
-                println!(
-                    "{}: {} bytes\n{}",
-                    output.display(),
-                    bytes.len(),
-                    crate::output::table_text::summary(&table)
-                );
+                println!("{}: {} bytes\n{}", output.display(), bytes.len(), crate::output::table_text::summary(&table));
             }
             Ok(())
         }
         Command::Inspect { table, json } => {
-            let bad = |reason: String| CliError::BadTable {
-                path: table.clone(),
-                reason,
-            };
+            let bad = |reason: String| CliError::BadTable { path: table.clone(), reason };
             let bytes = std::fs::read(&table).map_err(|e| bad(e.to_string()))?;
-            let contents =
-                crate::output::table_text::read(&bytes).map_err(|e| bad(e.to_string()))?;
+            let contents = crate::output::table_text::read(&bytes).map_err(|e| bad(e.to_string()))?;
             if let Some(path) = json {
-                output::write_whole(
-                    &path,
-                    pretty(&crate::output::table_text::json(&contents)).as_bytes(),
-                )?;
+                output::write_whole(&path, pretty(&crate::output::table_text::json(&contents)).as_bytes())?;
             }
             println!("{}: {} bytes, checked", table.display(), bytes.len());
             println!("{}", crate::output::table_text::summary(&contents));
@@ -390,17 +325,11 @@ fn report_failure(error: CliError, json: Option<&Path>, scene: &Scene) -> CliErr
     error
 }
 
-fn place(
-    scene: &Scene,
-    common: &Common,
-    table: Option<&Path>,
-) -> Result<(serde_json::Value, String), CliError> {
+fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_json::Value, String), CliError> {
     let start = Instant::now();
     let model = TissueModel::new(scene)?;
     let bar = common.progress(study::progress_steps(&model));
-    let placement = study::place(&model, NewtonSettings::default(), common.threads(), &|| {
-        bar.inc(1)
-    })?;
+    let placement = study::place(&model, NewtonSettings::default(), common.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     if let Some(path) = table {
         let built = table::build(&model, placement.optimum.dynamic, &TableOptions::default())?;
@@ -431,9 +360,11 @@ fn summary(scene: &Scene, model: &TissueModel, placement: &Placement, wall_s: f6
     );
     for p in &placement.paddles {
         let mark = |best: u32| if p.index == best { "*" } else { " " };
-        let stopped = p.fixture.failure.as_ref().map_or(String::new(), |f| {
-            format!("  stopped at depth {:.4}: {}", f.depth, f.reason)
-        });
+        let stopped = p
+            .fixture
+            .failure
+            .as_ref()
+            .map_or(String::new(), |f| format!("  stopped at depth {:.4}: {}", f.depth, f.reason));
         let _ = writeln!(
             out,
             "{:>7}  {:8.4}{} ({:8.4}, {:8.4})  {:12.6}{}{stopped}",
@@ -471,38 +402,21 @@ fn solve(
     let model = TissueModel::new(scene)?;
     let position = model.paddle_position(paddle).ok_or_else(|| {
         let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
-        CliError::Usage(
-            format!("the scene has no paddle {paddle}"),
-            format!("choose one of {}", known.join(", ")),
-        )
+        CliError::Usage(format!("the scene has no paddle {paddle}"), format!("choose one of {}", known.join(", ")))
     })?;
-    let mut body = model
-        .body(Some(position), NewtonSettings::default())
-        .map_err(ModelError::from)?;
+    let mut body = model.body(Some(position), NewtonSettings::default()).map_err(ModelError::from)?;
     // In pieces of the scene's increment: the path matters near the limits of stability.
-    let pieces = (depth / scene.needle.depth * f64::from(scene.needle.increments))
-        .ceil()
-        .max(1.0);
+    let pieces = (depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0);
     for piece in 1..=pieces as u32 {
         let share = f64::from(piece) / pieces;
         if let Err(failure) = body.drive(depth * share, displacement * share) {
-            return Err(CliError::Solve {
-                failure,
-                depth: body.depth(),
-            });
+            return Err(CliError::Solve { failure, depth: body.depth() });
         }
     }
     let target = body.target_displacement();
     let orthogonal = target.dot(&scene.needle.orthogonal());
-    let jacobian = body
-        .actuation_jacobian()
-        .map_err(|failure| CliError::Solve {
-            failure,
-            depth: body.depth(),
-        })?;
-    let nodal = model
-        .nodal_displacements(body.equilibrium().coefficients())
-        .map_err(ModelError::from)?;
+    let jacobian = body.actuation_jacobian().map_err(|failure| CliError::Solve { failure, depth: body.depth() })?;
+    let nodal = model.nodal_displacements(body.equilibrium().coefficients()).map_err(ModelError::from)?;
     let point = |p: &Vector2<f64>| [p.x, p.y];
     if let Some(path) = files.json {
         let document = serde_json::json!({

@@ -15,30 +15,14 @@ fn model(integration: Integration) -> TissueModel {
 #[test]
 fn newton_converges_quadratically() {
     let model = model(Integration::Scni);
-    let mut body = model
-        .body(
-            Some(2),
-            NewtonSettings {
-                residual_tolerance: 1e-13,
-                ..Default::default()
-            },
-        )
-        .unwrap();
+    let mut body = model.body(Some(2), NewtonSettings { residual_tolerance: 1e-13, ..Default::default() }).unwrap();
     body.drive(0.02, Vector2::zeros()).unwrap();
-    let history: Vec<f64> = body
-        .equilibrium()
-        .residual_history()
-        .iter()
-        .copied()
-        .filter(|r| *r < 0.1 && *r > 1e-12)
-        .collect();
+    let history: Vec<f64> =
+        body.equilibrium().residual_history().iter().copied().filter(|r| *r < 0.1 && *r > 1e-12).collect();
     assert!(history.len() >= 2, "{history:?}");
     for pair in history.windows(2) {
         // log r grows by about two per iteration; rounding ends it.
-        assert!(
-            pair[1] < 10.0 * pair[0].powf(1.7) || pair[1] < 1e-11,
-            "{history:?}"
-        );
+        assert!(pair[1] < 10.0 * pair[0].powf(1.7) || pair[1] < 1e-11, "{history:?}");
     }
 }
 
@@ -47,15 +31,8 @@ fn exact_jacobian_agrees_with_resolved_finite_differences_at_depth() {
     for integration in [Integration::Dni, Integration::Scni] {
         let model = model(integration);
         for depth in [0.0, 0.05] {
-            let mut body = model
-                .body(
-                    Some(2),
-                    NewtonSettings {
-                        residual_tolerance: 1e-12,
-                        ..Default::default()
-                    },
-                )
-                .unwrap();
+            let mut body =
+                model.body(Some(2), NewtonSettings { residual_tolerance: 1e-12, ..Default::default() }).unwrap();
             body.drive(depth, Vector2::zeros()).unwrap();
             let exact = body.actuation_jacobian().unwrap();
             let mut difference = Matrix2::zeros();
@@ -68,10 +45,7 @@ fn exact_jacobian_agrees_with_resolved_finite_differences_at_depth() {
                 difference.set_column(axis, &((ahead - body.target_displacement()) / (2.0 * step)));
                 body.drive(depth, Vector2::zeros()).unwrap();
             }
-            assert!(
-                (exact - difference).norm() < 1e-6,
-                "{integration:?} {depth}: {exact} {difference}"
-            );
+            assert!((exact - difference).norm() < 1e-6, "{integration:?} {depth}: {exact} {difference}");
         }
     }
 }
@@ -96,9 +70,7 @@ fn held_values_are_met_and_a_rigid_translation_costs_nothing() {
     let model = TissueModel::new(&scene).unwrap();
     let mut body = model.body(Some(0), NewtonSettings::default()).unwrap();
     body.drive(0.03, Vector2::new(0.004, -0.002)).unwrap();
-    let nodal = model
-        .nodal_displacements(body.equilibrium().coefficients())
-        .unwrap();
+    let nodal = model.nodal_displacements(body.equilibrium().coefficients()).unwrap();
     for (x, u) in model.positions().iter().zip(&nodal) {
         if x.x == 1.0 {
             assert!(u.norm() < 1e-12, "immobile node {x:?} moved by {u:?}");
@@ -121,31 +93,14 @@ fn the_answer_turns_with_the_scene() {
     let straight = Scene::parse(text, "straight").unwrap();
     let turn = |p: Vector2<f64>| Vector2::new(-p.y, p.x);
     let mut turned = straight.clone();
-    turned.outline = model_offline::scene::Polygon::new(
-        straight
-            .outline
-            .vertices()
-            .iter()
-            .map(|p| turn(*p))
-            .collect(),
-    )
-    .unwrap();
+    turned.outline =
+        model_offline::scene::Polygon::new(straight.outline.vertices().iter().map(|p| turn(*p)).collect()).unwrap();
     for inclusion in &mut turned.inclusions {
-        inclusion.outline = model_offline::scene::Polygon::new(
-            inclusion
-                .outline
-                .vertices()
-                .iter()
-                .map(|p| turn(*p))
-                .collect(),
-        )
-        .unwrap();
+        inclusion.outline =
+            model_offline::scene::Polygon::new(inclusion.outline.vertices().iter().map(|p| turn(*p)).collect())
+                .unwrap();
     }
-    turned
-        .immobile
-        .iter_mut()
-        .flatten()
-        .for_each(|p| *p = turn(*p));
+    turned.immobile.iter_mut().flatten().for_each(|p| *p = turn(*p));
     turned.needle.contact.iter_mut().for_each(|p| *p = turn(*p));
     turned.needle.axis = turn(turned.needle.axis);
     turned.target = turn(turned.target);
@@ -156,10 +111,7 @@ fn the_answer_turns_with_the_scene() {
         let model = TissueModel::new(scene).unwrap();
         let mut body = model.body(Some(3), NewtonSettings::default()).unwrap();
         body.drive(0.05, Vector2::zeros()).unwrap();
-        (
-            body.target_displacement(),
-            body.actuation_jacobian().unwrap(),
-        )
+        (body.target_displacement(), body.actuation_jacobian().unwrap())
     };
     let ((u, j), (v, k)) = (solve(&straight), solve(&turned));
     let q = Matrix2::new(0.0, -1.0, 1.0, 0.0);
@@ -183,18 +135,12 @@ fn too_deep_is_a_typed_failure_with_the_last_converged_state() {
     let model = TissueModel::new(&scene).unwrap();
     let placement = place(&model, NewtonSettings::default(), 2, &|| {}).unwrap();
     for paddle in &placement.paddles {
-        let failure = paddle
-            .fixture
-            .failure
-            .as_ref()
-            .expect("the law loses stability before depth 0.4");
+        let failure = paddle.fixture.failure.as_ref().expect("the law loses stability before depth 0.4");
         assert!(failure.depth > 0.08 && failure.depth < 0.3, "{failure:?}");
         assert_eq!(failure.depth, paddle.fixture.reached_depth);
         assert!(matches!(
             failure.reason,
-            FailureReason::LostStability
-                | FailureReason::ElementInverted
-                | FailureReason::NotConverged
+            FailureReason::LostStability | FailureReason::ElementInverted | FailureReason::NotConverged
         ));
     }
 }
@@ -207,16 +153,8 @@ fn a_paddle_that_failed_never_ranks_above_one_that_reached_the_depth() {
     scene.needle.increments = 13;
     let model = TissueModel::new(&scene).unwrap();
     let placement = place(&model, NewtonSettings::default(), 2, &|| {}).unwrap();
-    let best = placement
-        .paddles
-        .iter()
-        .find(|p| p.index == placement.optimum.fixture)
-        .unwrap();
-    if placement
-        .paddles
-        .iter()
-        .any(|p| p.fixture.failure.is_none())
-    {
+    let best = placement.paddles.iter().find(|p| p.index == placement.optimum.fixture).unwrap();
+    if placement.paddles.iter().any(|p| p.fixture.failure.is_none()) {
         assert!(best.fixture.failure.is_none());
     }
 }
@@ -226,16 +164,10 @@ fn the_paddles_forces_balance_those_of_needle_and_wall() {
     let model = model(Integration::Scni);
     let mut body = model.body(Some(2), NewtonSettings::default()).unwrap();
     body.drive(0.05, Vector2::new(0.002, 0.001)).unwrap();
-    let total = body.equilibrium().reactions().enumerate().fold(
-        Vector2::zeros(),
-        |mut sum: Vector2<f64>, (k, r)| {
-            sum[k % 2] += r;
-            sum
-        },
-    );
-    let largest = body
-        .equilibrium()
-        .reactions()
-        .fold(0.0_f64, |m, r| m.max(r.abs()));
+    let total = body.equilibrium().reactions().enumerate().fold(Vector2::zeros(), |mut sum: Vector2<f64>, (k, r)| {
+        sum[k % 2] += r;
+        sum
+    });
+    let largest = body.equilibrium().reactions().fold(0.0_f64, |m, r| m.max(r.abs()));
     assert!(total.norm() < 1e-8 * largest, "{total} of {largest}");
 }

@@ -31,22 +31,14 @@ fn paper_law(c: f64) -> Material {
 }
 
 fn laws() -> Vec<(&'static str, Material)> {
-    let general =
-        Material::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 10.0).unwrap())
-            .unwrap();
+    let general = Material::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 10.0).unwrap()).unwrap();
     vec![
         ("fung", paper_law(10.0)),
         ("fung general", general),
-        (
-            "st venant-kirchhoff",
-            Material::saint_venant_kirchhoff(383.0, 318.5).unwrap(),
-        ),
+        ("st venant-kirchhoff", Material::saint_venant_kirchhoff(383.0, 318.5).unwrap()),
         ("neo-hookean", Material::neo_hookean(383.0, 318.5).unwrap()),
         ("linear", Material::linear(383.0, 318.5).unwrap()),
-        (
-            "fung with barrier",
-            paper_law(10.0).with_barrier(50.0).unwrap(),
-        ),
+        ("fung with barrier", paper_law(10.0).with_barrier(50.0).unwrap()),
     ]
 }
 
@@ -56,9 +48,7 @@ fn gradient(scatter: &mut Scatter, size: f64) -> Matrix<2> {
 
 #[test]
 fn table_i_is_isotropic_with_the_published_moduli() {
-    let general =
-        Material::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 0.779).unwrap())
-            .unwrap();
+    let general = Material::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 0.779).unwrap()).unwrap();
     let mut scatter = Scatter::new(1);
     for _ in 0..50 {
         let h = gradient(&mut scatter, 0.3);
@@ -80,14 +70,8 @@ fn closed_form_stresses_confined_compression_and_extension() {
         (1.2, 270.1327),
         (1.5, 966.2809),
     ] {
-        let p = paper_law(0.779)
-            .respond(&Matrix2::new(0.0, 0.0, 0.0, stretch - 1.0))
-            .pk1_stress;
-        assert!(
-            (p[(1, 1)] - expected).abs() < 6e-5,
-            "{stretch}: {}",
-            p[(1, 1)]
-        );
+        let p = paper_law(0.779).respond(&Matrix2::new(0.0, 0.0, 0.0, stretch - 1.0)).pk1_stress;
+        assert!((p[(1, 1)] - expected).abs() < 6e-5, "{stretch}: {}", p[(1, 1)]);
     }
 }
 
@@ -95,18 +79,11 @@ fn closed_form_stresses_confined_compression_and_extension() {
 fn closed_form_stresses_with_free_lateral_faces() {
     for (stretch, lateral, expected) in [(0.8, 1.065_473, -126.5239), (0.7, 1.091_598, -156.8798)] {
         let law = paper_law(0.779);
-        let p = |x: f64| {
-            law.respond(&Matrix2::new(x - 1.0, 0.0, 0.0, stretch - 1.0))
-                .pk1_stress
-        };
+        let p = |x: f64| law.respond(&Matrix2::new(x - 1.0, 0.0, 0.0, stretch - 1.0)).pk1_stress;
         let (mut low, mut high) = (1.0, 1.2);
         for _ in 0..80 {
             let middle = 0.5 * (low + high);
-            if p(middle)[(0, 0)] < 0.0 {
-                low = middle
-            } else {
-                high = middle
-            }
+            if p(middle)[(0, 0)] < 0.0 { low = middle } else { high = middle }
         }
         assert!((low - lateral).abs() < 6e-7, "{low}");
         assert!((p(low)[(1, 1)] - expected).abs() < 6e-5);
@@ -115,15 +92,8 @@ fn closed_form_stresses_with_free_lateral_faces() {
 
 #[test]
 fn closed_form_stresses_simple_shear() {
-    let p = paper_law(0.779)
-        .respond(&Matrix2::new(0.0, 0.5, 0.0, 0.0))
-        .pk1_stress;
-    for (at, expected) in [
-        ((0, 0), 127.9622),
-        ((0, 1), 223.7593),
-        ((1, 0), 159.7782),
-        ((1, 1), 127.9622),
-    ] {
+    let p = paper_law(0.779).respond(&Matrix2::new(0.0, 0.5, 0.0, 0.0)).pk1_stress;
+    for (at, expected) in [((0, 0), 127.9622), ((0, 1), 223.7593), ((1, 0), 159.7782), ((1, 1), 127.9622)] {
         assert!((p[at] - expected).abs() < 6e-5, "{at:?}: {}", p[at]);
     }
 }
@@ -131,22 +101,12 @@ fn closed_form_stresses_simple_shear() {
 #[test]
 fn nominal_stress_peaks_where_the_law_loses_stability() {
     // A_2222 = dP22/dF22 changes sign at the published stretches.
-    for (c, expected) in [
-        (0.0, 0.5773),
-        (0.779, 0.5768),
-        (100.0, 0.523),
-        (1000.0, 0.452),
-    ] {
-        let slope =
-            |s: f64| paper_law(c).tangent(&Matrix2::new(0.0, 0.0, 0.0, s - 1.0))[1][1][1][1];
+    for (c, expected) in [(0.0, 0.5773), (0.779, 0.5768), (100.0, 0.523), (1000.0, 0.452)] {
+        let slope = |s: f64| paper_law(c).tangent(&Matrix2::new(0.0, 0.0, 0.0, s - 1.0))[1][1][1][1];
         let (mut low, mut high) = (0.3, 0.9);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if slope(middle) < 0.0 {
-                low = middle
-            } else {
-                high = middle
-            }
+            if slope(middle) < 0.0 { low = middle } else { high = middle }
         }
         assert!((low - expected).abs() < 6e-4, "c = {c}: {low}");
     }
@@ -166,19 +126,12 @@ fn stress_is_the_slope_of_energy_and_tangent_the_slope_of_stress() {
                     d[(k, l)] = step;
                     let (ahead, behind) = (law.respond(&(h + d)), law.respond(&(h - d)));
                     let slope = (ahead.energy - behind.energy) / (2.0 * step);
-                    assert!(
-                        (slope - response.pk1_stress[(k, l)]).abs() < 1e-6 * 1e3,
-                        "{name}"
-                    );
+                    assert!((slope - response.pk1_stress[(k, l)]).abs() < 1e-6 * 1e3, "{name}");
                     let dp = (ahead.pk1_stress - behind.pk1_stress) / (2.0 * step);
                     for i in 0..2 {
                         for j in 0..2 {
                             let exact = tangent[i][j][k][l];
-                            assert!(
-                                (dp[(i, j)] - exact).abs() < 1e-6 * 1e3,
-                                "{name} {exact} {}",
-                                dp[(i, j)]
-                            );
+                            assert!((dp[(i, j)] - exact).abs() < 1e-6 * 1e3, "{name} {exact} {}", dp[(i, j)]);
                         }
                     }
                 }
@@ -190,21 +143,14 @@ fn stress_is_the_slope_of_energy_and_tangent_the_slope_of_stress() {
 #[test]
 fn the_same_holds_in_three_dimensions() {
     let mut scatter = Scatter::new(3);
-    for law in [
-        paper_law(10.0),
-        Material::neo_hookean(383.0, 318.5)
-            .unwrap()
-            .with_barrier(20.0)
-            .unwrap(),
-    ] {
+    for law in [paper_law(10.0), Material::neo_hookean(383.0, 318.5).unwrap().with_barrier(20.0).unwrap()] {
         let h = Matrix3::from_fn(|_, _| 0.2 * scatter.next());
         let tangent = law.tangent(&h);
         for k in 0..3 {
             for l in 0..3 {
                 let mut d = Matrix3::zeros();
                 d[(k, l)] = 1e-5;
-                let dp =
-                    (law.respond(&(h + d)).pk1_stress - law.respond(&(h - d)).pk1_stress) / 2e-5;
+                let dp = (law.respond(&(h + d)).pk1_stress - law.respond(&(h - d)).pk1_stress) / 2e-5;
                 for i in 0..3 {
                     for j in 0..3 {
                         assert!((dp[(i, j)] - tangent[i][j][k][l]).abs() < 1e-3);
@@ -225,13 +171,9 @@ fn energy_does_not_depend_on_the_frame_and_stress_turns_with_it() {
             let q = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());
             let here = law.respond(&(f - Matrix2::identity()));
             let turned = law.respond(&(q * f - Matrix2::identity()));
+            assert!((here.energy - turned.energy).abs() <= 1e-11 * (1.0 + here.energy), "{name}");
             assert!(
-                (here.energy - turned.energy).abs() <= 1e-11 * (1.0 + here.energy),
-                "{name}"
-            );
-            assert!(
-                (q * here.pk1_stress - turned.pk1_stress).norm()
-                    <= 1e-10 * (1.0 + here.pk1_stress.norm()),
+                (q * here.pk1_stress - turned.pk1_stress).norm() <= 1e-10 * (1.0 + here.pk1_stress.norm()),
                 "{name}"
             );
         }
@@ -245,18 +187,14 @@ fn reading_table_i_as_a_voigt_law_would_not_be_frame_invariant() {
     let law = paper_law(0.0);
     let energy = |angle: f64| {
         let q = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());
-        law.respond(&(q * Matrix2::new(0.1, 0.0, 0.0, 0.0) * q.transpose()))
-            .energy
+        law.respond(&(q * Matrix2::new(0.1, 0.0, 0.0, 0.0) * q.transpose())).energy
     };
     assert!((energy(0.0) - energy(0.6)).abs() < 1e-12 * energy(0.0));
 }
 
 #[test]
 fn barrier_is_not_felt_at_small_strain_and_is_felt_in_strong_compression() {
-    let (plain, guarded) = (
-        paper_law(0.779),
-        paper_law(0.779).with_barrier(500.0).unwrap(),
-    );
+    let (plain, guarded) = (paper_law(0.779), paper_law(0.779).with_barrier(500.0).unwrap());
     let zero = Matrix2::zeros();
     assert_eq!(plain.tangent(&zero), guarded.tangent(&zero));
     let squeezed = Matrix2::new(0.0, 0.0, 0.0, -0.7);

@@ -67,9 +67,7 @@ impl Header {
         }
         let format_version = u16::from_le_bytes(reader.take()?);
         if format_version != FORMAT_VERSION {
-            return Err(TableError::FormatVersion {
-                found: format_version,
-            });
+            return Err(TableError::FormatVersion { found: format_version });
         }
         let [scalar, dimension] = reader.take()?;
         let paddle_dof = u16::from_le_bytes(reader.take()?);
@@ -78,8 +76,7 @@ impl Header {
         }
         Ok(Self {
             format_version,
-            scalar: ScalarKind::from_byte(scalar)
-                .ok_or(TableError::UnknownScalar { found: scalar })?,
+            scalar: ScalarKind::from_byte(scalar).ok_or(TableError::UnknownScalar { found: scalar })?,
             dimension,
             paddle_dof,
             scene_hash: reader.take()?,
@@ -109,31 +106,16 @@ impl Header {
 ///
 /// # Errors
 /// [`TableError::BufferTooSmall`], or what [`Table::validate`] refuses: an invalid table is never written.
-pub fn encode<T: Scalar, const D: usize>(
-    table: &Table<T, D>,
-    buffer: &mut [u8],
-) -> Result<usize, TableError> {
+pub fn encode<T: Scalar, const D: usize>(table: &Table<T, D>, buffer: &mut [u8]) -> Result<usize, TableError> {
     table.validate()?;
-    let too_small = TableError::BufferTooSmall {
-        bytes: buffer.len(),
-    };
-    let (header, body) = buffer
-        .split_first_chunk_mut::<HEADER_BYTES>()
-        .ok_or(too_small)?;
-    let payload_bytes = postcard::to_slice(table, body)
-        .map_err(|_| too_small)?
-        .len();
+    let too_small = TableError::BufferTooSmall { bytes: buffer.len() };
+    let (header, body) = buffer.split_first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
+    let payload_bytes = postcard::to_slice(table, body).map_err(|_| too_small)?.len();
     *header = Header {
         format_version: FORMAT_VERSION,
         scalar: T::KIND,
-        dimension: u8::try_from(D).map_err(|_| TableError::Dimension {
-            found: D,
-            expected: 3,
-        })?,
-        paddle_dof: u16::try_from(D).map_err(|_| TableError::PaddleDof {
-            found: D,
-            expected: 3,
-        })?,
+        dimension: u8::try_from(D).map_err(|_| TableError::Dimension { found: D, expected: 3 })?,
+        paddle_dof: u16::try_from(D).map_err(|_| TableError::PaddleDof { found: D, expected: 3 })?,
         scene_hash: table.scene_hash,
         payload_bytes: u32::try_from(payload_bytes).map_err(|_| too_small)?,
     }
@@ -151,25 +133,15 @@ pub fn encode<T: Scalar, const D: usize>(
 pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, TableError> {
     let (header, payload) = split(bytes)?;
     if header.scalar != T::KIND {
-        return Err(TableError::ScalarKind {
-            found: header.scalar.name(),
-            expected: T::KIND.name(),
-        });
+        return Err(TableError::ScalarKind { found: header.scalar.name(), expected: T::KIND.name() });
     }
     if usize::from(header.dimension) != D {
-        return Err(TableError::Dimension {
-            found: header.dimension.into(),
-            expected: D,
-        });
+        return Err(TableError::Dimension { found: header.dimension.into(), expected: D });
     }
     if usize::from(header.paddle_dof) != D {
-        return Err(TableError::PaddleDof {
-            found: header.paddle_dof.into(),
-            expected: D,
-        });
+        return Err(TableError::PaddleDof { found: header.paddle_dof.into(), expected: D });
     }
-    let (mut table, rest) =
-        postcard::take_from_bytes::<Table<T, D>>(payload).map_err(|_| TableError::Payload)?;
+    let (mut table, rest) = postcard::take_from_bytes::<Table<T, D>>(payload).map_err(|_| TableError::Payload)?;
     if !rest.is_empty() {
         return Err(TableError::PayloadTrailing { extra: rest.len() });
     }
@@ -181,23 +153,15 @@ pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, Ta
 /// Header and payload of an intact file.
 fn split(bytes: &[u8]) -> Result<(Header, &[u8]), TableError> {
     let too_short = TableError::TooShort { bytes: bytes.len() };
-    let (content, checksum) = bytes
-        .split_last_chunk::<CHECKSUM_BYTES>()
-        .ok_or(too_short)?;
-    let (head, payload) = content
-        .split_first_chunk::<HEADER_BYTES>()
-        .ok_or(too_short)?;
+    let (content, checksum) = bytes.split_last_chunk::<CHECKSUM_BYTES>().ok_or(too_short)?;
+    let (head, payload) = content.split_first_chunk::<HEADER_BYTES>().ok_or(too_short)?;
     let header = Header::parse(head)?;
     let claimed = header.payload_bytes as usize;
     if claimed > payload.len() {
-        return Err(TableError::Truncated {
-            missing: claimed - payload.len(),
-        });
+        return Err(TableError::Truncated { missing: claimed - payload.len() });
     }
     if claimed < payload.len() {
-        return Err(TableError::TrailingBytes {
-            extra: payload.len() - claimed,
-        });
+        return Err(TableError::TrailingBytes { extra: payload.len() - claimed });
     }
     let (written, computed) = (u32::from_le_bytes(*checksum), CRC.checksum(content));
     if written != computed {
@@ -211,12 +175,7 @@ struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N], TableError> {
-        let (field, rest) = self
-            .0
-            .split_first_chunk::<N>()
-            .ok_or(TableError::TooShort {
-                bytes: self.0.len(),
-            })?;
+        let (field, rest) = self.0.split_first_chunk::<N>().ok_or(TableError::TooShort { bytes: self.0.len() })?;
         self.0 = rest;
         Ok(*field)
     }

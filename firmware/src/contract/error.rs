@@ -126,10 +126,7 @@ impl fmt::Display for TableError {
             Self::TooShort { bytes } => {
                 write!(f, "{bytes} bytes cannot hold a controller table; {REWRITE}")
             }
-            Self::NotATable => write!(
-                f,
-                "not a controller table: give a file written by `model-offline table`"
-            ),
+            Self::NotATable => write!(f, "not a controller table: give a file written by `model-offline table`"),
             Self::FormatVersion { found } => write!(
                 f,
                 "table format version {found}, this build reads version {}: write the table again with the \
@@ -143,86 +140,43 @@ impl fmt::Display for TableError {
             }
             Self::TrailingBytes { extra } => write!(f, "{extra} bytes follow the table; {REWRITE}"),
             Self::Checksum { written, computed } => {
-                write!(
-                    f,
-                    "checksum {computed:08x}, the file says {written:08x}; {REWRITE}"
-                )
+                write!(f, "checksum {computed:08x}, the file says {written:08x}; {REWRITE}")
             }
             Self::ScalarKind { found, expected } => {
-                write!(
-                    f,
-                    "the table holds {found}, this controller computes in {expected}: write it as {expected}"
-                )
+                write!(f, "the table holds {found}, this controller computes in {expected}: write it as {expected}")
             }
             Self::Dimension { found, expected } => {
-                write!(
-                    f,
-                    "the table is {found}-dimensional, this controller {expected}-dimensional"
-                )
+                write!(f, "the table is {found}-dimensional, this controller {expected}-dimensional")
             }
             Self::PaddleDof { found, expected } => {
-                write!(
-                    f,
-                    "the table has {found} paddle degrees of freedom, this controller {expected}"
-                )
+                write!(f, "the table has {found} paddle degrees of freedom, this controller {expected}")
             }
-            Self::Payload => write!(
-                f,
-                "the payload is no table although its checksum is right; {REWRITE}"
-            ),
+            Self::Payload => write!(f, "the payload is no table although its checksum is right; {REWRITE}"),
             Self::PayloadTrailing { extra } => {
                 write!(f, "the payload is {extra} bytes too long; {REWRITE}")
             }
-            Self::NotFinite { field } => write!(
-                f,
-                "{field} is not a finite number: check the scene, solve again"
-            ),
+            Self::NotFinite { field } => write!(f, "{field} is not a finite number: check the scene, solve again"),
             Self::NotPositive { field } => write!(f, "{field} must be positive: correct the scene"),
-            Self::NotUnit { field } => write!(
-                f,
-                "{field} is not a unit vector: normalise it before writing"
-            ),
-            Self::NotOrthogonal => write!(
-                f,
-                "n is not orthogonal to the needle axis: project it before writing"
-            ),
+            Self::NotUnit { field } => write!(f, "{field} is not a unit vector: normalise it before writing"),
+            Self::NotOrthogonal => write!(f, "n is not orthogonal to the needle axis: project it before writing"),
             Self::TooFewKnots { found } => {
                 write!(f, "{found} knots in depth, at least 2 are needed")
             }
-            Self::DepthOrder { knot } => write!(
-                f,
-                "knot {knot} is not deeper than the one before it: sort the knots"
-            ),
-            Self::DepthRange => write!(
-                f,
-                "validity must start at the first knot's depth and end at the last one's"
-            ),
+            Self::DepthOrder { knot } => write!(f, "knot {knot} is not deeper than the one before it: sort the knots"),
+            Self::DepthRange => write!(f, "validity must start at the first knot's depth and end at the last one's"),
             Self::DisplacementRange => {
-                write!(
-                    f,
-                    "the paddle's limit exceeds the range where the table is valid: lower the limit"
-                )
+                write!(f, "the paddle's limit exceeds the range where the table is valid: lower the limit")
             }
             Self::IllConditioned { knot } => write!(
                 f,
                 "the Jacobian of knot {knot} is (nearly) singular: this paddle cannot control the target, choose another"
             ),
             Self::PathBeyondLimit { knot } => {
-                write!(
-                    f,
-                    "the feed-forward path leaves the paddle's range at knot {knot}: raise the paddle's limit"
-                )
+                write!(f, "the feed-forward path leaves the paddle's range at knot {knot}: raise the paddle's limit")
             }
-            Self::Gains => write!(
-                f,
-                "the suggested gain must lie in (0, 1) and lambda_max be at least 1"
-            ),
+            Self::Gains => write!(f, "the suggested gain must lie in (0, 1) and lambda_max be at least 1"),
             Self::BufferTooSmall { bytes } => {
-                write!(
-                    f,
-                    "{bytes} bytes cannot hold the table: give {}",
-                    super::codec::MAX_TABLE_BYTES
-                )
+                write!(f, "{bytes} bytes cannot hold the table: give {}", super::codec::MAX_TABLE_BYTES)
             }
         }
     }

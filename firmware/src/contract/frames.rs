@@ -124,9 +124,7 @@ assert_layout!(PaddleCommand, 64, 6, 5);
 mod tests {
     use super::*;
 
-    fn round_trip<F: Serialize + for<'de> Deserialize<'de> + PartialEq + core::fmt::Debug>(
-        frame: F,
-    ) {
+    fn round_trip<F: Serialize + for<'de> Deserialize<'de> + PartialEq + core::fmt::Debug>(frame: F) {
         let mut buffer = [0u8; 128];
         let bytes = postcard::to_slice_cobs(&frame, &mut buffer).unwrap();
         assert_eq!(postcard::from_bytes_cobs::<F>(bytes).unwrap(), frame);
@@ -134,31 +132,9 @@ mod tests {
 
     #[test]
     fn every_frame_survives_the_serial_line() {
-        round_trip(NeedleSample {
-            sequence: u32::MAX,
-            reserved: 0,
-            time_ns: 7,
-            depth: 0.1,
-            velocity: -2.5e-3,
-        });
-        round_trip(TargetSample {
-            sequence: 3,
-            flags: TARGET_VISIBLE,
-            time_ns: 9,
-            displacement: [1e-9, -0.3],
-        });
-        round_trip(PaddleSample {
-            sequence: 3,
-            paddle_index: 4,
-            time_ns: u64::MAX,
-            displacement: [0.0, -0.0],
-        });
-        round_trip(PaddleCommand {
-            state: 2,
-            tick: 1 << 40,
-            faults: 1 << 33,
-            flags: 1,
-            ..PaddleCommand::default()
-        });
+        round_trip(NeedleSample { sequence: u32::MAX, reserved: 0, time_ns: 7, depth: 0.1, velocity: -2.5e-3 });
+        round_trip(TargetSample { sequence: 3, flags: TARGET_VISIBLE, time_ns: 9, displacement: [1e-9, -0.3] });
+        round_trip(PaddleSample { sequence: 3, paddle_index: 4, time_ns: u64::MAX, displacement: [0.0, -0.0] });
+        round_trip(PaddleCommand { state: 2, tick: 1 << 40, faults: 1 << 33, flags: 1, ..PaddleCommand::default() });
     }
 }

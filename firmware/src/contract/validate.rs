@@ -32,10 +32,7 @@ impl<T: Scalar, const D: usize> Table<T, D> {
 
     fn validate_geometry(&self) -> Result<(), TableError> {
         finite("target position", self.target_position.iter())?;
-        finite(
-            "paddle segment",
-            self.paddle.segment.iter().flat_map(SVector::iter),
-        )?;
+        finite("paddle segment", self.paddle.segment.iter().flat_map(SVector::iter))?;
         unit("needle axis", &self.needle_axis)?;
         unit("orthogonal direction", &self.orthogonal)?;
         let cosine = self.needle_axis.dot(&self.orthogonal).to_f64();
@@ -45,49 +42,26 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     fn validate_limits(&self) -> Result<(), TableError> {
         positive("paddle displacement limit", self.paddle.max_displacement)?;
         positive("paddle rate limit", self.paddle.max_rate)?;
-        positive(
-            "valid paddle displacement",
-            self.validity.paddle_displacement,
-        )?;
+        positive("valid paddle displacement", self.validity.paddle_displacement)?;
         positive("needle speed limit", self.validity.needle_speed)?;
-        ensure(
-            self.paddle.max_displacement <= self.validity.paddle_displacement,
-            TableError::DisplacementRange,
-        )?;
-        finite(
-            "gains",
-            [self.gains.loop_gain, self.gains.lambda_max].iter(),
-        )?;
+        ensure(self.paddle.max_displacement <= self.validity.paddle_displacement, TableError::DisplacementRange)?;
+        finite("gains", [self.gains.loop_gain, self.gains.lambda_max].iter())?;
         let gain = self.gains.loop_gain.to_f64();
-        ensure(
-            gain > 0.0 && gain < 1.0 && self.gains.lambda_max.to_f64() >= 1.0,
-            TableError::Gains,
-        )
+        ensure(gain > 0.0 && gain < 1.0 && self.gains.lambda_max.to_f64() >= 1.0, TableError::Gains)
     }
 
     fn validate_knots(&self) -> Result<(), TableError> {
         let (Some(first), Some(last)) = (self.knots.first(), self.knots.last()) else {
             return Err(TableError::TooFewKnots { found: 0 });
         };
-        ensure(
-            self.knots.len() >= 2,
-            TableError::TooFewKnots {
-                found: self.knots.len(),
-            },
-        )?;
-        finite(
-            "validity depth range",
-            [self.validity.depth_start, self.validity.depth_end].iter(),
-        )?;
+        ensure(self.knots.len() >= 2, TableError::TooFewKnots { found: self.knots.len() })?;
+        finite("validity depth range", [self.validity.depth_start, self.validity.depth_end].iter())?;
         for knot in &self.knots {
             knot.validate_finite()?;
         }
         for (index, pair) in self.knots.windows(2).enumerate() {
             if let [shallow, deep] = pair {
-                ensure(
-                    shallow.depth < deep.depth,
-                    TableError::DepthOrder { knot: index + 1 },
-                )?;
+                ensure(shallow.depth < deep.depth, TableError::DepthOrder { knot: index + 1 })?;
             }
         }
         ensure(
@@ -95,10 +69,7 @@ impl<T: Scalar, const D: usize> Table<T, D> {
             TableError::DepthRange,
         )?;
         for (index, knot) in self.knots.iter().enumerate() {
-            ensure(
-                condition_number(&knot.jacobian) <= CONDITION_LIMIT,
-                TableError::IllConditioned { knot: index },
-            )?;
+            ensure(condition_number(&knot.jacobian) <= CONDITION_LIMIT, TableError::IllConditioned { knot: index })?;
             ensure(
                 knot.paddle_path.norm() <= self.paddle.max_displacement,
                 TableError::PathBeyondLimit { knot: index },
@@ -115,14 +86,8 @@ impl<T: Scalar, const D: usize> Knot<T, D> {
         finite("knot paddle path", self.paddle_path.iter())?;
         finite("knot paddle path slope", self.paddle_path_slope.iter())?;
         finite("knot target displacement", self.target_displacement.iter())?;
-        finite(
-            "knot target displacement slope",
-            self.target_displacement_slope.iter(),
-        )?;
-        finite(
-            "knot static target displacement",
-            self.static_target_displacement.iter(),
-        )
+        finite("knot target displacement slope", self.target_displacement_slope.iter())?;
+        finite("knot static target displacement", self.static_target_displacement.iter())
     }
 }
 
@@ -130,14 +95,8 @@ fn ensure(holds: bool, error: TableError) -> Result<(), TableError> {
     if holds { Ok(()) } else { Err(error) }
 }
 
-fn finite<'a, T: Scalar>(
-    field: &'static str,
-    mut values: impl Iterator<Item = &'a T>,
-) -> Result<(), TableError> {
-    ensure(
-        values.all(|value| value.to_f64().is_finite()),
-        TableError::NotFinite { field },
-    )
+fn finite<'a, T: Scalar>(field: &'static str, mut values: impl Iterator<Item = &'a T>) -> Result<(), TableError> {
+    ensure(values.all(|value| value.to_f64().is_finite()), TableError::NotFinite { field })
 }
 
 fn positive<T: Scalar>(field: &'static str, value: T) -> Result<(), TableError> {
@@ -145,13 +104,7 @@ fn positive<T: Scalar>(field: &'static str, value: T) -> Result<(), TableError> 
     ensure(value.to_f64() > 0.0, TableError::NotPositive { field })
 }
 
-fn unit<T: Scalar, const D: usize>(
-    field: &'static str,
-    vector: &SVector<T, D>,
-) -> Result<(), TableError> {
+fn unit<T: Scalar, const D: usize>(field: &'static str, vector: &SVector<T, D>) -> Result<(), TableError> {
     finite(field, vector.iter())?;
-    ensure(
-        (vector.norm().to_f64() - 1.0).abs() <= T::UNIT_TOLERANCE,
-        TableError::NotUnit { field },
-    )
+    ensure((vector.norm().to_f64() - 1.0).abs() <= T::UNIT_TOLERANCE, TableError::NotUnit { field })
 }

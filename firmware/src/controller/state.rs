@@ -82,11 +82,7 @@ impl<T: Scalar> State<T> {
 
 /// Enters the tick into the accounts and checks that time goes on. A tick from the past is rejected: nothing of it
 /// is read.
-pub(super) fn start_tick<T: Scalar>(
-    state: &mut State<T>,
-    inputs: &Inputs,
-    faults: &mut Faults,
-) -> bool {
+pub(super) fn start_tick<T: Scalar>(state: &mut State<T>, inputs: &Inputs, faults: &mut Faults) -> bool {
     let Some((tick, time_ns)) = state.last_tick else {
         state.ledger.ticks.start(0);
         state.last_tick = Some((inputs.tick, inputs.time_ns));
@@ -100,16 +96,9 @@ pub(super) fn start_tick<T: Scalar>(
     let skipped = inputs.tick - tick - 1;
     state.ledger.ticks.start(skipped);
     state.last_tick = Some((inputs.tick, inputs.time_ns));
-    state.successive_overruns = if skipped > 0 {
-        state.successive_overruns.saturating_add(1)
-    } else {
-        0
-    };
+    state.successive_overruns = if skipped > 0 { state.successive_overruns.saturating_add(1) } else { 0 };
     faults.set_if(Faults::TICKS_SKIPPED, skipped > 0);
-    faults.set_if(
-        Faults::OVERRUN,
-        state.successive_overruns >= MAX_SUCCESSIVE_OVERRUNS,
-    );
+    faults.set_if(Faults::OVERRUN, state.successive_overruns >= MAX_SUCCESSIVE_OVERRUNS);
     true
 }
 

@@ -25,13 +25,7 @@ struct Loop<'t> {
 impl<'t> Loop<'t> {
     fn new(table: &'t Table<f64, 2>, settings: &Settings) -> Self {
         let controller = Controller::new(table, settings).unwrap();
-        Self {
-            controller,
-            state: State::new(),
-            plant: Plant::new(),
-            last: None,
-            worst: 0.0,
-        }
+        Self { controller, state: State::new(), plant: Plant::new(), last: None, worst: 0.0 }
     }
 
     /// One tick with the inputs changed by `fault`.
@@ -42,9 +36,7 @@ impl<'t> Loop<'t> {
         let displacement = Vector2::from(command.displacement);
         assert!(displacement.norm() <= 0.05 * (1.0 + 1e-12));
         if let Some(last) = self.last.filter(PaddleCommand::is_valid) {
-            assert!(
-                (displacement - Vector2::from(last.displacement)).norm() <= 1e-4 * (1.0 + 1e-9)
-            );
+            assert!((displacement - Vector2::from(last.displacement)).norm() <= 1e-4 * (1.0 + 1e-9));
         }
         assert_eq!(self.state.ledger().unaccounted(), 0);
         self.plant.act(&command);
@@ -79,17 +71,8 @@ fn the_right_table_leaves_almost_no_error() {
 #[test]
 fn a_wrong_table_is_corrected_by_feedback() {
     let table = table();
-    for direction in [
-        crate::law::Direction::Inverse,
-        crate::law::Direction::MinimumNorm,
-    ] {
-        let mut closed = Loop::new(
-            &table,
-            &Settings {
-                direction,
-                ..settings()
-            },
-        );
+    for direction in [crate::law::Direction::Inverse, crate::law::Direction::MinimumNorm] {
+        let mut closed = Loop::new(&table, &Settings { direction, ..settings() });
         closed.plant.push = 0.035;
         closed.plant.jacobian = jacobian() * 0.7;
         closed.run(6500);
@@ -110,10 +93,7 @@ fn a_slow_target_sensor_makes_no_oscillation() {
     for _ in 0..2000 {
         closed.tick(|_| {});
         let error = closed.plant.target().x;
-        assert!(
-            error >= -1e-12 && error <= last + 1e-12,
-            "neither overshoot nor return"
-        );
+        assert!(error >= -1e-12 && error <= last + 1e-12, "neither overshoot nor return");
         last = error;
     }
     assert_eq!(closed.state.mode(), Mode::Run);
@@ -125,13 +105,7 @@ fn growth(ratio: f64) -> f64 {
     let mut table = table();
     table.paddle.max_rate = 1e3;
     let limit = stability::gain_limit(0.0, 1);
-    let mut closed = Loop::new(
-        &table,
-        &Settings {
-            loop_gain: Some(ratio * limit),
-            ..settings()
-        },
-    );
+    let mut closed = Loop::new(&table, &Settings { loop_gain: Some(ratio * limit), ..settings() });
     closed.plant.speed = 0.0;
     let start = 1e-5;
     closed.plant.offset = start;
@@ -186,9 +160,7 @@ fn ages_lead_to_hold_and_safe_and_safe_needs_rearming() {
         };
         let mut closed = Loop::new(&table, &settings());
         closed.run(1000);
-        let held = (0..200)
-            .find(|_| closed.tick(silence).state == Mode::Hold as u32)
-            .unwrap();
+        let held = (0..200).find(|_| closed.tick(silence).state == Mode::Hold as u32).unwrap();
         let position = closed.last.unwrap().displacement;
         assert!(held <= 100, "stream {stream}: {held}");
         closed.until_safe(silence).unwrap();
@@ -220,15 +192,7 @@ fn a_pause_of_100_ms_is_one_gap_and_resumes() {
 #[test]
 fn rejected_inputs_leave_the_integral_bit_identical() {
     let table = table();
-    let bad = [
-        f64::NAN,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        1e-310,
-        1e3,
-        -1e3,
-        f64::MAX,
-    ];
+    let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, 1e3, -1e3, f64::MAX];
     for value in bad {
         for field in 0..6 {
             let mut closed = Loop::new(&table, &settings());
@@ -250,8 +214,7 @@ fn rejected_inputs_leave_the_integral_bit_identical() {
                     inputs.target = None;
                 }
             });
-            let same =
-                integral.map(f64::to_bits) == closed.state.integral().unwrap().map(f64::to_bits);
+            let same = integral.map(f64::to_bits) == closed.state.integral().unwrap().map(f64::to_bits);
             assert!(same, "field {field} = {value}");
         }
     }
@@ -269,23 +232,13 @@ fn units_off_by_1000_are_refused() {
         }
     });
     assert_eq!(closed.state.mode(), Mode::Safe);
-    assert!(
-        closed
-            .state
-            .ledger()
-            .needle
-            .discarded_for(Discard::OutOfRange)
-            > 200
-    );
+    assert!(closed.state.ledger().needle.discarded_for(Discard::OutOfRange) > 200);
 }
 
 #[test]
 fn duplicates_are_integrated_once() {
     let table = table();
-    let (mut once, mut twice) = (
-        Loop::new(&table, &settings()),
-        Loop::new(&table, &settings()),
-    );
+    let (mut once, mut twice) = (Loop::new(&table, &settings()), Loop::new(&table, &settings()));
     once.plant.push = 0.03;
     twice.plant.push = 0.03;
     let mut repeated = None;
@@ -326,13 +279,7 @@ fn lost_target_holds_and_the_return_keeps_the_rate() {
 fn a_jump_of_the_target_is_gated() {
     let table = table();
     let noise = 1e-4;
-    let mut closed = Loop::new(
-        &table,
-        &Settings {
-            target_noise: noise,
-            ..settings()
-        },
-    );
+    let mut closed = Loop::new(&table, &Settings { target_noise: noise, ..settings() });
     closed.run(1000);
     let integral = closed.state.integral();
     for _ in 0..20 {
@@ -342,14 +289,7 @@ fn a_jump_of_the_target_is_gated() {
             }
         });
     }
-    assert_eq!(
-        closed
-            .state
-            .ledger()
-            .target
-            .discarded_for(Discard::Innovation),
-        1
-    );
+    assert_eq!(closed.state.ledger().target.discarded_for(Discard::Innovation), 1);
     assert_eq!(closed.state.integral(), integral);
 }
 
@@ -361,18 +301,12 @@ fn frozen_inputs_are_detected() {
         closed.run(1000);
         let depth = closed.plant.depth;
         let displacement = closed.plant.target().into();
-        let ticks =
-            closed.until_safe(
-                |inputs| match (stream, &mut inputs.needle, &mut inputs.target) {
-                    (0, Some(needle), _) => needle.depth = depth,
-                    (1, _, Some(target)) => target.displacement = displacement,
-                    _ => {}
-                },
-            );
-        assert!(
-            ticks.is_some_and(|ticks| ticks < 600),
-            "stream {stream}: {ticks:?}"
-        );
+        let ticks = closed.until_safe(|inputs| match (stream, &mut inputs.needle, &mut inputs.target) {
+            (0, Some(needle), _) => needle.depth = depth,
+            (1, _, Some(target)) => target.displacement = displacement,
+            _ => {}
+        });
+        assert!(ticks.is_some_and(|ticks| ticks < 600), "stream {stream}: {ticks:?}");
     }
 }
 
@@ -404,10 +338,7 @@ fn clock_identity_actuator_and_overruns_lead_to_safe() {
         closed.run(1);
     }
     assert!(closed.state.faults().contains(Faults::OVERRUN));
-    assert_eq!(
-        closed.state.ledger().ticks.skipped,
-        u64::from(MAX_SUCCESSIVE_OVERRUNS)
-    );
+    assert_eq!(closed.state.ledger().ticks.skipped, u64::from(MAX_SUCCESSIVE_OVERRUNS));
 }
 
 #[test]
@@ -416,11 +347,7 @@ fn a_sign_error_of_the_plant_trips_and_right_signs_never_do() {
     let mut closed = Loop::new(&table, &settings());
     closed.plant.jacobian = -jacobian();
     closed.run(5000);
-    assert!(
-        closed.state.faults().contains(Faults::DIVERGENCE),
-        "worst {}",
-        closed.worst
-    );
+    assert!(closed.state.faults().contains(Faults::DIVERGENCE), "worst {}", closed.worst);
     assert!(closed.worst < 0.01, "worst {}", closed.worst);
     for (scale, push) in [(0.3, 0.02), (1.0, 0.05), (1.5, -0.03), (0.5, 0.06)] {
         let mut closed = Loop::new(&table, &settings());
@@ -428,11 +355,7 @@ fn a_sign_error_of_the_plant_trips_and_right_signs_never_do() {
         closed.plant.push = push;
         closed.run(5500);
         let faults = closed.state.faults();
-        assert_eq!(
-            closed.state.mode(),
-            Mode::Run,
-            "scale {scale} push {push}: {faults}"
-        );
+        assert_eq!(closed.state.mode(), Mode::Run, "scale {scale} push {push}: {faults}");
     }
 }
 
@@ -473,11 +396,7 @@ fn saturation_recovers_without_overshoot() {
     for _ in 0..5000 {
         closed.plant.offset -= 2e-6;
         closed.tick(|_| {});
-        assert!(
-            closed.plant.target().x > -2.2e-4,
-            "overshoot {}",
-            closed.plant.target().x
-        );
+        assert!(closed.plant.target().x > -2.2e-4, "overshoot {}", closed.plant.target().x);
     }
     closed.run(1000);
     assert!(closed.plant.target().x.abs() < 1e-5);
@@ -486,16 +405,10 @@ fn saturation_recovers_without_overshoot() {
 #[test]
 fn counters_may_start_anywhere() {
     let table = table();
-    let (mut zero, mut wrapping) = (
-        Loop::new(&table, &settings()),
-        Loop::new(&table, &settings()),
-    );
+    let (mut zero, mut wrapping) = (Loop::new(&table, &settings()), Loop::new(&table, &settings()));
     wrapping.plant.sequence = u32::MAX - 5;
     for _ in 0..500 {
-        assert_eq!(
-            zero.tick(|_| {}).displacement,
-            wrapping.tick(|_| {}).displacement
-        );
+        assert_eq!(zero.tick(|_| {}).displacement, wrapping.tick(|_| {}).displacement);
     }
     assert_eq!(wrapping.state.ledger().needle.missed, 0);
 }

@@ -84,10 +84,7 @@ impl<const D: usize> Quadrature<D> {
 ///
 /// # Errors
 /// [`ShapeError`] names the node whose moment matrix fails.
-pub fn direct_nodal(
-    shape: &ShapeFunctions<'_, 2>,
-    cells: &[NodalCell],
-) -> Result<Quadrature<2>, ShapeError> {
+pub fn direct_nodal(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Result<Quadrature<2>, ShapeError> {
     let mut rule = Quadrature::default();
     let (mut candidates, mut stencil) = (Vec::new(), Stencil::default());
     for (node, cell) in cells.iter().enumerate() {
@@ -151,9 +148,7 @@ impl<'a, 'c> CellAverage<'a, 'c> {
 
     fn begin(&mut self, cell: &NodalCell) {
         let (low, high) = crate::scene::geometry::bounds(&cell.corners());
-        self.shape
-            .cloud()
-            .covering(&low, &high, &mut self.candidates);
+        self.shape.cloud().covering(&low, &high, &mut self.candidates);
         self.nodes.clear();
         self.gradients.clear();
     }
@@ -165,14 +160,7 @@ impl<'a, 'c> CellAverage<'a, 'c> {
         }
         for s in GAUSS_2 {
             let x = a + (b - a) * s;
-            self.shape.evaluate(
-                &x,
-                node,
-                &self.candidates,
-                Reproduce::Field,
-                false,
-                &mut self.stencil,
-            )?;
+            self.shape.evaluate(&x, node, &self.candidates, Reproduce::Field, false, &mut self.stencil)?;
             for (&i, &value) in self.stencil.nodes.iter().zip(&self.stencil.values) {
                 self.nodes.push(i);
                 self.sum[i as usize] += weighted_normal * value;
@@ -185,8 +173,7 @@ impl<'a, 'c> CellAverage<'a, 'c> {
         self.nodes.sort_unstable();
         self.nodes.dedup();
         for &i in &self.nodes {
-            self.gradients
-                .push(std::mem::take(&mut self.sum[i as usize]) / area);
+            self.gradients.push(std::mem::take(&mut self.sum[i as usize]) / area);
         }
     }
 }

@@ -28,11 +28,7 @@ pub fn product_kernel<const D: usize>(offset: &Point<D>, a: f64) -> (f64, Point<
         slope[k] = derivative * offset[k].signum() / a;
     }
     let product = value.iter().product();
-    let gradient = Point::from_fn(|k, _| {
-        (0..D)
-            .map(|m| if m == k { slope[m] } else { value[m] })
-            .product()
-    });
+    let gradient = Point::from_fn(|k, _| (0..D).map(|m| if m == k { slope[m] } else { value[m] }).product());
     (product, gradient)
 }
 
@@ -49,10 +45,8 @@ mod tests {
         assert_eq!(cubic_b_spline(0.0).0, 2.0 / 3.0);
         // ∫ over the support of a one-dimensional spline of half-width 1 is 1/2 · (area of the classic spline 1) .
         let n = 10_000;
-        let sum: f64 = (0..n)
-            .map(|i| cubic_b_spline((f64::from(i) + 0.5) / f64::from(n)).0)
-            .sum::<f64>()
-            / f64::from(n);
+        let sum: f64 =
+            (0..n).map(|i| cubic_b_spline((f64::from(i) + 0.5) / f64::from(n)).0).sum::<f64>() / f64::from(n);
         assert!((sum - 0.25).abs() < 1e-8);
     }
 
@@ -63,8 +57,7 @@ mod tests {
         for k in 0..3 {
             let mut step = Point::<3>::zeros();
             step[k] = 1e-6;
-            let difference =
-                (product_kernel(&(x + step), 0.9).0 - product_kernel(&(x - step), 0.9).0) / 2e-6;
+            let difference = (product_kernel(&(x + step), 0.9).0 - product_kernel(&(x - step), 0.9).0) / 2e-6;
             assert!((difference - gradient[k]).abs() < 1e-9);
         }
     }

@@ -43,15 +43,14 @@ pub fn lattice_nodes(scene: &Scene, spacing: f64) -> Vec<Point<2>> {
 
     let mut fixed: Vec<Point2> = Vec::new();
     for p in feature_points(scene) {
-        let snap =
-            |nodes: &mut [Point2]| match nodes.iter_mut().find(|x| (**x - p).norm() <= tolerance) {
-                // The feature's own digits, not the lattice's: 3 × 0.1 is not 0.3.
-                Some(x) => {
-                    *x = p;
-                    true
-                }
-                None => false,
-            };
+        let snap = |nodes: &mut [Point2]| match nodes.iter_mut().find(|x| (**x - p).norm() <= tolerance) {
+            // The feature's own digits, not the lattice's: 3 × 0.1 is not 0.3.
+            Some(x) => {
+                *x = p;
+                true
+            }
+            None => false,
+        };
         if !snap(&mut nodes) && !snap(&mut fixed) {
             fixed.push(p);
         }
@@ -69,14 +68,7 @@ pub fn lattice_nodes(scene: &Scene, spacing: f64) -> Vec<Point<2>> {
 }
 
 /// Adds evenly spaced nodes where those on the segment from `a` to `b` leave a gap.
-fn fill_gaps(
-    a: Point2,
-    b: Point2,
-    spacing: f64,
-    tolerance: f64,
-    nodes: &[Point2],
-    fixed: &mut Vec<Point2>,
-) {
+fn fill_gaps(a: Point2, b: Point2, spacing: f64, tolerance: f64, nodes: &[Point2], fixed: &mut Vec<Point2>) {
     let length = (b - a).norm();
     let direction = (b - a) / length;
     let mut stations: Vec<f64> = nodes
@@ -90,9 +82,7 @@ fn fill_gaps(
         let gap = pair[1] - pair[0];
         if gap > MAX_GAP * spacing {
             let pieces = (gap / spacing).round().max(2.0);
-            fixed.extend(
-                (1..pieces as usize).map(|k| a + direction * (pair[0] + gap * k as f64 / pieces)),
-            );
+            fixed.extend((1..pieces as usize).map(|k| a + direction * (pair[0] + gap * k as f64 / pieces)));
         }
     }
 }
@@ -103,18 +93,11 @@ mod tests {
 
     #[test]
     fn the_papers_scenes_have_the_published_node_counts() {
-        for (name, spacing, expected) in [
-            ("paper", 0.1, 106),
-            ("paper-hull", 0.1, 126),
-            ("paper", 0.05, 386),
-            ("paper", 0.025, 1471),
-        ] {
+        for (name, spacing, expected) in
+            [("paper", 0.1, 106), ("paper-hull", 0.1, 126), ("paper", 0.05, 386), ("paper", 0.025, 1471)]
+        {
             let scene = Scene::bundled(name).unwrap();
-            assert_eq!(
-                lattice_nodes(&scene, spacing).len(),
-                expected,
-                "{name} at {spacing}"
-            );
+            assert_eq!(lattice_nodes(&scene, spacing).len(), expected, "{name} at {spacing}");
         }
     }
 }

@@ -10,11 +10,13 @@ pub mod kernel;
 pub mod lattice;
 pub mod nodal_cells;
 pub mod node_cloud;
+pub mod planar;
 pub mod shape_functions;
 
 pub use integration::Quadrature;
 pub use nodal_cells::NodalCell;
 pub use node_cloud::NodeCloud;
+pub use planar::{Method, Planar};
 pub use shape_functions::{ShapeError, ShapeFunctions, Stencil};
 
 /// A point or vector in D dimensions, in scene length units.

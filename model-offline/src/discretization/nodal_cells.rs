@@ -29,13 +29,7 @@ impl NodalCell {
     /// Edges as (start, end, across).
     pub fn edges(&self) -> impl Iterator<Item = (Point2, Point2, Across)> + '_ {
         let n = self.boundary.len();
-        (0..n).map(move |i| {
-            (
-                self.boundary[i].0,
-                self.boundary[(i + 1) % n].0,
-                self.boundary[i].1,
-            )
-        })
+        (0..n).map(move |i| (self.boundary[i].0, self.boundary[(i + 1) % n].0, self.boundary[i].1))
     }
 
     /// Corners without labels.
@@ -46,19 +40,10 @@ impl NodalCell {
 
 /// Voronoi cells of the nodes, clipped by the outline.
 pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Vec<NodalCell> {
-    let sites: RTree<GeomWithData<[f64; 2], u32>> = RTree::bulk_load(
-        nodes
-            .iter()
-            .enumerate()
-            .map(|(i, x)| GeomWithData::new([x.x, x.y], i as u32))
-            .collect(),
-    );
-    let boundary: Vec<(Point2, Across)> = outline
-        .vertices()
-        .iter()
-        .enumerate()
-        .map(|(i, &v)| (v, Across::Outline(i as u32)))
-        .collect();
+    let sites: RTree<GeomWithData<[f64; 2], u32>> =
+        RTree::bulk_load(nodes.iter().enumerate().map(|(i, x)| GeomWithData::new([x.x, x.y], i as u32)).collect());
+    let boundary: Vec<(Point2, Across)> =
+        outline.vertices().iter().enumerate().map(|(i, &v)| (v, Across::Outline(i as u32))).collect();
     let mut scratch = Vec::new();
     nodes
         .iter()
@@ -71,10 +56,7 @@ pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Vec<NodalCell> 
                 clip_by_convex(boundary.clone(), &cell, &mut scratch)
             };
             let corners: Vec<Point2> = boundary.iter().map(|c| c.0).collect();
-            NodalCell {
-                area: signed_area(&corners).max(0.0),
-                boundary,
-            }
+            NodalCell { area: signed_area(&corners).max(0.0), boundary }
         })
         .collect()
 }
@@ -86,18 +68,8 @@ fn unclipped_cell(
     size: f64,
     scratch: &mut Vec<(Point2, Across)>,
 ) -> Vec<(Point2, Across)> {
-    let corner = |sx: f64, sy: f64| {
-        (
-            x + Point2::new(sx, sy) * (2.0 * size),
-            Across::Outline(u32::MAX),
-        )
-    };
-    let mut cell = vec![
-        corner(-1.0, -1.0),
-        corner(1.0, -1.0),
-        corner(1.0, 1.0),
-        corner(-1.0, 1.0),
-    ];
+    let corner = |sx: f64, sy: f64| (x + Point2::new(sx, sy) * (2.0 * size), Across::Outline(u32::MAX));
+    let mut cell = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
     let mut radius = f64::INFINITY;
     for site in sites.nearest_neighbor_iter(&[x.x, x.y]) {
         let other = Point2::from(*site.geom());
@@ -110,13 +82,7 @@ fn unclipped_cell(
         if 0.5 * distance > radius {
             break;
         }
-        clip_half_plane(
-            &cell,
-            (x + other) * 0.5,
-            separation,
-            Across::Node(site.data),
-            scratch,
-        );
+        clip_half_plane(&cell, (x + other) * 0.5, separation, Across::Node(site.data), scratch);
         std::mem::swap(&mut cell, scratch);
         radius = cell.iter().map(|c| (c.0 - x).norm()).fold(0.0, f64::max);
     }
@@ -151,18 +117,13 @@ mod tests {
     #[test]
     fn cells_of_scattered_nodes_tile_a_non_convex_body() {
         let outline = Polygon::new(
-            [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 0.6], [0.0, 1.4]]
-                .iter()
-                .map(|p| Point2::from(*p))
-                .collect(),
+            [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 0.6], [0.0, 1.4]].iter().map(|p| Point2::from(*p)).collect(),
         )
         .unwrap();
         let mut nodes = Vec::new();
         let mut state = 3_u64;
         let mut random = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 33) as f64 / f64::from(1_u32 << 31)
         };
         while nodes.len() < 80 {
@@ -173,16 +134,10 @@ mod tests {
         }
         let cells = clipped_voronoi(&nodes, &outline);
         let total: f64 = cells.iter().map(|c| c.area).sum();
-        assert!(
-            (total - outline.area()).abs() < 1e-13 * outline.area(),
-            "{total}"
-        );
+        assert!((total - outline.area()).abs() < 1e-13 * outline.area(), "{total}");
         // ∮ n dΓ = 0 on every cell: what makes a constant field strain-free under SCNI.
         for cell in &cells {
-            let closed: Point2 = cell
-                .edges()
-                .map(|(a, b, _)| Point2::new(b.y - a.y, a.x - b.x))
-                .sum();
+            let closed: Point2 = cell.edges().map(|(a, b, _)| Point2::new(b.y - a.y, a.x - b.x)).sum();
             assert!(closed.norm() < 1e-14);
         }
     }

@@ -35,11 +35,7 @@ where
                 })
                 .collect(),
         );
-        Self {
-            positions,
-            half_widths,
-            supports,
-        }
+        Self { positions, half_widths, supports }
     }
 
     /// Number of nodes.
@@ -67,11 +63,7 @@ where
         let corner = |p: &Point<D>| -> [f64; D] { std::array::from_fn(|k| p[k]) };
         out.clear();
         let window = AABB::from_corners(corner(low), corner(high));
-        out.extend(
-            self.supports
-                .locate_in_envelope_intersecting(&window)
-                .map(|s| s.data),
-        );
+        out.extend(self.supports.locate_in_envelope_intersecting(&window).map(|s| s.data));
         // The tree's order depends on its build; ascending order makes every sum reproducible.
         out.sort_unstable();
     }

@@ -48,13 +48,10 @@ pub struct Stencil<const D: usize> {
 impl<const D: usize> Stencil<D> {
     /// Σ_I Ψ_I d_I for nodal coefficients stored node by node (D numbers each).
     pub fn interpolate(&self, coefficients: &[f64]) -> Point<D> {
-        self.nodes
-            .iter()
-            .zip(&self.values)
-            .fold(Point::zeros(), |sum, (&i, &value)| {
-                let at = i as usize * D;
-                sum + Point::from_column_slice(&coefficients[at..at + D]) * value
-            })
+        self.nodes.iter().zip(&self.values).fold(Point::zeros(), |sum, (&i, &value)| {
+            let at = i as usize * D;
+            sum + Point::from_column_slice(&coefficients[at..at + D]) * value
+        })
     }
 }
 
@@ -104,14 +101,7 @@ where
             .min_by(|&a, &b| self.distance(a, x).total_cmp(&self.distance(b, x)))
             .unwrap_or(0);
         let mut stencil = Stencil::default();
-        self.evaluate(
-            x,
-            nearest as usize,
-            &candidates,
-            Reproduce::Field,
-            gradients,
-            &mut stencil,
-        )?;
+        self.evaluate(x, nearest as usize, &candidates, Reproduce::Field, gradients, &mut stencil)?;
         Ok(stencil)
     }
 
@@ -180,8 +170,7 @@ where
                     let dh = monomial_slope::<D, P>(&(offset / scale), k) / scale;
                     for r in 0..P {
                         for c in 0..=r {
-                            moment_slope[k][(r, c)] +=
-                                phi_slope[k] * h[r] * h[c] + phi * (dh[r] * h[c] + h[r] * dh[c]);
+                            moment_slope[k][(r, c)] += phi_slope[k] * h[r] * h[c] + phi * (dh[r] * h[c] + h[r] * dh[c]);
                         }
                     }
                 }
@@ -284,16 +273,12 @@ mod tests {
     {
         let mut state = 7_u64;
         let mut jitter = || {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             ((state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5) * 0.4
         };
         let count = per_axis.pow(D as u32);
         let positions = (0..count)
-            .map(|n| {
-                Point::from_fn(|k, _| (n / per_axis.pow(k as u32) % per_axis) as f64 + jitter())
-            })
+            .map(|n| Point::from_fn(|k, _| (n / per_axis.pow(k as u32) % per_axis) as f64 + jitter()))
             .collect();
         NodeCloud::new(positions, vec![2.6; count])
     }
@@ -315,10 +300,7 @@ mod tests {
                     .zip(&stencil.values)
                     .map(|(&i, v)| v * field(&cloud.positions()[i as usize]))
                     .sum();
-                assert!(
-                    (sum - field(&x)).abs() < 1e-11 * (1.0 + field(&x).abs()),
-                    "power {power}: {sum}"
-                );
+                assert!((sum - field(&x)).abs() < 1e-11 * (1.0 + field(&x).abs()), "power {power}: {sum}");
                 for k in 0..D {
                     let slope: f64 = stencil
                         .nodes
@@ -329,10 +311,7 @@ mod tests {
                     let mut step = Point::<D>::zeros();
                     step[k] = 1e-6;
                     let exact = (field(&(x + step)) - field(&(x - step))) / 2e-6;
-                    assert!(
-                        (slope - exact).abs() < 1e-7,
-                        "power {power} axis {k}: {slope} {exact}"
-                    );
+                    assert!((slope - exact).abs() < 1e-7, "power {power} axis {k}: {slope} {exact}");
                 }
             }
         }
@@ -355,19 +334,11 @@ mod tests {
         for k in 0..2 {
             let mut step = Point::<2>::zeros();
             step[k] = 1e-5;
-            let (ahead, behind) = (
-                shape.at(&(x + step), false).unwrap(),
-                shape.at(&(x - step), false).unwrap(),
-            );
-            let value =
-                |s: &Stencil<2>, i| s.nodes.binary_search(&i).map_or(0.0, |at| s.values[at]);
+            let (ahead, behind) = (shape.at(&(x + step), false).unwrap(), shape.at(&(x - step), false).unwrap());
+            let value = |s: &Stencil<2>, i| s.nodes.binary_search(&i).map_or(0.0, |at| s.values[at]);
             for (&i, gradient) in here.nodes.iter().zip(&here.gradients) {
                 let difference = (value(&ahead, i) - value(&behind, i)) / 2e-5;
-                assert!(
-                    (difference - gradient[k]).abs() < 1e-8,
-                    "{difference} {}",
-                    gradient[k]
-                );
+                assert!((difference - gradient[k]).abs() < 1e-8, "{difference} {}", gradient[k]);
             }
         }
     }
@@ -376,13 +347,8 @@ mod tests {
     fn failures_name_the_node() {
         let shape_error = |positions: Vec<[f64; 2]>, half_width: f64| {
             let n = positions.len();
-            let cloud = NodeCloud::new(
-                positions.into_iter().map(Point::from).collect(),
-                vec![half_width; n],
-            );
-            ShapeFunctions::new(&cloud, Basis::Linear)
-                .at(&cloud.positions()[1], false)
-                .unwrap_err()
+            let cloud = NodeCloud::new(positions.into_iter().map(Point::from).collect(), vec![half_width; n]);
+            ShapeFunctions::new(&cloud, Basis::Linear).at(&cloud.positions()[1], false).unwrap_err()
         };
         let too_small = shape_error(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0.5);
         assert_eq!((too_small.node, too_small.neighbours), (1, 1));

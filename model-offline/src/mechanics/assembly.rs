@@ -21,11 +21,7 @@ pub struct Tissue {
 impl Tissue {
     /// A tissue of one material in every cell.
     pub fn uniform(material: Material, cells: usize) -> Self {
-        Self {
-            materials: vec![material],
-            offsets: (0..=cells as u32).collect(),
-            parts: vec![(0, 1.0); cells],
-        }
+        Self { materials: vec![material], offsets: (0..=cells as u32).collect(), parts: vec![(0, 1.0); cells] }
     }
 
     /// A tissue from the parts of every cell: (index into `materials`, factor on the energy).
@@ -35,20 +31,14 @@ impl Tissue {
             parts.extend(cell);
             offsets.push(parts.len() as u32);
         }
-        Self {
-            materials,
-            offsets,
-            parts,
-        }
+        Self { materials, offsets, parts }
     }
 
     /// The materials and energy factors of a cell.
     #[inline]
     pub fn parts(&self, cell: u32) -> impl Iterator<Item = (&Material, f64)> + '_ {
         let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
-        self.parts[range]
-            .iter()
-            .map(|&(m, factor)| (&self.materials[m as usize], factor))
+        self.parts[range].iter().map(|&(m, factor)| (&self.materials[m as usize], factor))
     }
 
     /// Whether every material is linear, so that one tangent serves every state.
@@ -61,15 +51,8 @@ impl Tissue {
     /// # Errors
     /// Never for the laws there are; the signature leaves room for one without a linear limit.
     pub fn linearised(&self) -> Result<Self, super::MaterialError> {
-        let materials = self
-            .materials
-            .iter()
-            .map(Material::linearised)
-            .collect::<Result<_, _>>()?;
-        Ok(Self {
-            materials,
-            ..self.clone()
-        })
+        let materials = self.materials.iter().map(Material::linearised).collect::<Result<_, _>>()?;
+        Ok(Self { materials, ..self.clone() })
     }
 }
 
@@ -97,11 +80,7 @@ impl<const D: usize> State<D> {
 
 /// Displacement gradient at integration point `q` for coefficients stored node by node.
 #[inline]
-pub fn displacement_gradient<const D: usize>(
-    rule: &Quadrature<D>,
-    q: usize,
-    coefficients: &[f64],
-) -> Matrix<D> {
+pub fn displacement_gradient<const D: usize>(rule: &Quadrature<D>, q: usize, coefficients: &[f64]) -> Matrix<D> {
     let point = rule.point(q);
     let mut h = Matrix::<D>::zeros();
     for (&i, g) in point.nodes.iter().zip(point.gradients) {
@@ -144,10 +123,7 @@ pub fn internal_force<const D: usize>(
             pk1 += response.pk1_stress * (point.weight * factor);
         }
         if !pk1.iter().all(|p| p.is_finite()) {
-            return Err(Inverted {
-                point: q,
-                det_f: f64::NAN,
-            });
+            return Err(Inverted { point: q, det_f: f64::NAN });
         }
         for (&i, g) in point.nodes.iter().zip(point.gradients) {
             let f = &mut force[i as usize * D..i as usize * D + D];
@@ -179,11 +155,7 @@ impl Scatter {
         for point in rule.points() {
             for (column, &j) in point.nodes.iter().enumerate() {
                 for &i in &point.nodes[column..] {
-                    positions.push(
-                        pattern
-                            .block_position(i, j)
-                            .expect("the pattern covers the rule") as u32,
-                    );
+                    positions.push(pattern.block_position(i, j).expect("the pattern covers the rule") as u32);
                 }
             }
         }
@@ -207,12 +179,7 @@ pub fn tangent<const D: usize>(
         for (material, factor) in tissue.parts(point.cell) {
             let part = material.tangent(h);
             let scale = point.weight * factor;
-            for (sum, row) in a
-                .iter_mut()
-                .flatten()
-                .flatten()
-                .flatten()
-                .zip(part.iter().flatten().flatten().flatten())
+            for (sum, row) in a.iter_mut().flatten().flatten().flatten().zip(part.iter().flatten().flatten().flatten())
             {
                 *sum += scale * row;
             }

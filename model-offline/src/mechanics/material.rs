@@ -76,11 +76,7 @@ impl FungTensors {
             }
             Ok(symmetrised(&t))
         };
-        Ok(Self {
-            a: gather(a)?,
-            c_tensor: gather(c_tensor)?,
-            c,
-        })
+        Ok(Self { a: gather(a)?, c_tensor: gather(c_tensor)?, c })
     }
 }
 
@@ -88,9 +84,8 @@ impl FungTensors {
 fn symmetrised(t: &Tensor4<2>) -> Tensor4<2> {
     let mut out: Tensor4<2> = Default::default();
     for (i, j, k, l) in indices::<2>() {
-        let minor = |a: usize, b: usize, c: usize, d: usize| {
-            t[a][b][c][d] + t[b][a][c][d] + t[a][b][d][c] + t[b][a][d][c]
-        };
+        let minor =
+            |a: usize, b: usize, c: usize, d: usize| t[a][b][c][d] + t[b][a][c][d] + t[a][b][d][c] + t[b][a][d][c];
         out[i][j][k][l] = (minor(i, j, k, l) + minor(k, l, i, j)) / 8.0;
     }
     out
@@ -102,22 +97,10 @@ fn indices<const D: usize>() -> impl Iterator<Item = (usize, usize, usize, usize
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 enum Law {
-    Fung {
-        lambda: f64,
-        mu: f64,
-        c: f64,
-        lambda_c: f64,
-        mu_c: f64,
-    },
+    Fung { lambda: f64, mu: f64, c: f64, lambda_c: f64, mu_c: f64 },
     FungGeneral(Box<FungTensors>),
-    NeoHookean {
-        kappa: f64,
-        mu: f64,
-    },
-    Linear {
-        lambda: f64,
-        mu: f64,
-    },
+    NeoHookean { kappa: f64, mu: f64 },
+    Linear { lambda: f64, mu: f64 },
 }
 
 /// A hyperelastic law with an optional volumetric barrier.
@@ -133,36 +116,14 @@ impl Material {
     ///
     /// # Errors
     /// Moduli that are not finite, negative exponents, or a law unstable at rest.
-    pub fn fung(
-        lambda: f64,
-        mu: f64,
-        c: f64,
-        lambda_c: f64,
-        mu_c: f64,
-    ) -> Result<Self, MaterialError> {
-        for (value, name) in [
-            (lambda, "lambda"),
-            (mu, "mu"),
-            (c, "c"),
-            (lambda_c, "lambda_c"),
-            (mu_c, "mu_c"),
-        ] {
+    pub fn fung(lambda: f64, mu: f64, c: f64, lambda_c: f64, mu_c: f64) -> Result<Self, MaterialError> {
+        for (value, name) in [(lambda, "lambda"), (mu, "mu"), (c, "c"), (lambda_c, "lambda_c"), (mu_c, "mu_c")] {
             finite(value, name)?;
         }
         if c < 0.0 {
             return Err(MaterialError::Negative("c"));
         }
-        Self {
-            law: Law::Fung {
-                lambda,
-                mu,
-                c,
-                lambda_c,
-                mu_c,
-            },
-            barrier: 0.0,
-        }
-        .stable()
+        Self { law: Law::Fung { lambda, mu, c, lambda_c, mu_c }, barrier: 0.0 }.stable()
     }
 
     /// Fung's law with general tensors: `W = ½ E:A:E + (c/2) exp(E:C:E)`. Planar.
@@ -174,11 +135,7 @@ impl Material {
         if tensors.c < 0.0 {
             return Err(MaterialError::Negative("c"));
         }
-        Self {
-            law: Law::FungGeneral(Box::new(tensors)),
-            barrier: 0.0,
-        }
-        .stable()
+        Self { law: Law::FungGeneral(Box::new(tensors)), barrier: 0.0 }.stable()
     }
 
     /// St. Venant–Kirchhoff: `W = ½ λ (tr E)² + μ E:E`.
@@ -197,14 +154,7 @@ impl Material {
     pub fn neo_hookean(lambda: f64, mu: f64) -> Result<Self, MaterialError> {
         finite(lambda, "lambda")?;
         finite(mu, "mu")?;
-        Self {
-            law: Law::NeoHookean {
-                kappa: lambda + 2.0 * mu / 3.0,
-                mu,
-            },
-            barrier: 0.0,
-        }
-        .stable()
+        Self { law: Law::NeoHookean { kappa: lambda + 2.0 * mu / 3.0, mu }, barrier: 0.0 }.stable()
     }
 
     /// Linear elasticity: `W = ½ λ (tr ε)² + μ ε:ε`, ε = ½ (H + Hᵀ). In the plane this is plane strain; give
@@ -215,11 +165,7 @@ impl Material {
     pub fn linear(lambda: f64, mu: f64) -> Result<Self, MaterialError> {
         finite(lambda, "lambda")?;
         finite(mu, "mu")?;
-        Self {
-            law: Law::Linear { lambda, mu },
-            barrier: 0.0,
-        }
-        .stable()
+        Self { law: Law::Linear { lambda, mu }, barrier: 0.0 }.stable()
     }
 
     /// Adds the volumetric barrier `β/4 (ln J)⁴`: zero value, slope and curvature at J = 1, so that small strains do
@@ -244,18 +190,9 @@ impl Material {
     /// The law of small strains with the same tangent at rest: what a linear model of this tissue would use.
     pub fn linearised(&self) -> Result<Self, MaterialError> {
         match &self.law {
-            Law::Fung {
-                lambda,
-                mu,
-                c,
-                lambda_c,
-                mu_c,
-            } => Self::linear(lambda + c * lambda_c, mu + c * mu_c),
+            Law::Fung { lambda, mu, c, lambda_c, mu_c } => Self::linear(lambda + c * lambda_c, mu + c * mu_c),
             Law::NeoHookean { kappa, mu } => Self::linear(kappa - 2.0 * mu / 3.0, *mu),
-            Law::Linear { .. } => Ok(Self {
-                law: self.law.clone(),
-                barrier: 0.0,
-            }),
+            Law::Linear { .. } => Ok(Self { law: self.law.clone(), barrier: 0.0 }),
             // Anisotropic in general: keep the law and let the strain be small.
             Law::FungGeneral(_) => Ok(self.clone()),
         }
@@ -266,13 +203,7 @@ impl Material {
     pub fn respond<const D: usize>(&self, h: &Matrix<D>) -> Response<D> {
         let f = Matrix::<D>::identity() + h;
         let mut response = match &self.law {
-            Law::Fung {
-                lambda,
-                mu,
-                c,
-                lambda_c,
-                mu_c,
-            } => {
+            Law::Fung { lambda, mu, c, lambda_c, mu_c } => {
                 let e = green_lagrange(h);
                 let (trace, square) = (e.trace(), e.norm_squared());
                 let exponential = c * (lambda_c * trace * trace + 2.0 * mu_c * square).exp();
@@ -280,10 +211,7 @@ impl Material {
                     + e * (2.0 * (mu + exponential * mu_c));
                 // The energy is counted from rest: (c/2)(e^Q − 1), so that it is exactly 0 there.
                 let energy = 0.5 * lambda * trace * trace + mu * square + 0.5 * (exponential - c);
-                Response {
-                    energy,
-                    pk1_stress: f * pk2,
-                }
+                Response { energy, pk1_stress: f * pk2 }
             }
             Law::FungGeneral(t) => {
                 let e = green_lagrange(h);
@@ -300,8 +228,7 @@ impl Material {
                 let trace = f.norm_squared() + (3 - D) as f64;
                 let factor = j.powf(-2.0 / 3.0);
                 Response {
-                    energy: 0.5 * mu * (factor * trace - 3.0)
-                        + 0.25 * kappa * (j * j - 1.0 - 2.0 * j.ln()),
+                    energy: 0.5 * mu * (factor * trace - 3.0) + 0.25 * kappa * (j * j - 1.0 - 2.0 * j.ln()),
                     pk1_stress: (f - inverse_t * (trace / 3.0)) * (mu * factor)
                         + inverse_t * (0.5 * kappa * (j * j - 1.0)),
                 }
@@ -310,10 +237,7 @@ impl Material {
                 let strain = (h + h.transpose()) * 0.5;
                 let trace = strain.trace();
                 let stress = Matrix::<D>::identity() * (lambda * trace) + strain * (2.0 * mu);
-                Response {
-                    energy: 0.5 * stress.dot(&strain),
-                    pk1_stress: stress,
-                }
+                Response { energy: 0.5 * stress.dot(&strain), pk1_stress: stress }
             }
         };
         if self.barrier > 0.0 {
@@ -329,13 +253,7 @@ impl Material {
     pub fn tangent<const D: usize>(&self, h: &Matrix<D>) -> Tensor4<D> {
         let f = Matrix::<D>::identity() + h;
         let mut tangent = match &self.law {
-            Law::Fung {
-                lambda,
-                mu,
-                c,
-                lambda_c,
-                mu_c,
-            } => {
+            Law::Fung { lambda, mu, c, lambda_c, mu_c } => {
                 let e = green_lagrange(h);
                 let (trace, square) = (e.trace(), e.norm_squared());
                 let exponential = c * (lambda_c * trace * trace + 2.0 * mu_c * square).exp();
@@ -363,8 +281,8 @@ impl Material {
                 let exponential = t.c * ce.dot(&e).exp();
                 let mut c = zero4::<D>();
                 for (i, j, k, l) in indices::<D>() {
-                    c[i][j][k][l] = t.a[i][j][k][l]
-                        + exponential * (t.c_tensor[i][j][k][l] + 2.0 * ce[(i, j)] * ce[(k, l)]);
+                    c[i][j][k][l] =
+                        t.a[i][j][k][l] + exponential * (t.c_tensor[i][j][k][l] + 2.0 * ce[(i, j)] * ce[(k, l)]);
                 }
                 push_forward(&f, &(ae + ce * exponential), &c)
             }
@@ -379,8 +297,7 @@ impl Material {
                     let identity = if i == k && jj == l { 1.0 } else { 0.0 };
                     let swap = g[(i, l)] * g[(k, jj)];
                     a[i][jj][k][l] = factor
-                        * (identity
-                            - 2.0 / 3.0 * (f[(i, jj)] * g[(k, l)] + g[(i, jj)] * f[(k, l)])
+                        * (identity - 2.0 / 3.0 * (f[(i, jj)] * g[(k, l)] + g[(i, jj)] * f[(k, l)])
                             + trace / 3.0 * (swap + 2.0 / 3.0 * g[(i, jj)] * g[(k, l)]))
                         + kappa * j * j * g[(i, jj)] * g[(k, l)]
                         - pressure * swap;
@@ -402,9 +319,8 @@ impl Material {
             let log = j.ln();
             let g = inverse_transpose(&f, j);
             for (i, jj, k, l) in indices::<D>() {
-                tangent[i][jj][k][l] += self.barrier
-                    * (3.0 * log * log * g[(i, jj)] * g[(k, l)]
-                        - log.powi(3) * g[(i, l)] * g[(k, jj)]);
+                tangent[i][jj][k][l] +=
+                    self.barrier * (3.0 * log * log * g[(i, jj)] * g[(k, l)] - log.powi(3) * g[(i, l)] * g[(k, jj)]);
             }
         }
         tangent
@@ -447,20 +363,12 @@ impl Material {
             return Err(MaterialError::NotFinite("a modulus"));
         }
         let lowest = voigt.symmetric_eigenvalues().min();
-        if lowest > 1e-12 * voigt.norm() {
-            Ok(self)
-        } else {
-            Err(MaterialError::Unstable(lowest))
-        }
+        if lowest > 1e-12 * voigt.norm() { Ok(self) } else { Err(MaterialError::Unstable(lowest)) }
     }
 }
 
 fn finite(value: f64, name: &'static str) -> Result<(), MaterialError> {
-    if value.is_finite() {
-        Ok(())
-    } else {
-        Err(MaterialError::NotFinite(name))
-    }
+    if value.is_finite() { Ok(()) } else { Err(MaterialError::NotFinite(name)) }
 }
 
 /// E = ½ (H + Hᵀ + HᵀH).
@@ -476,10 +384,7 @@ fn zero4<const D: usize>() -> Tensor4<D> {
 fn contract<const D: usize>(t: &Tensor4<2>, e: &Matrix<D>) -> Matrix<D> {
     debug_assert_eq!(D, 2, "the general (A, C) form is planar");
     Matrix::from_fn(|i, j| {
-        (0..D)
-            .flat_map(|k| (0..D).map(move |l| (k, l)))
-            .map(|(k, l)| t[i][j][k][l] * e[(k, l)])
-            .sum()
+        (0..D).flat_map(|k| (0..D).map(move |l| (k, l))).map(|(k, l)| t[i][j][k][l] * e[(k, l)]).sum()
     })
 }
 
@@ -487,13 +392,7 @@ fn contract<const D: usize>(t: &Tensor4<2>, e: &Matrix<D>) -> Matrix<D> {
 fn cofactors<const D: usize>(f: &Matrix<D>) -> Matrix<D> {
     match D {
         1 => Matrix::identity(),
-        2 => Matrix::from_fn(|r, c| {
-            if r == c {
-                f[(1 - r, 1 - c)]
-            } else {
-                -f[(1 - r, 1 - c)]
-            }
-        }),
+        2 => Matrix::from_fn(|r, c| if r == c { f[(1 - r, 1 - c)] } else { -f[(1 - r, 1 - c)] }),
         3 => Matrix::from_fn(|r, c| {
             let next = |x: usize, by: usize| (x + by) % 3;
             f[(next(r, 1), next(c, 1))] * f[(next(r, 2), next(c, 2))]

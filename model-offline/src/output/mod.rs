@@ -22,30 +22,19 @@ pub struct OutputError {
 /// # Errors
 /// [`OutputError`] names the file; whatever was there before is untouched.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
-    let fail = |source| OutputError {
-        path: path.to_owned(),
-        source,
-    };
+    let fail = |source| OutputError { path: path.to_owned(), source };
     // Renaming over a device or a pipe would replace it: those are written to directly.
     if path.exists() && !path.is_file() && !path.is_dir() {
         return std::fs::write(path, bytes).map_err(fail);
     }
-    let folder = path
-        .parent()
-        .filter(|p| !p.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new()
-        .prefix(".stillpoint-")
-        .tempfile_in(folder)
-        .map_err(fail)?;
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut file = tempfile::Builder::new().prefix(".stillpoint-").tempfile_in(folder).map_err(fail)?;
     file.write_all(bytes).map_err(fail)?;
     // Temporary files are private; a result is as readable as the user's umask would have made it.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        let _ = file
-            .as_file()
-            .set_permissions(std::fs::Permissions::from_mode(0o644));
+        let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
     }
     file.as_file().sync_all().map_err(fail)?;
     file.persist(path).map_err(|e| fail(e.error))?;

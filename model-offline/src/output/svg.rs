@@ -11,10 +11,7 @@ pub fn svg(model: &TissueModel, body: &Body<'_>) -> String {
     let scene = model.scene();
     let coefficients = body.equilibrium().coefficients();
     let moved = |x: &Point2| x + model.displacement_at(x, coefficients);
-    let strains: Vec<f64> = cell_gradients(model, coefficients)
-        .iter()
-        .map(|h| green_lagrange(h).norm())
-        .collect();
+    let strains: Vec<f64> = cell_gradients(model, coefficients).iter().map(|h| green_lagrange(h).norm()).collect();
     let largest = strains.iter().copied().fold(1e-12, f64::max);
     let (low, high) = scene.outline.bounds();
     let size = high - low;
@@ -59,23 +56,13 @@ pub fn svg(model: &TissueModel, body: &Body<'_>) -> String {
         edge.push(edge[0]);
         line(edge, "#7b3294", 2.0);
     }
-    line(
-        scene.needle.contact.iter().map(moved).collect(),
-        "#d7191c",
-        5.0,
-    );
+    line(scene.needle.contact.iter().map(moved).collect(), "#d7191c", 5.0);
     for paddle in &scene.paddles {
         line(paddle.segment.iter().map(moved).collect(), "#2c7bb6", 3.0);
     }
     let ((x, y), (x0, y0)) = (pixel(moved(&scene.target)), pixel(scene.target));
-    let _ = writeln!(
-        out,
-        "<circle cx=\"{x0:.2}\" cy=\"{y0:.2}\" r=\"5\" fill=\"none\" stroke=\"#000000\"/>"
-    );
-    let _ = writeln!(
-        out,
-        "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"4\" fill=\"#000000\"/>"
-    );
+    let _ = writeln!(out, "<circle cx=\"{x0:.2}\" cy=\"{y0:.2}\" r=\"5\" fill=\"none\" stroke=\"#000000\"/>");
+    let _ = writeln!(out, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"4\" fill=\"#000000\"/>");
     let bottom = size.y * scale + 70.0;
     for i in 0..50 {
         let _ = writeln!(
@@ -99,22 +86,9 @@ pub fn svg(model: &TissueModel, body: &Body<'_>) -> String {
 
 /// Light to dark, readable in grey: a straight line through perceptual lightness.
 fn colour(t: f64) -> String {
-    let stops = [
-        (255.0, 247.0, 188.0),
-        (254.0, 153.0, 41.0),
-        (102.0, 37.0, 6.0),
-    ];
+    let stops = [(255.0, 247.0, 188.0), (254.0, 153.0, 41.0), (102.0, 37.0, 6.0)];
     let t = t.clamp(0.0, 1.0) * 2.0;
-    let (a, b, s) = if t < 1.0 {
-        (stops[0], stops[1], t)
-    } else {
-        (stops[1], stops[2], t - 1.0)
-    };
+    let (a, b, s) = if t < 1.0 { (stops[0], stops[1], t) } else { (stops[1], stops[2], t - 1.0) };
     let mix = |p: f64, q: f64| (p + (q - p) * s).round() as u8;
-    format!(
-        "#{:02x}{:02x}{:02x}",
-        mix(a.0, b.0),
-        mix(a.1, b.1),
-        mix(a.2, b.2)
-    )
+    format!("#{:02x}{:02x}{:02x}", mix(a.0, b.0), mix(a.1, b.1), mix(a.2, b.2))
 }

@@ -43,10 +43,7 @@ pub fn summary(table: &Table<f64, 2>) -> String {
         table.gains.lambda_max,
     );
     for knot in &table.knots {
-        let measure = knot
-            .jacobian
-            .try_inverse()
-            .map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
+        let measure = knot.jacobian.try_inverse().map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
         let _ = writeln!(
             out,
             "{:8.4}  ({:9.6}, {:9.6})  {:9.4}  {:12.6}  {:16.6}",

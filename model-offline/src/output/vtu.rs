@@ -31,28 +31,14 @@ pub fn vtu(model: &TissueModel, body: &Body<'_>) -> String {
         let _ = writeln!(offsets, "{count}");
         types.push_str("7\n");
         let e = green_lagrange(h);
-        let _ = writeln!(
-            strain,
-            "{:.9e} {:.9e} {:.9e}",
-            e[(0, 0)],
-            e[(1, 1)],
-            e[(0, 1)]
-        );
+        let _ = writeln!(strain, "{:.9e} {:.9e} {:.9e}", e[(0, 0)], e[(1, 1)], e[(0, 1)]);
         let _ = writeln!(det_f, "{:.9e}", determinant(&(Matrix::<2>::identity() + h)));
         let index = cells - 1;
         let sigma = model
             .tissue()
             .parts(index as u32)
-            .fold(Matrix::<2>::zeros(), |sum, (material, factor)| {
-                sum + material.cauchy_stress(h) * factor
-            });
-        let _ = writeln!(
-            stress,
-            "{:.9e} {:.9e} {:.9e}",
-            sigma[(0, 0)],
-            sigma[(1, 1)],
-            sigma[(0, 1)]
-        );
+            .fold(Matrix::<2>::zeros(), |sum, (material, factor)| sum + material.cauchy_stress(h) * factor);
+        let _ = writeln!(stress, "{:.9e} {:.9e} {:.9e}", sigma[(0, 0)], sigma[(1, 1)], sigma[(0, 1)]);
     }
     let array = |name: &str, kind: &str, components: usize, content: &str| {
         format!(

@@ -1,10 +1,7 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
 use crate::discretization::lattice::lattice_nodes;
-use crate::discretization::nodal_cells::clipped_voronoi;
-use crate::discretization::{
-    NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, integration,
-};
+use crate::discretization::{Method, NodalCell, Planar, Quadrature, ShapeError, Stencil};
 use crate::mechanics::{Material, Tissue};
 use crate::scene::geometry::{Point2, distance_to_polyline, overlap_area};
 use crate::scene::schema::{Basis, Essential, Integration};
@@ -45,9 +42,7 @@ pub enum ModelError {
 #[derive(Debug, Clone)]
 pub struct TissueModel {
     scene: Scene,
-    cloud: Arc<NodeCloud<2>>,
-    cells: Arc<Vec<NodalCell>>,
-    rule: Arc<Quadrature<2>>,
+    planar: Planar,
     tissue: Tissue,
     spacing: f64,
     immobile: Vec<Stencil<2>>,
@@ -73,77 +68,53 @@ impl TissueModel {
                 "only the linear basis with the transformation method is available yet".into(),
             ));
         }
+        if !matches!(spec.integration, Integration::Dni | Integration::Scni) {
+            return Err(ModelError::Unsupported(format!(
+                "integration {:?} is not available yet: use dni or scni",
+                spec.integration
+            )));
+        }
         let nodes = lattice_nodes(scene, spacing);
-        let half_widths = vec![spec.support * spacing; nodes.len()];
-        let cells = clipped_voronoi(&nodes, &scene.outline);
-        let cloud = NodeCloud::new(nodes, half_widths);
-        let shape = ShapeFunctions::new(&cloud, spec.basis);
-        let rule = match spec.integration {
-            Integration::Dni => integration::direct_nodal(&shape, &cells)?,
-            Integration::Scni => integration::stabilised_conforming_nodal(&shape, &cells)?,
-            other => {
-                return Err(ModelError::Unsupported(format!(
-                    "integration {other:?} is not available yet: use dni or scni"
-                )));
-            }
-        };
+        let spacings = vec![spacing; nodes.len()];
+        let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support };
+        let planar = Planar::new(&scene.outline, nodes, &spacings, method)?;
+        Self::on(scene, planar, spacing)
+    }
+
+    /// The model of a scene on a body discretised already, whose nodes are `spacing` apart.
+    ///
+    /// # Errors
+    /// [`ModelError::NothingHeld`] when no node lies on a feature.
+    pub fn on(scene: &Scene, planar: Planar, spacing: f64) -> Result<Self, ModelError> {
         let tolerance = 1e-9 * scene.outline.size();
-        let on = |path: &[Point2], name: &str| -> Result<Vec<Stencil<2>>, ModelError> {
-            let held: Result<Vec<_>, ShapeError> = cloud
-                .positions()
-                .iter()
-                .filter(|x| distance_to_polyline(**x, path) <= tolerance)
-                .map(|x| shape.at(x, false))
-                .collect();
-            let held = held?;
-            if held.is_empty() {
-                Err(ModelError::NothingHeld(name.to_owned()))
-            } else {
-                Ok(held)
-            }
+        let on = |paths: &[&[Point2]], name: &str| -> Result<Vec<Stencil<2>>, ModelError> {
+            let near = |x: &&Point2| paths.iter().any(|path| distance_to_polyline(**x, path) <= tolerance);
+            let held: Vec<_> =
+                planar.positions().iter().filter(near).map(|x| planar.value_stencil(x)).collect::<Result<_, _>>()?;
+            if held.is_empty() { Err(ModelError::NothingHeld(name.to_owned())) } else { Ok(held) }
         };
-        let mut immobile = Vec::new();
-        for x in cloud.positions() {
-            if scene
-                .immobile
-                .iter()
-                .any(|path| distance_to_polyline(*x, path) <= tolerance)
-            {
-                immobile.push(shape.at(x, false)?);
-            }
-        }
-        if immobile.is_empty() {
-            return Err(ModelError::NothingHeld("immobile part".to_owned()));
-        }
-        let needle = on(&scene.needle.contact, "needle contact")?;
+        let immobile: Vec<&[Point2]> = scene.immobile.iter().map(Vec::as_slice).collect();
         let paddles = scene
             .paddles
             .iter()
-            .map(|p| on(&p.segment, &format!("paddle {}", p.index)))
+            .map(|p| on(&[&p.segment], &format!("paddle {}", p.index)))
             .collect::<Result<_, _>>()?;
-        let target = shape.at(&scene.target, false)?;
         Ok(Self {
-            tissue: tissue_of(scene, &cells),
+            tissue: tissue_of(scene, planar.cells()),
             scene: scene.clone(),
-            cells: Arc::new(cells),
-            rule: Arc::new(rule),
             spacing,
-            immobile,
-            needle,
+            immobile: on(&immobile, "immobile part")?,
+            needle: on(&[&scene.needle.contact], "needle contact")?,
             paddles,
-            target,
-            cloud: Arc::new(cloud),
+            target: planar.value_stencil(&scene.target)?,
+            planar,
         })
     }
 
     /// The same nodes and shape functions with the tissue of another scene that differs in its materials only.
     #[must_use]
     pub fn with_tissue_of(&self, scene: &Scene) -> Self {
-        Self {
-            tissue: tissue_of(scene, &self.cells),
-            scene: scene.clone(),
-            ..self.clone()
-        }
+        Self { tissue: tissue_of(scene, self.planar.cells()), scene: scene.clone(), ..self.clone() }
     }
 
     /// The scene.
@@ -153,32 +124,32 @@ impl TissueModel {
 
     /// Number of nodes.
     pub fn nodes(&self) -> usize {
-        self.cloud.len()
+        self.planar.cloud().len()
     }
 
     /// Number of unknowns.
     pub fn dofs(&self) -> usize {
-        2 * self.cloud.len()
+        2 * self.planar.cloud().len()
     }
 
     /// Node positions at rest.
     pub fn positions(&self) -> &[Point2] {
-        self.cloud.positions()
+        self.planar.positions()
     }
 
-    /// The node cloud.
-    pub fn cloud(&self) -> &NodeCloud<2> {
-        &self.cloud
+    /// The body's discretization.
+    pub fn planar(&self) -> &Planar {
+        &self.planar
     }
 
     /// Nodal cells.
     pub fn cells(&self) -> &[NodalCell] {
-        &self.cells
+        self.planar.cells()
     }
 
     /// The integration rule.
     pub fn rule(&self) -> &Arc<Quadrature<2>> {
-        &self.rule
+        self.planar.rule()
     }
 
     /// Materials by cell.
@@ -191,21 +162,13 @@ impl TissueModel {
     /// # Errors
     /// [`ShapeError`], which building the model has ruled out already.
     pub fn nodal_displacements(&self, coefficients: &[f64]) -> Result<Vec<Point2>, ShapeError> {
-        let shape = ShapeFunctions::new(&self.cloud, self.scene.discretization.basis);
-        self.positions()
-            .iter()
-            .map(|x| Ok(shape.at(x, false)?.interpolate(coefficients)))
-            .collect()
+        self.positions().iter().map(|x| Ok(self.planar.value_stencil(x)?.interpolate(coefficients))).collect()
     }
 
     /// Displacement of any point of the body for given coefficients.
     pub fn displacement_at(&self, x: &Point2, coefficients: &[f64]) -> Point2 {
-        let shape = ShapeFunctions::new(&self.cloud, self.scene.discretization.basis);
         // Building the model evaluated shape functions all over the body; only far outside it can this fail.
-        shape.at(x, false).map_or_else(
-            |_| Point2::zeros(),
-            |stencil| stencil.interpolate(coefficients),
-        )
+        self.planar.value_stencil(x).map_or_else(|_| Point2::zeros(), |stencil| stencil.interpolate(coefficients))
     }
 
     /// Position of a paddle in the scene's list, by its index.
@@ -217,29 +180,19 @@ impl TissueModel {
     ///
     /// # Errors
     /// [`Failure`] when the tangent at rest is singular.
-    pub fn body(
-        &self,
-        paddle: Option<usize>,
-        settings: NewtonSettings,
-    ) -> Result<Body<'_>, Failure> {
+    pub fn body(&self, paddle: Option<usize>, settings: NewtonSettings) -> Result<Body<'_>, Failure> {
         let none = Vec::new();
         let paddle = paddle.map_or(&none, |p| &self.paddles[p]);
         let held = HeldRows::new(self.immobile.iter().chain(&self.needle).chain(paddle));
         let equilibrium = Equilibrium::at_rest(
-            Arc::clone(&self.rule),
+            Arc::clone(self.planar.rule()),
             self.tissue.clone(),
             held,
             self.nodes(),
             self.spacing,
             settings,
         )?;
-        Ok(Body {
-            model: self,
-            equilibrium,
-            paddle_rows: paddle.len(),
-            depth: 0.0,
-            paddle: Vector2::zeros(),
-        })
+        Ok(Body { model: self, equilibrium, paddle_rows: paddle.len(), depth: 0.0, paddle: Vector2::zeros() })
     }
 }
 
@@ -339,9 +292,7 @@ impl Body<'_> {
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Failure> {
         let prescribed = self.held_values(depth, paddle);
         let outcome = self.equilibrium.drive(&prescribed);
-        let reached = outcome
-            .as_ref()
-            .map_or_else(|failure| failure.reached, |()| 1.0);
+        let reached = outcome.as_ref().map_or_else(|failure| failure.reached, |()| 1.0);
         self.depth += (depth - self.depth) * reached;
         self.paddle += (paddle - self.paddle) * reached;
         if outcome.is_ok() {
@@ -353,9 +304,7 @@ impl Body<'_> {
 
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector2<f64> {
-        self.model
-            .target
-            .interpolate(self.equilibrium.coefficients())
+        self.model.target.interpolate(self.equilibrium.coefficients())
     }
 
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle held, by exact linearisation.
@@ -386,8 +335,7 @@ impl Body<'_> {
     /// Values of all held rows, in the order immobile, needle, paddle.
     fn held_values(&self, depth: f64, paddle: Vector2<f64>) -> Vec<f64> {
         let model = self.model;
-        let mut values =
-            vec![0.0; 2 * (model.immobile.len() + model.needle.len() + self.paddle_rows)];
+        let mut values = vec![0.0; 2 * (model.immobile.len() + model.needle.len() + self.paddle_rows)];
         let (_, rest) = values.split_at_mut(2 * model.immobile.len());
         let (needle_values, paddle_values) = rest.split_at_mut(2 * model.needle.len());
         for pair in needle_values.chunks_exact_mut(2) {

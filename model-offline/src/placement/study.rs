@@ -89,16 +89,10 @@ pub fn parallel<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T
                 done.push((i, work(i)));
             }
         };
-        let handles: Vec<_> = (1..threads.min(count))
-            .map(|_| scope.spawn(worker))
-            .collect();
+        let handles: Vec<_> = (1..threads.min(count)).map(|_| scope.spawn(worker)).collect();
         let mut results = worker();
         for handle in handles {
-            results.extend(
-                handle
-                    .join()
-                    .unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-            );
+            results.extend(handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
         }
         results
     });
@@ -116,11 +110,10 @@ pub fn place(
     threads: usize,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Placement, ModelError> {
-    let paddles = parallel(model.scene().paddles.len(), threads, |paddle| {
-        study_paddle(model, paddle, settings, progress)
-    })
-    .into_iter()
-    .collect::<Result<Vec<_>, _>>()?;
+    let paddles =
+        parallel(model.scene().paddles.len(), threads, |paddle| study_paddle(model, paddle, settings, progress))
+            .into_iter()
+            .collect::<Result<Vec<_>, _>>()?;
     let optimum = rank(&paddles);
     Ok(Placement { paddles, optimum })
 }
@@ -138,23 +131,15 @@ pub fn best_dynamic(model: &TissueModel, threads: usize) -> Result<u32, ModelErr
     let scene = model.scene();
     let measures = parallel(scene.paddles.len(), threads, |paddle| {
         let index = scene.paddles[paddle].index;
-        let jacobian = model
-            .body(Some(paddle), NewtonSettings::default())?
-            .actuation_jacobian()?;
+        let jacobian = model.body(Some(paddle), NewtonSettings::default())?.actuation_jacobian()?;
         match best_direction(&jacobian, scene.needle.orthogonal()) {
             Ok(direction) => Ok((index, direction.norm())),
-            Err(condition) => Err(ModelError::Uncontrollable {
-                paddle: index,
-                condition,
-            }),
+            Err(condition) => Err(ModelError::Uncontrollable { paddle: index, condition }),
         }
     })
     .into_iter()
     .collect::<Result<Vec<_>, ModelError>>()?;
-    Ok(measures
-        .iter()
-        .min_by(|a, b| a.1.total_cmp(&b.1))
-        .map_or(0, |m| m.0))
+    Ok(measures.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |m| m.0))
 }
 
 fn study_paddle(
@@ -168,11 +153,8 @@ fn study_paddle(
     let normal = scene.needle.orthogonal();
     let mut body = model.body(Some(paddle), settings)?;
     let jacobian = body.actuation_jacobian()?;
-    let best_direction =
-        best_direction(&jacobian, normal).map_err(|condition| ModelError::Uncontrollable {
-            paddle: index,
-            condition,
-        })?;
+    let best_direction = best_direction(&jacobian, normal)
+        .map_err(|condition| ModelError::Uncontrollable { paddle: index, condition })?;
     let target_per_depth = body.depth_sensitivity()?;
 
     let mut fixture = StaticStudy {
@@ -188,9 +170,7 @@ fn study_paddle(
     for increment in 1..=increments {
         progress();
         let depth = scene.needle.depth * f64::from(increment) / f64::from(increments);
-        let outcome = body
-            .drive(depth, Vector2::zeros())
-            .and_then(|()| body.actuation_jacobian());
+        let outcome = body.drive(depth, Vector2::zeros()).and_then(|()| body.actuation_jacobian());
         match outcome {
             Ok(jacobian) => {
                 let displacement = body.target_displacement();
@@ -204,11 +184,7 @@ fn study_paddle(
             }
             Err(Failure { reason, detail, .. }) => {
                 fixture.reached_depth = body.depth();
-                fixture.failure = Some(StaticFailure {
-                    reason,
-                    depth: body.depth(),
-                    detail,
-                });
+                fixture.failure = Some(StaticFailure { reason, depth: body.depth(), detail });
                 break;
             }
         }
@@ -253,12 +229,6 @@ fn rank(paddles: &[PaddleResult]) -> Optimum {
         let ((a_failed, a_value), (b_failed, b_value)) = (key(a), key(b));
         a_failed.cmp(&b_failed).then(a_value.total_cmp(&b_value))
     });
-    let dynamic = paddles.iter().min_by(|a, b| {
-        a.controllability_measure
-            .total_cmp(&b.controllability_measure)
-    });
-    Optimum {
-        fixture: fixture.map_or(0, |p| p.index),
-        dynamic: dynamic.map_or(0, |p| p.index),
-    }
+    let dynamic = paddles.iter().min_by(|a, b| a.controllability_measure.total_cmp(&b.controllability_measure));
+    Optimum { fixture: fixture.map_or(0, |p| p.index), dynamic: dynamic.map_or(0, |p| p.index) }
 }

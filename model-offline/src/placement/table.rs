@@ -3,9 +3,7 @@
 use super::model::{Body, ModelError, TissueModel};
 use super::study::best_direction;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
-use firmware::contract::{
-    Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity,
-};
+use firmware::contract::{Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity};
 use firmware::stability::default_gain;
 use nalgebra::{Matrix2, Vector2};
 
@@ -23,11 +21,7 @@ pub struct TableOptions {
 
 impl Default for TableOptions {
     fn default() -> Self {
-        Self {
-            knots: 21,
-            delay_samples: 1,
-            lambda_max: 1.25,
-        }
+        Self { knots: 21, delay_samples: 1, lambda_max: 1.25 }
     }
 }
 
@@ -68,44 +62,24 @@ pub enum TableBuildError {
 ///
 /// # Errors
 /// [`TableBuildError`].
-pub fn build(
-    model: &TissueModel,
-    paddle_index: u32,
-    options: &TableOptions,
-) -> Result<Table<f64, 2>, TableBuildError> {
+pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> Result<Table<f64, 2>, TableBuildError> {
     if !(2..=MAX_KNOTS).contains(&options.knots) {
         return Err(TableBuildError::Knots(options.knots));
     }
     let scene = model.scene();
-    let position = model
-        .paddle_position(paddle_index)
-        .ok_or(TableBuildError::NoSuchPaddle(paddle_index))?;
+    let position = model.paddle_position(paddle_index).ok_or(TableBuildError::NoSuchPaddle(paddle_index))?;
     let settings = NewtonSettings::default();
-    let mut fixture = model
-        .body(Some(position), settings)
-        .map_err(ModelError::from)?;
-    let mut steered = model
-        .body(Some(position), settings)
-        .map_err(ModelError::from)?;
+    let mut fixture = model.body(Some(position), settings).map_err(ModelError::from)?;
+    let mut steered = model.body(Some(position), settings).map_err(ModelError::from)?;
     let mut knots = heapless::Vec::new();
     for k in 0..options.knots {
         let depth = scene.needle.depth * k as f64 / (options.knots - 1) as f64;
-        match knot(
-            &mut fixture,
-            &mut steered,
-            depth,
-            paddle_index,
-            scene.needle.orthogonal(),
-        ) {
+        match knot(&mut fixture, &mut steered, depth, paddle_index, scene.needle.orthogonal()) {
             Ok(knot) => {
                 let needed = knot.paddle_path.norm();
                 let available = scene.actuator.max_displacement;
                 if needed > available {
-                    return Err(TableBuildError::OutOfReach {
-                        depth,
-                        needed,
-                        available,
-                    });
+                    return Err(TableBuildError::OutOfReach { depth, needed, available });
                 }
                 // Capacity was checked above.
                 let _ = knots.push(knot);
@@ -117,10 +91,7 @@ pub fn build(
     let (first, last) = (&knots[0], &knots[knots.len() - 1]);
     let table = Table {
         scene_hash: scene.hash(),
-        units: Units {
-            length: label(&scene.length_unit)?,
-            stress: label(&scene.stress_unit)?,
-        },
+        units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
         tissue: label(scene.tissue())?,
         paddle: Paddle {
             index: paddle_index,
@@ -191,11 +162,7 @@ fn knot(
 }
 
 /// d(paddle)/d(depth) that keeps n·(target displacement) at zero, moving the paddle along J⁻¹n.
-fn path_slope(
-    direction: Vector2<f64>,
-    sensitivity: Vector2<f64>,
-    normal: Vector2<f64>,
-) -> Vector2<f64> {
+fn path_slope(direction: Vector2<f64>, sensitivity: Vector2<f64>, normal: Vector2<f64>) -> Vector2<f64> {
     -direction * normal.dot(&sensitivity)
 }
 
@@ -205,8 +172,8 @@ fn linearise(
     normal: Vector2<f64>,
 ) -> Result<(Matrix2<f64>, Vector2<f64>, Vector2<f64>), ModelError> {
     let jacobian = body.actuation_jacobian()?;
-    let direction = best_direction(&jacobian, normal)
-        .map_err(|condition| ModelError::Uncontrollable { paddle, condition })?;
+    let direction =
+        best_direction(&jacobian, normal).map_err(|condition| ModelError::Uncontrollable { paddle, condition })?;
     Ok((jacobian, direction, body.depth_sensitivity()?))
 }
 
@@ -228,9 +195,6 @@ fn steer(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<(), M
     Err(ModelError::Solve(Failure {
         reason: crate::solver::equilibrium::FailureReason::NotConverged,
         reached: 0.0,
-        detail: format!(
-            "the paddle path at depth {:.4} leaves {error:.1e} of orthogonal error",
-            body.depth()
-        ),
+        detail: format!("the paddle path at depth {:.4} leaves {error:.1e} of orthogonal error", body.depth()),
     }))
 }

@@ -34,12 +34,7 @@ pub(crate) struct Source<'a> {
 }
 
 impl Source<'_> {
-    pub(crate) fn error(
-        self,
-        span: Range<usize>,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) -> SceneError {
+    pub(crate) fn error(self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> SceneError {
         let start = span.start.min(self.text.len());
         let before = &self.text[..self.text.floor_char_boundary(start)];
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);

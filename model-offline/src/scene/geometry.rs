@@ -110,9 +110,7 @@ impl Polygon {
 
     /// Distance from a point to the nearest edge.
     pub fn distance_to_boundary(&self, p: Point2) -> f64 {
-        self.edges()
-            .map(|(a, b)| distance_to_segment(p, a, b))
-            .fold(f64::INFINITY, f64::min)
+        self.edges().map(|(a, b)| distance_to_segment(p, a, b)).fold(f64::INFINITY, f64::min)
     }
 
     /// Classifies a point; within `tolerance` of an edge it is on the boundary.
@@ -129,8 +127,7 @@ impl Polygon {
     /// Even-odd rule; points on the boundary may fall either way.
     pub fn contains(&self, p: Point2) -> bool {
         self.edges().fold(false, |inside, (a, b)| {
-            let crosses =
-                (a.y > p.y) != (b.y > p.y) && p.x < (b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x;
+            let crosses = (a.y > p.y) != (b.y > p.y) && p.x < (b.x - a.x) * (p.y - a.y) / (b.y - a.y) + a.x;
             inside ^ crosses
         })
     }
@@ -150,11 +147,7 @@ impl Polygon {
             .collect();
         stations.extend([0.0, 1.0]);
         stations.sort_by(f64::total_cmp);
-        stations.windows(2).all(|s| {
-            [s[0], 0.5 * (s[0] + s[1]), s[1]]
-                .iter()
-                .all(|&t| on(a + direction * t))
-        })
+        stations.windows(2).all(|s| [s[0], 0.5 * (s[0] + s[1]), s[1]].iter().all(|&t| on(a + direction * t)))
     }
 }
 
@@ -162,40 +155,27 @@ impl Polygon {
 pub fn distance_to_segment(p: Point2, a: Point2, b: Point2) -> f64 {
     let d = b - a;
     let length2 = d.norm_squared();
-    let s = if length2 > 0.0 {
-        ((p - a).dot(&d) / length2).clamp(0.0, 1.0)
-    } else {
-        0.0
-    };
+    let s = if length2 > 0.0 { ((p - a).dot(&d) / length2).clamp(0.0, 1.0) } else { 0.0 };
     (p - a - d * s).norm()
 }
 
 /// Distance from `p` to a polyline.
 pub fn distance_to_polyline(p: Point2, polyline: &[Point2]) -> f64 {
-    polyline
-        .windows(2)
-        .map(|s| distance_to_segment(p, s[0], s[1]))
-        .fold(f64::INFINITY, f64::min)
+    polyline.windows(2).map(|s| distance_to_segment(p, s[0], s[1])).fold(f64::INFINITY, f64::min)
 }
 
 /// Signed area of a closed loop of vertices (positive when counter-clockwise).
 pub fn signed_area(vertices: &[Point2]) -> f64 {
     let n = vertices.len();
     // Relative to the first vertex: cells far from the origin keep their digits.
-    (1..n.saturating_sub(1))
-        .map(|i| 0.5 * cross(vertices[i] - vertices[0], vertices[i + 1] - vertices[0]))
-        .sum()
+    (1..n.saturating_sub(1)).map(|i| 0.5 * cross(vertices[i] - vertices[0], vertices[i + 1] - vertices[0])).sum()
 }
 
 /// Lower left and upper right corner of the bounding box of some points.
 pub fn bounds(points: &[Point2]) -> (Point2, Point2) {
-    points.iter().fold(
-        (
-            Point2::repeat(f64::INFINITY),
-            Point2::repeat(f64::NEG_INFINITY),
-        ),
-        |(low, high), p| (low.inf(p), high.sup(p)),
-    )
+    points.iter().fold((Point2::repeat(f64::INFINITY), Point2::repeat(f64::NEG_INFINITY)), |(low, high), p| {
+        (low.inf(p), high.sup(p))
+    })
 }
 
 fn extent(points: &[Point2]) -> f64 {
@@ -220,11 +200,8 @@ fn first_crossing(v: &[Point2], tolerance: f64) -> Option<(usize, usize)> {
             let (first, second) = (i.min(j), i.max(j));
             let neighbours = second == first + 1 || (first == 0 && second == n - 1);
             let meet = if neighbours {
-                let (shared, p, q) = if second == first + 1 {
-                    (v[second], v[first], end(second))
-                } else {
-                    (v[0], v[n - 1], end(0))
-                };
+                let (shared, p, q) =
+                    if second == first + 1 { (v[second], v[first], end(second)) } else { (v[0], v[n - 1], end(0)) };
                 let (a, b) = (p - shared, q - shared);
                 a.dot(&b) > 0.0 && cross(a, b).abs() <= 1e-12 * a.norm() * b.norm()
             } else {
@@ -339,15 +316,7 @@ mod tests {
 
     #[test]
     fn location_and_boundary_segments() {
-        let l = polygon(&[
-            [0.0, 0.0],
-            [2.0, 0.0],
-            [2.0, 1.0],
-            [1.0, 1.0],
-            [1.0, 2.0],
-            [0.0, 2.0],
-        ])
-        .unwrap();
+        let l = polygon(&[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]]).unwrap();
         assert_eq!(l.locate(Point2::new(0.5, 0.5), 1e-9), Location::Inside);
         assert_eq!(l.locate(Point2::new(1.5, 1.5), 1e-9), Location::Outside);
         assert_eq!(l.locate(Point2::new(1.0, 1.5), 1e-9), Location::OnBoundary);
@@ -357,21 +326,11 @@ mod tests {
 
     #[test]
     fn overlap_with_a_non_convex_polygon_is_exact() {
-        let u = polygon(&[
-            [0.0, 0.0],
-            [3.0, 0.0],
-            [3.0, 2.0],
-            [2.0, 2.0],
-            [2.0, 1.0],
-            [1.0, 1.0],
-            [1.0, 2.0],
-            [0.0, 2.0],
-        ])
-        .unwrap();
-        let window: Vec<Point2> = [[0.5, 0.5], [2.5, 0.5], [2.5, 1.5], [0.5, 1.5]]
-            .iter()
-            .map(|p| Point2::new(p[0], p[1]))
-            .collect();
+        let u =
+            polygon(&[[0.0, 0.0], [3.0, 0.0], [3.0, 2.0], [2.0, 2.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]])
+                .unwrap();
+        let window: Vec<Point2> =
+            [[0.5, 0.5], [2.5, 0.5], [2.5, 1.5], [0.5, 1.5]].iter().map(|p| Point2::new(p[0], p[1])).collect();
         assert!((overlap_area(&u, &window) - 1.5).abs() < 1e-14);
     }
 }

@@ -15,10 +15,8 @@ use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// The bundled scenes: name and text.
-pub const BUNDLED: [(&str, &str); 2] = [
-    ("paper", include_str!("../../scenes/paper.toml")),
-    ("paper-hull", include_str!("../../scenes/paper-hull.toml")),
-];
+pub const BUNDLED: [(&str, &str); 2] =
+    [("paper", include_str!("../../scenes/paper.toml")), ("paper-hull", include_str!("../../scenes/paper-hull.toml"))];
 
 /// A validated scene.
 #[derive(Debug, Clone)]
@@ -77,11 +75,7 @@ impl Needle {
     /// Unit vector orthogonal to the axis: the axis turned by 90°, signed so that its larger component is positive.
     pub fn orthogonal(&self) -> Point2 {
         let turned = Point2::new(-self.axis.y, self.axis.x);
-        let larger = if turned.x.abs() >= turned.y.abs() {
-            turned.x
-        } else {
-            turned.y
-        };
+        let larger = if turned.x.abs() >= turned.y.abs() { turned.x } else { turned.y };
         // Adding zero turns a negative zero into a positive one: reports show it.
         (turned * larger.signum()).map(|v| v + 0.0)
     }
@@ -158,17 +152,10 @@ impl Scene {
         }
         let bytes = std::fs::read(path).map_err(|error| {
             let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
-            error::Source {
-                file: &file,
-                text: "",
-            }
-            .error(
+            error::Source { file: &file, text: "" }.error(
                 0..0,
                 format!("cannot read the scene: {error}"),
-                format!(
-                    "give the path of a scene file, or one of the bundled scenes: {}",
-                    known.join(", ")
-                ),
+                format!("give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
             )
         })?;
         match String::from_utf8(bytes) {
@@ -202,19 +189,12 @@ impl Scene {
     /// The same scene in homogeneous tissue.
     #[must_use]
     pub fn without_inclusions(&self) -> Self {
-        Self {
-            inclusions: Vec::new(),
-            ..self.clone()
-        }
+        Self { inclusions: Vec::new(), ..self.clone() }
     }
 
     /// The label of the tissue, as reports and tables carry it.
     pub fn tissue(&self) -> &'static str {
-        if self.inclusions.is_empty() {
-            "homogeneous"
-        } else {
-            "inclusion"
-        }
+        if self.inclusions.is_empty() { "homogeneous" } else { "inclusion" }
     }
 
     /// SHA-256 over everything that the model's numbers depend on, with the discretization.

@@ -9,9 +9,7 @@ use std::ops::Range;
 /// A value together with where it stands in the file, so that an error can point at it.
 #[derive(Debug, Clone, Deserialize)]
 #[serde(transparent)]
-pub struct Located<T: serde::de::DeserializeOwned>(
-    #[serde(deserialize_with = "deserialize_spanned")] toml::Spanned<T>,
-);
+pub struct Located<T: serde::de::DeserializeOwned>(#[serde(deserialize_with = "deserialize_spanned")] toml::Spanned<T>);
 
 fn deserialize_spanned<'de, D, T>(deserializer: D) -> Result<toml::Spanned<T>, D::Error>
 where
@@ -107,10 +105,7 @@ fn one() -> String {
 
 impl Default for UnitsSection {
     fn default() -> Self {
-        Self {
-            length: one(),
-            stress: one(),
-        }
+        Self { length: one(), stress: one() }
     }
 }
 
@@ -240,9 +235,7 @@ pub struct ActuatorSection {
 }
 
 /// Integration rules of the weak form, and finite-element baselines.
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 #[value(rename_all = "kebab-case")]
 pub enum Integration {
@@ -261,19 +254,7 @@ pub enum Integration {
 }
 
 /// Monomials that the shape functions reproduce exactly.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Default,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Basis {
     /// 1, x, y.
@@ -284,19 +265,7 @@ pub enum Basis {
 }
 
 /// How essential boundary conditions are imposed.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Default,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Essential {
     /// Nodal values are held exactly (the paper's transformation method).

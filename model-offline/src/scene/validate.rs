@@ -3,8 +3,7 @@
 use super::error::{SceneError, Source};
 use super::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
 use super::schema::{
-    DiscretizationSection, InclusionSection, Integration, Located, MaterialModel, MaterialSection,
-    SceneFile,
+    DiscretizationSection, InclusionSection, Integration, Located, MaterialModel, MaterialSection, SceneFile,
 };
 use super::{Actuator, Discretization, Inclusion, Needle, Paddle, Resolution, Scene};
 use crate::mechanics::{FungTensors, Material, MaterialError};
@@ -32,11 +31,7 @@ pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
             "see `model-offline schema` for every key, its type and its meaning",
         )
     })?;
-    Validator {
-        source,
-        file: &file,
-    }
-    .scene()
+    Validator { source, file: &file }.scene()
 }
 
 struct Validator<'a> {
@@ -50,10 +45,7 @@ impl Validator<'_> {
         if *file.scene.dimension.get() != 2 {
             return Err(self.error(
                 file.scene.dimension.span(),
-                format!(
-                    "dimension {} is not available from a scene file",
-                    file.scene.dimension.get()
-                ),
+                format!("dimension {} is not available from a scene file", file.scene.dimension.get()),
                 "use dimension = 2 (plane strain)",
             ));
         }
@@ -61,18 +53,10 @@ impl Validator<'_> {
         let tolerance = 1e-9 * outline.size();
         let immobile = self.immobile(&outline, tolerance)?;
         let needle = self.needle(&outline, &immobile, tolerance)?;
-        let target = self.point(
-            file.target.position.get(),
-            file.target.position.span(),
-            "target",
-        )?;
+        let target = self.point(file.target.position.get(), file.target.position.span(), "target")?;
         self.target(target, &outline, &immobile, &needle, tolerance)?;
         let paddles = self.paddles(&outline, &immobile, &needle, tolerance)?;
-        let inclusions = file
-            .inclusion
-            .iter()
-            .map(|i| self.inclusion(i, &outline))
-            .collect::<Checked<_>>()?;
+        let inclusions = file.inclusion.iter().map(|i| self.inclusion(i, &outline)).collect::<Checked<_>>()?;
         Ok(Scene {
             name: file.scene.name.clone(),
             length_unit: file.scene.units.length.clone(),
@@ -89,12 +73,7 @@ impl Validator<'_> {
         })
     }
 
-    fn error(
-        &self,
-        span: Range<usize>,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) -> SceneError {
+    fn error(&self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> SceneError {
         self.source.error(span, message, help)
     }
 
@@ -102,20 +81,13 @@ impl Validator<'_> {
         if p.iter().all(|v| v.is_finite()) {
             Ok(Point2::new(p[0], p[1]))
         } else {
-            Err(self.error(
-                span,
-                format!("{what}: coordinates must be finite numbers"),
-                "replace nan and inf",
-            ))
+            Err(self.error(span, format!("{what}: coordinates must be finite numbers"), "replace nan and inf"))
         }
     }
 
     fn path(&self, points: &Located<Vec<[f64; 2]>>, what: &str) -> Checked<Vec<Point2>> {
-        let path: Vec<Point2> = points
-            .get()
-            .iter()
-            .map(|p| self.point(p, points.span(), what))
-            .collect::<Checked<_>>()?;
+        let path: Vec<Point2> =
+            points.get().iter().map(|p| self.point(p, points.span(), what)).collect::<Checked<_>>()?;
         if path.len() < 2 || path.windows(2).any(|s| s[0] == s[1]) {
             return Err(self.error(
                 points.span(),
@@ -135,11 +107,7 @@ impl Validator<'_> {
                 "simplify the polygon: details far below the node spacing change nothing",
             ));
         }
-        let vertices = points
-            .get()
-            .iter()
-            .map(|p| self.point(p, points.span(), what))
-            .collect::<Checked<_>>()?;
+        let vertices = points.get().iter().map(|p| self.point(p, points.span(), what)).collect::<Checked<_>>()?;
         Polygon::new(vertices).map_err(|error| {
             self.error(
                 points.span(),
@@ -154,11 +122,7 @@ impl Validator<'_> {
         if v.is_finite() && v > 0.0 {
             Ok(v)
         } else {
-            Err(self.error(
-                value.span(),
-                format!("{what} is {v}"),
-                format!("{what} must be a positive finite number"),
-            ))
+            Err(self.error(value.span(), format!("{what} is {v}"), format!("{what} must be a positive finite number")))
         }
     }
 
@@ -188,12 +152,7 @@ impl Validator<'_> {
             .collect()
     }
 
-    fn needle(
-        &self,
-        outline: &Polygon,
-        immobile: &[Vec<Point2>],
-        tolerance: f64,
-    ) -> Checked<Needle> {
+    fn needle(&self, outline: &Polygon, immobile: &[Vec<Point2>], tolerance: f64) -> Checked<Needle> {
         let section = &self.file.needle;
         let contact = self.path(&section.contact, "needle contact")?;
         let inside = |p: &Point2| outline.locate(*p, tolerance) != Location::Outside;
@@ -204,10 +163,7 @@ impl Validator<'_> {
                 "the contact is tissue that moves with the needle: put it on the boundary or inside",
             ));
         }
-        if contact
-            .windows(2)
-            .any(|s| polyline_near(immobile, s, tolerance))
-        {
+        if contact.windows(2).any(|s| polyline_near(immobile, s, tolerance)) {
             return Err(self.error(
                 section.contact.span(),
                 "the needle contact touches the immobile part",
@@ -216,11 +172,7 @@ impl Validator<'_> {
         }
         let axis = self.point(section.axis.get(), section.axis.span(), "needle axis")?;
         if axis.norm() < 1e-12 {
-            return Err(self.error(
-                section.axis.span(),
-                "the needle axis has no direction",
-                "e.g. axis = [0.0, -1.0]",
-            ));
+            return Err(self.error(section.axis.span(), "the needle axis has no direction", "e.g. axis = [0.0, -1.0]"));
         }
         let increments = *section.increments.get();
         if !(1..=10_000).contains(&increments) {
@@ -234,19 +186,11 @@ impl Validator<'_> {
         if depth > outline.size() {
             return Err(self.error(
                 section.depth.span(),
-                format!(
-                    "depth {depth} is larger than the whole body ({:.4})",
-                    outline.size()
-                ),
+                format!("depth {depth} is larger than the whole body ({:.4})", outline.size()),
                 "check the units of the depth",
             ));
         }
-        Ok(Needle {
-            contact,
-            axis: axis.normalize(),
-            depth,
-            increments,
-        })
+        Ok(Needle { contact, axis: axis.normalize(), depth, increments })
     }
 
     fn target(
@@ -259,16 +203,9 @@ impl Validator<'_> {
     ) -> Checked<()> {
         let span = self.file.target.position.span();
         if outline.locate(target, tolerance) == Location::Outside {
-            return Err(self.error(
-                span,
-                "the target is outside the outline",
-                "move the target into the body",
-            ));
+            return Err(self.error(span, "the target is outside the outline", "move the target into the body"));
         }
-        if immobile
-            .iter()
-            .any(|path| distance_to_polyline(target, path) <= tolerance)
-        {
+        if immobile.iter().any(|path| distance_to_polyline(target, path) <= tolerance) {
             return Err(self.error(
                 span,
                 "the target is on the immobile part, so it cannot move",
@@ -304,24 +241,13 @@ impl Validator<'_> {
             let section = located.get();
             let span = section.segment.span();
             let [a, b] = section.segment.get();
-            let segment = [
-                self.point(a, span.clone(), "paddle")?,
-                self.point(b, span.clone(), "paddle")?,
-            ];
+            let segment = [self.point(a, span.clone(), "paddle")?, self.point(b, span.clone(), "paddle")?];
             let name = format!("paddle {}", section.index);
             if paddles.iter().any(|p| p.index == section.index) {
-                return Err(self.error(
-                    located.span(),
-                    format!("{name} is given twice"),
-                    "number the paddles",
-                ));
+                return Err(self.error(located.span(), format!("{name} is given twice"), "number the paddles"));
             }
             if (segment[1] - segment[0]).norm() <= tolerance {
-                return Err(self.error(
-                    span,
-                    format!("{name} has no length"),
-                    "give two different end points",
-                ));
+                return Err(self.error(span, format!("{name} has no length"), "give two different end points"));
             }
             if !outline.segment_on_boundary(segment[0], segment[1], tolerance) {
                 return Err(self.error(
@@ -337,30 +263,19 @@ impl Validator<'_> {
                     "a paddle must be on boundary that can move, and may not touch the immobile part",
                 ));
             }
-            if needle
-                .contact
-                .windows(2)
-                .any(|s| touch(s, &segment, tolerance))
-            {
+            if needle.contact.windows(2).any(|s| touch(s, &segment, tolerance)) {
                 return Err(self.error(
                     span,
                     format!("{name} touches the needle contact"),
                     "tissue cannot follow both: move the paddle or the contact",
                 ));
             }
-            paddles.push(Paddle {
-                index: section.index,
-                segment,
-            });
+            paddles.push(Paddle { index: section.index, segment });
         }
         Ok(paddles)
     }
 
-    fn inclusion(
-        &self,
-        located: &Located<InclusionSection>,
-        outline: &Polygon,
-    ) -> Checked<Inclusion> {
+    fn inclusion(&self, located: &Located<InclusionSection>, outline: &Polygon) -> Checked<Inclusion> {
         let section = located.get();
         let region = self.polygon(&section.outline, "inclusion")?;
         if overlap(&region, outline) <= 1e-12 * region.area().min(outline.area()) {
@@ -373,11 +288,7 @@ impl Validator<'_> {
         Ok(Inclusion {
             outline: region,
             stiffness: self.positive(&section.stiffness, "stiffness")?,
-            material: section
-                .material
-                .as_ref()
-                .map(|m| self.material(m))
-                .transpose()?,
+            material: section.material.as_ref().map(|m| self.material(m)).transpose()?,
         })
     }
 
@@ -385,18 +296,12 @@ impl Validator<'_> {
         let m = located.get();
         let fail = |message: String, help: &str| self.error(located.span(), message, help);
         let required = |value: Option<f64>, name: &str| {
-            value.ok_or_else(|| {
-                fail(
-                    format!("material: {name} is missing"),
-                    "give every modulus of the law",
-                )
-            })
+            value.ok_or_else(|| fail(format!("material: {name} is missing"), "give every modulus of the law"))
         };
         let unused = |keys: &[(&str, bool)]| match keys.iter().find(|k| k.1) {
-            Some((key, _)) => Err(fail(
-                format!("material: {key} has no meaning for this law"),
-                "remove it, or choose another model",
-            )),
+            Some((key, _)) => {
+                Err(fail(format!("material: {key} has no meaning for this law"), "remove it, or choose another model"))
+            }
             None => Ok(()),
         };
         let exponential = [
@@ -416,8 +321,7 @@ impl Validator<'_> {
                 ])?;
                 let none = Vec::new();
                 let c_entries = m.c_tensor.as_ref().unwrap_or(&none);
-                FungTensors::from_entries(a, c_entries, m.c.unwrap_or(0.0))
-                    .and_then(Material::fung_general)
+                FungTensors::from_entries(a, c_entries, m.c.unwrap_or(0.0)).and_then(Material::fung_general)
             }
             (MaterialModel::Fung, None) => {
                 unused(&[("C without A", m.c_tensor.is_some())])?;
@@ -427,20 +331,11 @@ impl Validator<'_> {
                 } else {
                     (required(m.lambda_c, "lambda_c")?, required(m.mu_c, "mu_c")?)
                 };
-                Material::fung(
-                    required(m.lambda, "lambda")?,
-                    required(m.mu, "mu")?,
-                    c,
-                    lambda_c,
-                    mu_c,
-                )
+                Material::fung(required(m.lambda, "lambda")?, required(m.mu, "mu")?, c, lambda_c, mu_c)
             }
             (MaterialModel::SaintVenantKirchhoff, _) => {
                 unused(&exponential)?;
-                Material::saint_venant_kirchhoff(
-                    required(m.lambda, "lambda")?,
-                    required(m.mu, "mu")?,
-                )
+                Material::saint_venant_kirchhoff(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
             }
             (MaterialModel::NeoHookean, _) => {
                 unused(&exponential)?;
@@ -452,10 +347,7 @@ impl Validator<'_> {
             }
         };
         let refuse = |error: MaterialError| {
-            fail(
-                format!("material: {error}"),
-                "the law must be stable at rest: moduli finite, mu > 0, lambda + mu > 0",
-            )
+            fail(format!("material: {error}"), "the law must be stable at rest: moduli finite, mu > 0, lambda + mu > 0")
         };
         let material = built.map_err(refuse)?;
         match m.barrier {
@@ -467,26 +359,16 @@ impl Validator<'_> {
     fn actuator(&self, needle: &Needle) -> Checked<Actuator> {
         let section = &self.file.actuator;
         let or = |value: &Option<Located<f64>>, what: &str, default: f64| {
-            value
-                .as_ref()
-                .map_or(Ok(default), |v| self.positive(v, what))
+            value.as_ref().map_or(Ok(default), |v| self.positive(v, what))
         };
         Ok(Actuator {
             max_displacement: or(&section.max_displacement, "max_displacement", needle.depth)?,
             max_rate: or(&section.max_rate, "max_rate", needle.depth)?,
-            max_needle_speed: or(
-                &section.max_needle_speed,
-                "max_needle_speed",
-                2.0 * needle.depth,
-            )?,
+            max_needle_speed: or(&section.max_needle_speed, "max_needle_speed", 2.0 * needle.depth)?,
         })
     }
 
-    fn discretization(
-        &self,
-        located: &Located<DiscretizationSection>,
-        outline: &Polygon,
-    ) -> Checked<Discretization> {
+    fn discretization(&self, located: &Located<DiscretizationSection>, outline: &Polygon) -> Checked<Discretization> {
         let section = located.get();
         let resolution = match (&section.spacing, &section.tolerance) {
             (Some(_), Some(tolerance)) => {
@@ -505,22 +387,19 @@ impl Validator<'_> {
             }
             (Some(spacing), None) => {
                 let h = self.positive(spacing, "spacing")?;
-                check_spacing(h, outline)
-                    .map_err(|(message, help)| self.error(spacing.span(), message, help))?;
+                check_spacing(h, outline).map_err(|(message, help)| self.error(spacing.span(), message, help))?;
                 Resolution::Spacing(h)
             }
             (None, Some(tolerance)) => {
                 let t = self.positive(tolerance, "tolerance")?;
-                check_tolerance(t)
-                    .map_err(|(message, help)| self.error(tolerance.span(), message, help))?;
+                check_tolerance(t).map_err(|(message, help)| self.error(tolerance.span(), message, help))?;
                 Resolution::Tolerance(t)
             }
         };
         let support = match &section.support {
             Some(located) => {
                 let support = self.positive(located, "support")?;
-                check_support(support)
-                    .map_err(|(message, help)| self.error(located.span(), message, help))?;
+                check_support(support).map_err(|(message, help)| self.error(located.span(), message, help))?;
                 support
             }
             None => 2.0,
@@ -540,26 +419,18 @@ type Rule = Result<(), (String, String)>;
 /// Whether a spacing fits an outline: at least one node row, and not more nodes than memory is meant for.
 pub(crate) fn check_spacing(h: f64, outline: &Polygon) -> Rule {
     if !(h.is_finite() && h > 0.0) {
-        return Err((
-            format!("spacing is {h}"),
-            "spacing must be a positive finite number".to_owned(),
-        ));
+        return Err((format!("spacing is {h}"), "spacing must be a positive finite number".to_owned()));
     }
     if h > 0.5 * outline.size() {
         return Err((
-            format!(
-                "spacing {h} is too coarse for a body of size {:.4}",
-                outline.size()
-            ),
+            format!("spacing {h} is too coarse for a body of size {:.4}", outline.size()),
             "choose a spacing well below the size of the body".to_owned(),
         ));
     }
     let nodes = outline.area() / (h * h);
     if nodes > MAX_NODES {
         return Err((
-            format!(
-                "spacing {h} would give about {nodes:.1e} nodes, at most {MAX_NODES:.0e} are accepted"
-            ),
+            format!("spacing {h} would give about {nodes:.1e} nodes, at most {MAX_NODES:.0e} are accepted"),
             "choose a larger spacing, or a tolerance".to_owned(),
         ));
     }
@@ -571,10 +442,7 @@ pub(crate) fn check_tolerance(t: f64) -> Rule {
     if (1e-4..=0.5).contains(&t) {
         Ok(())
     } else {
-        Err((
-            format!("tolerance is {t}"),
-            "give a relative error between 0.0001 and 0.5".to_owned(),
-        ))
+        Err((format!("tolerance is {t}"), "give a relative error between 0.0001 and 0.5".to_owned()))
     }
 }
 
@@ -583,10 +451,7 @@ pub(crate) fn check_support(support: f64) -> Rule {
     if (1.0..=6.0).contains(&support) {
         Ok(())
     } else {
-        Err((
-            format!("support is {support}"),
-            "give a kernel support between 1 and 6 spacings; 2 is usual".to_owned(),
-        ))
+        Err((format!("support is {support}"), "give a kernel support between 1 and 6 spacings; 2 is usual".to_owned()))
     }
 }
 
@@ -607,16 +472,8 @@ fn overlap(a: &Polygon, b: &Polygon) -> f64 {
     (1..v.len() - 1)
         .map(|i| {
             let signed = super::geometry::cross(v[i] - v[0], v[i + 1] - v[0]);
-            let triangle = if signed >= 0.0 {
-                [v[0], v[i], v[i + 1]]
-            } else {
-                [v[0], v[i + 1], v[i]]
-            };
-            if signed == 0.0 {
-                0.0
-            } else {
-                signed.signum() * super::geometry::overlap_area(b, &triangle)
-            }
+            let triangle = if signed >= 0.0 { [v[0], v[i], v[i + 1]] } else { [v[0], v[i + 1], v[i]] };
+            if signed == 0.0 { 0.0 } else { signed.signum() * super::geometry::overlap_area(b, &triangle) }
         })
         .sum()
 }

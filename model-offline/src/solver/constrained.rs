@@ -34,10 +34,7 @@ pub struct HeldRows {
 impl HeldRows {
     /// One row per stencil.
     pub fn new<'a, const D: usize>(stencils: impl Iterator<Item = &'a Stencil<D>>) -> Self {
-        let mut rows = Self {
-            offsets: vec![0],
-            ..Self::default()
-        };
+        let mut rows = Self { offsets: vec![0], ..Self::default() };
         for stencil in stencils {
             rows.nodes.extend_from_slice(&stencil.nodes);
             rows.values.extend_from_slice(&stencil.values);
@@ -122,11 +119,7 @@ impl<const D: usize> ConstrainedSolver<D> {
         let mut positions = Vec::new();
         for nodes in held.node_lists() {
             for (column, &j) in nodes.iter().enumerate() {
-                let find = |&i: &u32| {
-                    pattern
-                        .block_position(i, j)
-                        .expect("the pattern covers the held rows") as u32
-                };
+                let find = |&i: &u32| pattern.block_position(i, j).expect("the pattern covers the held rows") as u32;
                 positions.extend(nodes[column..].iter().map(find));
             }
         }
@@ -135,15 +128,7 @@ impl<const D: usize> ConstrainedSolver<D> {
             weighted: vec![0.0; held.len() * D],
             violation: vec![0.0; held.len() * D],
         };
-        Self {
-            matrix: vec![0.0; pattern.entries()],
-            pattern,
-            cholesky,
-            held,
-            penalty: 0.0,
-            positions,
-            work,
-        }
+        Self { matrix: vec![0.0; pattern.entries()], pattern, cholesky, held, penalty: 0.0, positions, work }
     }
 
     /// The sparsity pattern.
@@ -174,10 +159,7 @@ impl<const D: usize> ConstrainedSolver<D> {
 
     fn mean_diagonal(&self) -> f64 {
         let n = self.pattern.unknowns();
-        (0..n)
-            .map(|u| self.matrix[self.pattern.diagonal_position(u)])
-            .sum::<f64>()
-            / n as f64
+        (0..n).map(|u| self.matrix[self.pattern.diagonal_position(u)]).sum::<f64>() / n as f64
     }
 
     /// Factorises the assembled tangent with the held rows' penalty. The penalty is fixed by the first call.
@@ -218,19 +200,8 @@ impl<const D: usize> ConstrainedSolver<D> {
 
     /// Solves `K x + Λᵀ μ = rhs`, `Λ x = gap` with the last factor. `mu` comes in as a first guess (zeros will do) and
     /// leaves as the multipliers; the constraint is met to `tolerance` (length units) or to rounding error.
-    pub fn solve(
-        &mut self,
-        rhs: &[f64],
-        gap: &[f64],
-        tolerance: f64,
-        x: &mut [f64],
-        mu: &mut [f64],
-    ) {
-        let Work {
-            solution,
-            weighted,
-            violation,
-        } = &mut self.work;
+    pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, x: &mut [f64], mu: &mut [f64]) {
+        let Work { solution, weighted, violation } = &mut self.work;
         // First round: K_ρ x = rhs + Λᵀ (ρ gap − μ).
         solution.copy_from_slice(rhs);
         for ((w, g), m) in weighted.iter_mut().zip(gap).zip(mu.iter()) {

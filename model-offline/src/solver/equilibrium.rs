@@ -136,9 +136,7 @@ impl<const D: usize> Equilibrium<D> {
         spacing: f64,
         settings: NewtonSettings,
     ) -> Result<Self, Failure> {
-        let lists = (0..rule.len())
-            .map(|q| rule.point(q).nodes)
-            .chain(held.node_lists());
+        let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(held.node_lists());
         let pattern = Pattern::new(D, nodes, lists);
         let scatter = Scatter::new(&rule, &pattern);
         let at = Snapshot {
@@ -164,8 +162,7 @@ impl<const D: usize> Equilibrium<D> {
             residuals: Vec::new(),
             effort: Effort::default(),
         };
-        body.evaluate()
-            .map_err(|_| body.failure(FailureReason::ElementInverted, 0.0, "at rest".into()))?;
+        body.evaluate().map_err(|_| body.failure(FailureReason::ElementInverted, 0.0, "at rest".into()))?;
         if !body.refactorise() {
             return Err(body.failure(
                 FailureReason::SingularTangent,
@@ -241,11 +238,7 @@ impl<const D: usize> Equilibrium<D> {
             let goal: Vec<f64> = if next >= 1.0 {
                 prescribed.to_vec()
             } else {
-                start
-                    .iter()
-                    .zip(prescribed)
-                    .map(|(a, b)| a + (b - a) * next)
-                    .collect()
+                start.iter().zip(prescribed).map(|(a, b)| a + (b - a) * next).collect()
             };
             let last = self.at.clone();
             match self.attempt(&goal) {
@@ -276,46 +269,28 @@ impl<const D: usize> Equilibrium<D> {
     /// [`Failure`] when the tangent at the current state is not positive definite.
     pub fn sensitivity(&mut self, rates: &[f64]) -> Result<Vec<f64>, Failure> {
         if !self.factor_is_current && !self.refactorise() {
-            return Err(self.failure(
-                FailureReason::LostStability,
-                1.0,
-                "tangent not positive definite".into(),
-            ));
+            return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
         }
         let n = self.at.coefficients.len();
         let (mut x, mut mu) = (vec![0.0; n], vec![0.0; rates.len()]);
-        self.solver
-            .solve(&vec![0.0; n], rates, 1e-14, &mut x, &mut mu);
+        self.solver.solve(&vec![0.0; n], rates, 1e-14, &mut x, &mut mu);
         Ok(x)
     }
 
     fn failure(&self, reason: FailureReason, reached: f64, detail: String) -> Failure {
-        Failure {
-            reason,
-            reached,
-            detail,
-        }
+        Failure { reason, reached, detail }
     }
 
     fn evaluate(&mut self) -> Result<(), Inverted> {
         let at = &mut self.at;
-        at.energy = assembly::internal_force(
-            &self.rule,
-            &self.tissue,
-            &at.coefficients,
-            &mut at.state,
-            &mut at.force,
-        )?;
+        at.energy = assembly::internal_force(&self.rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
         Ok(())
     }
 
     /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
     fn refactorise(&mut self) -> bool {
-        let (rule, tissue, state, scatter) =
-            (&self.rule, &self.tissue, &self.at.state, &self.scatter);
-        self.solver.assemble(|pattern, values| {
-            assembly::tangent(rule, tissue, state, pattern, scatter, values)
-        });
+        let (rule, tissue, state, scatter) = (&self.rule, &self.tissue, &self.at.state, &self.scatter);
+        self.solver.assemble(|pattern, values| assembly::tangent(rule, tissue, state, pattern, scatter, values));
         self.effort.factorisations += 1;
         self.factor_is_current = self.solver.factorise().is_ok();
         self.factor_exists |= self.factor_is_current;
@@ -351,15 +326,10 @@ impl<const D: usize> Equilibrium<D> {
             if !factor_usable {
                 indefinite = !self.refactorise();
                 if indefinite && !self.refactorise_shifted() {
-                    return Attempt::Failed(
-                        FailureReason::LostStability,
-                        "tangent indefinite, no shift helps".into(),
-                    );
+                    return Attempt::Failed(FailureReason::LostStability, "tangent indefinite, no shift helps".into());
                 }
             }
-            self.solver
-                .held()
-                .apply::<D>(&self.at.coefficients, &mut gap);
+            self.solver.held().apply::<D>(&self.at.coefficients, &mut gap);
             for (g, p) in gap.iter_mut().zip(prescribed) {
                 *g = p - *g;
             }
@@ -367,8 +337,7 @@ impl<const D: usize> Equilibrium<D> {
             for (r, f) in rhs.iter_mut().zip(&self.at.force) {
                 *r = -f;
             }
-            self.solver
-                .solve(&rhs, &gap, 1e-13 * self.spacing, &mut step, &mut mu);
+            self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, &mut step, &mut mu);
             self.effort.iterations += 1;
             let slope: f64 = step.iter().zip(&self.at.force).map(|(x, f)| x * f).sum();
             match self.search(&step, feasible.then_some(slope)) {
@@ -384,9 +353,7 @@ impl<const D: usize> Equilibrium<D> {
             self.residuals.push(residual);
             let linear = self.tissue.is_linear();
             if residual <= self.settings.residual_tolerance
-                && (linear
-                    || largest <= self.settings.step_tolerance * self.spacing
-                    || residual <= 1e-12)
+                && (linear || largest <= self.settings.step_tolerance * self.spacing || residual <= 1e-12)
             {
                 self.at.multipliers.copy_from_slice(&mu);
                 self.at.prescribed.copy_from_slice(prescribed);
@@ -424,11 +391,7 @@ impl<const D: usize> Equilibrium<D> {
         // Differences of energies below this are rounding.
         let noise = 1e-12 * (energy.abs() + self.smallest_force * self.spacing);
         let mut length = 1.0;
-        let shortest = if self.settings.line_search && slope.is_some() {
-            1.0 / 256.0
-        } else {
-            1.0
-        };
+        let shortest = if self.settings.line_search && slope.is_some() { 1.0 / 256.0 } else { 1.0 };
         loop {
             for ((d, s), x) in self.at.coefficients.iter_mut().zip(&start).zip(step) {
                 *d = s + length * x;
@@ -449,15 +412,11 @@ impl<const D: usize> Equilibrium<D> {
                 return Err(match outcome {
                     Err(inverted) => (
                         FailureReason::ElementInverted,
-                        format!(
-                            "det F = {:.3e} at integration point {}",
-                            inverted.det_f, inverted.point
-                        ),
+                        format!("det F = {:.3e} at integration point {}", inverted.det_f, inverted.point),
                     ),
-                    Ok(()) => (
-                        FailureReason::NotConverged,
-                        "no step along Newton's direction lowers the energy".into(),
-                    ),
+                    Ok(()) => {
+                        (FailureReason::NotConverged, "no step along Newton's direction lowers the energy".into())
+                    }
                 });
             }
         }

@@ -4,8 +4,7 @@
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering,
-    factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -23,11 +22,7 @@ pub struct Pattern {
 
 impl Pattern {
     /// The pattern of all pairs of nodes that share one of the given node lists (each ascending).
-    pub fn new<'a>(
-        dimension: usize,
-        nodes: usize,
-        lists: impl Iterator<Item = &'a [u32]> + Clone,
-    ) -> Self {
+    pub fn new<'a>(dimension: usize, nodes: usize, lists: impl Iterator<Item = &'a [u32]> + Clone) -> Self {
         let mut starts = vec![0_u32; nodes + 1];
         // Lists by their members, to gather the rows of one column after the other.
         for list in lists.clone() {
@@ -56,11 +51,7 @@ impl Pattern {
             rows.push(j as u32);
             seen[j] = j as u32;
             for &l in &members[starts[j] as usize..starts[j + 1] as usize] {
-                for &i in all[l as usize]
-                    .iter()
-                    .rev()
-                    .take_while(|&&i| i as usize > j)
-                {
+                for &i in all[l as usize].iter().rev().take_while(|&&i| i as usize > j) {
                     if seen[i as usize] != j as u32 {
                         seen[i as usize] = j as u32;
                         rows.push(i);
@@ -80,13 +71,7 @@ impl Pattern {
                 column_starts.push(row_indices.len() as u32);
             }
         }
-        Self {
-            dimension,
-            block_starts,
-            block_rows,
-            column_starts,
-            row_indices,
-        }
+        Self { dimension, block_starts, block_rows, column_starts, row_indices }
     }
 
     /// Number of unknowns.
@@ -101,8 +86,7 @@ impl Pattern {
 
     /// Index of the first entry of block (row node i, column node j), i ≥ j; `None` when it is not in the pattern.
     pub fn block_position(&self, i: u32, j: u32) -> Option<usize> {
-        let range =
-            self.block_starts[j as usize] as usize..self.block_starts[j as usize + 1] as usize;
+        let range = self.block_starts[j as usize] as usize..self.block_starts[j as usize + 1] as usize;
         let rank = self.block_rows[range].binary_search(&i).ok()?;
         Some(self.column_starts[j as usize * self.dimension] as usize + rank * self.dimension)
     }
@@ -142,9 +126,7 @@ pub struct SparseCholesky {
 
 impl std::fmt::Debug for SparseCholesky {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("SparseCholesky")
-            .field("factor_entries", &self.factor.len())
-            .finish_non_exhaustive()
+        f.debug_struct("SparseCholesky").field("factor_entries", &self.factor.len()).finish_non_exhaustive()
     }
 }
 
@@ -162,27 +144,16 @@ impl SparseCholesky {
         )
         .expect("memory for the symbolic factorisation");
         let factor = vec![0.0; symbolic.len_val()];
-        let workspace = MemBuffer::new(
-            symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-        );
+        let workspace = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()));
         let solve_workspace = MemBuffer::new(StackReq::EMPTY);
-        let mut analysed = Self {
-            symbolic,
-            factor,
-            workspace,
-            solve_workspace,
-            solve_columns: 0,
-        };
+        let mut analysed = Self { symbolic, factor, workspace, solve_workspace, solve_columns: 0 };
         analysed.reserve_columns(1);
         analysed
     }
 
     fn reserve_columns(&mut self, columns: usize) {
         if columns > self.solve_columns {
-            self.solve_workspace = MemBuffer::new(
-                self.symbolic
-                    .solve_in_place_scratch::<f64>(columns, Par::Seq),
-            );
+            self.solve_workspace = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq));
             self.solve_columns = columns;
         }
     }
@@ -196,11 +167,7 @@ impl SparseCholesky {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`]; the factor is then not usable.
-    pub fn factorise(
-        &mut self,
-        pattern: &Pattern,
-        values: &[f64],
-    ) -> Result<(), NotPositiveDefinite> {
+    pub fn factorise(&mut self, pattern: &Pattern, values: &[f64]) -> Result<(), NotPositiveDefinite> {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
         self.symbolic
             .factorize_numeric_llt(

@@ -33,10 +33,7 @@ fn round_trip_in_both_precisions() {
     assert_eq!(decode::<f64, 2>(&encoded(&table)).unwrap(), table);
     assert_eq!(decode::<f32, 2>(&encoded(&single)).unwrap(), single);
     let header = Header::read(&encoded(&single)).unwrap();
-    assert_eq!(
-        (header.scalar, header.dimension, header.paddle_dof),
-        (ScalarKind::F32, 2, 2)
-    );
+    assert_eq!((header.scalar, header.dimension, header.paddle_dof), (ScalarKind::F32, 2, 2));
     assert_eq!(header.scene_hash, table.scene_hash);
 }
 
@@ -78,10 +75,7 @@ fn a_flipped_payload_with_a_right_checksum_never_panics() {
 fn every_truncation_and_any_tail_is_refused() {
     let bytes = encoded(&test_support::table());
     for length in 0..bytes.len() {
-        assert!(
-            decode::<f64, 2>(&bytes[..length]).is_err(),
-            "length {length}"
-        );
+        assert!(decode::<f64, 2>(&bytes[..length]).is_err(), "length {length}");
     }
     let mut longer = bytes.clone();
     longer.push(0);
@@ -91,10 +85,7 @@ fn every_truncation_and_any_tail_is_refused() {
     let payload = u32::from_le_bytes(*padded[48..].first_chunk().unwrap());
     padded[48..52].copy_from_slice(&(payload + 1).to_le_bytes());
     padded.push(0);
-    assert_eq!(
-        refusal(&resealed(padded)),
-        TableError::PayloadTrailing { extra: 1 }
-    );
+    assert_eq!(refusal(&resealed(padded)), TableError::PayloadTrailing { extra: 1 });
 }
 
 #[test]
@@ -108,27 +99,9 @@ fn header_refusals_are_typed() {
     assert_eq!(with(0, b'X'), TableError::NotATable);
     assert_eq!(with(8, 9), TableError::FormatVersion { found: 9 });
     assert_eq!(with(10, 5), TableError::UnknownScalar { found: 5 });
-    assert_eq!(
-        with(10, 4),
-        TableError::ScalarKind {
-            found: "f32",
-            expected: "f64"
-        }
-    );
-    assert_eq!(
-        with(11, 3),
-        TableError::Dimension {
-            found: 3,
-            expected: 2
-        }
-    );
-    assert_eq!(
-        with(12, 4),
-        TableError::PaddleDof {
-            found: 4,
-            expected: 2
-        }
-    );
+    assert_eq!(with(10, 4), TableError::ScalarKind { found: "f32", expected: "f64" });
+    assert_eq!(with(11, 3), TableError::Dimension { found: 3, expected: 2 });
+    assert_eq!(with(12, 4), TableError::PaddleDof { found: 4, expected: 2 });
     assert_eq!(with(14, 1), TableError::Reserved);
     assert_eq!(refusal(&[]), TableError::TooShort { bytes: 0 });
     assert!(with(8, 9).to_string().contains("write the table again"));
@@ -141,9 +114,7 @@ fn invariant(change: impl FnOnce(&mut Table<f64, 2>)) -> TableError {
     let mut buffer = std::vec![0; MAX_TABLE_BYTES];
     let refused = encode(&table, &mut buffer).unwrap_err();
     // A writer that does not validate is caught by the reader.
-    let payload = postcard::to_slice(&table, &mut buffer[HEADER_BYTES..])
-        .unwrap()
-        .len();
+    let payload = postcard::to_slice(&table, &mut buffer[HEADER_BYTES..]).unwrap().len();
     let good = encoded(&test_support::table());
     let mut forged = good[..HEADER_BYTES].to_vec();
     forged[48..52].copy_from_slice(&(payload as u32).to_le_bytes());
@@ -161,42 +132,18 @@ fn invariants_are_checked_by_writer_and_reader() {
     assert_eq!(invariant(|t| t.knots.clear()), TooFewKnots { found: 0 });
     assert_eq!(invariant(|t| t.knots.swap(3, 4)), DepthOrder { knot: 4 });
     assert_eq!(invariant(|t| t.validity.depth_start = 0.01), DepthRange);
-    assert_eq!(
-        invariant(|t| t.orthogonal.x = 1.1),
-        NotUnit {
-            field: "orthogonal direction"
-        }
-    );
+    assert_eq!(invariant(|t| t.orthogonal.x = 1.1), NotUnit { field: "orthogonal direction" });
     assert_eq!(invariant(|t| t.needle_axis = t.orthogonal), NotOrthogonal);
-    assert_eq!(
-        invariant(|t| t.paddle.max_displacement = 1e-5),
-        PathBeyondLimit { knot: 1 }
-    );
-    assert_eq!(
-        invariant(|t| t.paddle.max_displacement = 1.0),
-        DisplacementRange
-    );
-    assert_eq!(
-        invariant(|t| t.paddle.max_rate = 0.0),
-        NotPositive {
-            field: "paddle rate limit"
-        }
-    );
+    assert_eq!(invariant(|t| t.paddle.max_displacement = 1e-5), PathBeyondLimit { knot: 1 });
+    assert_eq!(invariant(|t| t.paddle.max_displacement = 1.0), DisplacementRange);
+    assert_eq!(invariant(|t| t.paddle.max_rate = 0.0), NotPositive { field: "paddle rate limit" });
     assert_eq!(invariant(|t| t.gains.loop_gain = 1.5), Gains);
     assert_eq!(invariant(|t| t.gains.lambda_max = 0.5), Gains);
     let nan = invariant(|t| t.knots[5].jacobian.m12 = f64::NAN);
-    assert_eq!(
-        nan,
-        NotFinite {
-            field: "knot Jacobian"
-        }
-    );
+    assert_eq!(nan, NotFinite { field: "knot Jacobian" });
     for smallest in [0.0, 1e-12, 1e-6, 1e-4] {
         let jacobian = Matrix2::new(1.0, 0.0, 0.0, smallest);
-        assert_eq!(
-            invariant(|t| t.knots[2].jacobian = jacobian),
-            IllConditioned { knot: 2 }
-        );
+        assert_eq!(invariant(|t| t.knots[2].jacobian = jacobian), IllConditioned { knot: 2 });
     }
 }
 
@@ -206,9 +153,6 @@ fn a_small_buffer_is_an_error() {
     let length = encoded(&table).len();
     for bytes in 0..length {
         let mut buffer = std::vec![0; bytes];
-        assert_eq!(
-            encode(&table, &mut buffer),
-            Err(TableError::BufferTooSmall { bytes })
-        );
+        assert_eq!(encode(&table, &mut buffer), Err(TableError::BufferTooSmall { bytes }));
     }
 }

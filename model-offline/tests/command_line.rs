@@ -1,0 +1,183 @@
+//! The binary as a user runs it: results, bad scenes, exit codes, files whole or absent.
+
+use assert_cmd::Command;
+use std::path::{Path, PathBuf};
+
+fn model_offline() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_model-offline"))
+}
+
+fn scene(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name)
+}
+
+fn json(path: &Path) -> serde_json::Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// Table III and the static optima of the paper, and the controllability measures of an independent implementation
+/// on the inferred geometry (SCNI and DNI, spacing 0.1, support 2), which must be met within 0.5 %.
+#[test]
+fn place_reproduces_the_papers_optima_and_the_reference_measures() {
+    let reference: [(&str, &str, bool, [f64; 5]); 6] = [
+        ("paper.toml", "scni", false, [5.0875, 3.9765, 3.1535, 3.4679, 4.2817]),
+        ("paper.toml", "scni", true, [5.3496, 4.3531, 3.4680, 3.8749, 4.5870]),
+        ("paper.toml", "dni", false, [4.7005, 3.4937, 2.9602, 3.1399, 4.0325]),
+        ("paper.toml", "dni", true, [4.9280, 3.7897, 3.2687, 3.5115, 4.3500]),
+        ("paper-hull.toml", "scni", false, [5.1334, 3.9734, 3.1749, 3.5673, 4.3606]),
+        ("paper-hull.toml", "scni", true, [6.2333, 5.2037, 4.0257, 4.4317, 4.9358]),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("place.json");
+    for (file, integration, inclusion, measures) in reference {
+        let mut command = model_offline();
+        command.arg("place").arg(scene(file)).args(["--integration", integration, "--quiet", "--json"]).arg(&out);
+        if !inclusion {
+            command.arg("--without-inclusion");
+        }
+        command.assert().success();
+        let result = json(&out);
+        let expected = serde_json::json!({"static": if inclusion { 2 } else { 4 }, "dynamic": 3});
+        assert_eq!(result["optimum"], expected, "{file} {integration} {inclusion}");
+        for (paddle, measure) in result["paddles"].as_array().unwrap().iter().zip(measures) {
+            let ours = paddle["controllability_measure"].as_f64().unwrap();
+            assert!((ours / measure - 1.0).abs() < 0.005, "{file} {integration}: {ours} against {measure}");
+            assert!(paddle["static"]["failure"].is_null());
+        }
+    }
+}
+
+#[test]
+fn bad_scenes_give_one_error_with_file_line_and_column_and_write_nothing() {
+    let good = std::fs::read_to_string(scene("paper.toml")).unwrap();
+    let replaced = |from: &str, to: &str| {
+        assert!(good.contains(from), "{from}");
+        good.replacen(from, to, 1).into_bytes()
+    };
+    let cases: Vec<(&str, Vec<u8>, &str)> = vec![
+        ("unknown key", replaced("stiffness = 100.0", "stifness = 100.0"), "stifness"),
+        ("wrong type", replaced("spacing = 0.1", "spacing = \"fine\""), "invalid type"),
+        (
+            "crossing outline",
+            replaced("outline = [[0.5, 0.0], [1.0, 0.0], [1.0, 1.0]", "outline = [[0.5, 0.0], [1.0, 1.0], [1.0, 0.0]"),
+            "cross",
+        ),
+        ("target outside", replaced("position = [0.5, 0.5]", "position = [0.1, 0.1]"), "outside"),
+        ("paddle on the immobile part", replaced("[[0.0, 0.5], [0.0, 0.6]]", "[[1.0, 0.5], [1.0, 0.6]]"), "immobile"),
+        (
+            "paddle off the boundary",
+            replaced("[[0.0, 0.5], [0.0, 0.6]]", "[[0.1, 0.5], [0.1, 0.6]]"),
+            "off the boundary",
+        ),
+        ("both spacing and tolerance", replaced("spacing = 0.1", "spacing = 0.1\ntolerance = 0.01"), "both"),
+        ("neither", replaced("spacing = 0.1\n", ""), "neither"),
+        ("empty", Vec::new(), "empty"),
+        ("binary", vec![0x7f, b'E', b'L', b'F', 0xff, 0xfe, 0x00], "UTF-8"),
+        ("nan", replaced("depth = 0.1", "depth = nan"), "depth"),
+        ("nan in a point", replaced("[1.0, 0.0], [1.0, 1.0], [0.0", "[1.0, nan], [1.0, 1.0], [0.0"), "finite"),
+        (
+            "inclusion covers nothing",
+            replaced("[[0.55, 0.25]", "[[5.0, 5.0], [6.0, 5.0], [6.0, 6.0]]\n#"),
+            "covers nothing",
+        ),
+        ("unstable material", replaced("mu = 318.5", "mu = -318.5"), "stable"),
+        ("three dimensions", replaced("dimension = 2", "dimension = 3"), "dimension 3"),
+    ];
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, expected) in cases {
+        let path = folder.path().join("bad.toml");
+        std::fs::write(&path, text).unwrap();
+        let (out, table) = (folder.path().join("out.json"), folder.path().join("out.table"));
+        let output = model_offline()
+            .env("NO_COLOR", "1")
+            .arg("place")
+            .arg(&path)
+            .arg("--json")
+            .arg(&out)
+            .arg("--table")
+            .arg(&table)
+            .output()
+            .unwrap();
+        let stderr: String = String::from_utf8(output.stderr).unwrap().split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(output.status.code(), Some(2), "{name}: {stderr}");
+        assert!(stderr.contains(expected), "{name}: {stderr}");
+        let at = stderr.find("bad.toml:").unwrap_or_else(|| panic!("{name}: no position in {stderr}"));
+        let position: Vec<&str> = stderr[at + 9..].splitn(3, ':').collect();
+        assert!(position[0].parse::<u32>().is_ok() && position[1].parse::<u32>().is_ok(), "{name}: {stderr}");
+        assert!(!out.exists() && !table.exists(), "{name} wrote a file");
+    }
+}
+
+#[test]
+fn solve_writes_json_vtu_and_svg() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name);
+    model_offline()
+        .args([
+            "solve",
+            "paper",
+            "--paddle",
+            "3",
+            "--depth",
+            "0.05",
+            "--paddle-displacement",
+            "-0.001,0.002",
+            "--quiet",
+        ])
+        .arg("--json")
+        .arg(file("b.json"))
+        .arg("--vtu")
+        .arg(file("b.vtu"))
+        .arg("--svg")
+        .arg(file("b.svg"))
+        .assert()
+        .success();
+    let result = json(&file("b.json"));
+    assert_eq!(result["nodes"], 106);
+    assert!(result["target_displacement"][1].as_f64().unwrap() < -0.01);
+    let vtu = std::fs::read_to_string(file("b.vtu")).unwrap();
+    for name in ["displacement", "strain", "stress", "det_f"] {
+        assert!(vtu.contains(name), "{name}");
+    }
+    assert!(std::fs::read_to_string(file("b.svg")).unwrap().ends_with("</svg>\n"));
+}
+
+#[test]
+fn a_computation_that_fails_exits_1_with_the_reason_in_the_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("b.json");
+    model_offline().args(["solve", "paper", "--paddle", "3", "--depth", "0.6", "--json"]).arg(&out).assert().code(1);
+    let reason = json(&out)["failure"]["reason"].as_str().unwrap().to_owned();
+    assert!(["lost-stability", "element-inverted", "not-converged"].contains(&reason.as_str()), "{reason}");
+    assert!(json(&out)["failure"]["detail"].as_str().unwrap().contains("last converged state at depth"));
+}
+
+#[test]
+fn tables_are_written_inspected_and_refused_when_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.table");
+    model_offline().args(["table", "paper", "--quiet", "-o"]).arg(&path).assert().success();
+    let contents = folder.path().join("p.json");
+    model_offline().arg("inspect").arg(&path).arg("--json").arg(&contents).assert().success();
+    assert_eq!(json(&contents)["paddle"]["index"], 3);
+    let mut bytes = std::fs::read(&path).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    std::fs::write(&path, &bytes).unwrap();
+    model_offline().arg("inspect").arg(&path).assert().code(2);
+    model_offline().arg("inspect").arg(folder.path().join("absent")).assert().code(2);
+    model_offline().args(["table", "paper", "--paddle", "9", "-o"]).arg(&path).assert().code(2);
+}
+
+#[test]
+fn usage_errors_exit_2() {
+    model_offline().args(["place"]).assert().code(2);
+    model_offline().args(["place", "paper", "--spacing", "-1"]).assert().code(2);
+    model_offline().args(["place", "paper", "--spacing", "nan"]).assert().code(2);
+    model_offline().args(["place", "paper", "--spacing", "1e-9"]).assert().code(2);
+    model_offline().args(["place", "paper", "--support", "0.2"]).assert().code(2);
+    model_offline().args(["place", "paper", "--spacing", "0.1", "--tolerance", "0.1"]).assert().code(2);
+    model_offline().args(["place", "no-such-scene.toml"]).assert().code(2);
+    model_offline().args(["solve", "paper", "--paddle", "3", "--depth", "nan"]).assert().code(2);
+    model_offline().args(["schema"]).assert().success();
+}
