@@ -1,0 +1,87 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+use crate::by_hand::{PlantArgs, plant};
+use crate::controller::{ControllerArgs, serve};
+use crate::error::SimError;
+use crate::run::{RunArgs, run};
+use crate::timing::{TimingArgs, timing};
+use crate::{output, replay};
+
+/// Simulates needle insertions with a paddle that holds the target still. Without a command: `run` on the paper's scene
+#[derive(Debug, Parser)]
+#[command(version, about, args_conflicts_with_subcommands = true)]
+#[command(after_help = "Example: host-sim run --tissue inclusion --seed 7 --out my-report")]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Options of `run`.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Compares no paddle, the best static and the best dynamic paddle, and writes a report
+    #[command(
+        after_help = "Examples:\n  host-sim run\n  host-sim run --tissue inclusion --table-tissue homogeneous --noise 0\n  host-sim run --scene my.toml --mode free-run --rate 500 --json result.json"
+    )]
+    Run(Box<RunArgs>),
+    /// The controller's side of a link by hand
+    #[command(
+        after_help = "Example, in two terminals:\n  model-offline table paper -o paper.table && host-sim controller --table paper.table\n  host-sim plant --scene paper"
+    )]
+    Controller(ControllerArgs),
+    /// The plant's side of a link by hand
+    #[command(
+        after_help = "Example, in two terminals:\n  host-sim controller --table paper.table --mode free-run\n  host-sim plant --scene paper --mode free-run"
+    )]
+    Plant(Box<PlantArgs>),
+    /// Checks the fixed-rate loop against an empty one
+    #[command(after_help = "Example: host-sim timing --rate 1000 --seconds 10 --json timing.json")]
+    Timing(TimingArgs),
+    /// Runs the controller again on recorded inputs and compares bit by bit
+    #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
+    Replay {
+        /// Recording, as `run` writes it
+        recording: PathBuf,
+    },
+    /// Makes the report of a finished run again
+    #[command(after_help = "Example: host-sim report stillpoint-report")]
+    Report {
+        /// Directory of the run
+        directory: PathBuf,
+    },
+}
+
+/// Does what was asked for.
+///
+/// # Errors
+/// [`SimError`], with its exit code.
+pub fn execute(cli: Cli) -> Result<(), SimError> {
+    match cli.command {
+        None => run(&cli.run).map(drop),
+        Some(Command::Run(args)) => run(&args).map(drop),
+        Some(Command::Controller(args)) => serve(&args),
+        Some(Command::Plant(args)) => plant(&args),
+        Some(Command::Timing(args)) => timing(&args).map(drop),
+        Some(Command::Replay { recording }) => {
+            let replayed = replay::replay_file(&recording)?;
+            println!(
+                "{} of {} commands agree bit by bit ({}, seed {})",
+                replayed.ticks, replayed.ticks, replayed.mode, replayed.seed
+            );
+            Ok(())
+        }
+        Some(Command::Report { directory }) => {
+            output::rebuild_report(&directory)?;
+            println!("{}", directory.join("report.html").display());
+            Ok(())
+        }
+    }
+}

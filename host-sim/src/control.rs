@@ -1,0 +1,100 @@
+//! What plant and controller must agree on: rates, latency, noise. The same options on both command lines.
+
+use clap::Args;
+use firmware::Settings;
+
+use crate::error::SimError;
+
+/// Standard deviation of the target sensor when none is given, part of the insertion depth.
+pub const DEFAULT_NOISE_PER_DEPTH: f64 = 1e-4;
+
+/// Options of the loop.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
+pub struct LoopArgs {
+    /// Rate of the control loop, Hz
+    #[arg(long, default_value_t = 1000.0, value_name = "HZ")]
+    pub rate: f64,
+    /// Rate of the target sensor, Hz
+    #[arg(long, default_value_t = 50.0, value_name = "HZ")]
+    pub target_rate: f64,
+    /// Time from a measurement of the target to its arrival, ms
+    #[arg(long, default_value_t = 20.0, value_name = "MS")]
+    pub latency: f64,
+    /// Standard deviation of the target sensor per component, length [default: 1e-4 of the insertion depth]
+    #[arg(long, value_name = "LENGTH")]
+    pub noise: Option<f64>,
+}
+
+impl LoopArgs {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`SimError::Usage`] names the option.
+    pub fn check(&self) -> Result<(), SimError> {
+        positive("--rate", self.rate)?;
+        positive("--target-rate", self.target_rate)?;
+        not_negative("--latency", self.latency)?;
+        not_negative("--noise", self.noise.unwrap_or(0.0))
+    }
+
+    /// Period of the loop, ns.
+    pub fn period_ns(&self) -> u64 {
+        period_ns(self.rate)
+    }
+
+    /// Noise for an insertion to `depth`, length.
+    pub fn noise_for(&self, depth: f64) -> f64 {
+        self.noise.unwrap_or(DEFAULT_NOISE_PER_DEPTH * depth)
+    }
+
+    /// Settings of the controller for an insertion to `depth`.
+    pub fn settings(&self, depth: f64) -> Settings {
+        let latency_ns = (self.latency * 1e6).round() as u64;
+        Settings {
+            target_noise: self.noise_for(depth),
+            ..Settings::new(period_ns(self.rate), period_ns(self.target_rate), latency_ns)
+        }
+    }
+
+    /// The options as another process takes them. Rust prints the shortest decimal that reads back the same number.
+    pub fn to_arguments(self, depth: f64) -> [String; 8] {
+        [
+            "--rate".to_owned(),
+            self.rate.to_string(),
+            "--target-rate".to_owned(),
+            self.target_rate.to_string(),
+            "--latency".to_owned(),
+            self.latency.to_string(),
+            "--noise".to_owned(),
+            self.noise_for(depth).to_string(),
+        ]
+    }
+}
+
+fn period_ns(rate_hz: f64) -> u64 {
+    (1e9 / rate_hz).round() as u64
+}
+
+/// Refuses numbers that are not above 0.
+///
+/// # Errors
+/// [`SimError::Usage`] names the option.
+pub fn positive(option: &str, value: f64) -> Result<(), SimError> {
+    if value.is_finite() && value > 0.0 {
+        Ok(())
+    } else {
+        Err(SimError::Usage(format!("{option} must be above 0, not {value}")))
+    }
+}
+
+/// Refuses negative numbers, infinity and NaN.
+///
+/// # Errors
+/// [`SimError::Usage`] names the option.
+pub fn not_negative(option: &str, value: f64) -> Result<(), SimError> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(())
+    } else {
+        Err(SimError::Usage(format!("{option} must be 0 or above, not {value}")))
+    }
+}

@@ -1,0 +1,42 @@
+//! Tissue, sensors and actuators in a process of their own, exchanging samples with the controller over shared memory.
+//!
+//! ```text
+//! plant process                                    controller process
+//! plant → sensors → ─── needle, paddle, target ──→ firmware::Controller
+//!    ↑                  clock                             │
+//! actuator ←──────────── command ─────────────────────────┘
+//! ```
+//!
+//! Two modes of time, never mixed: in [`lockstep`] it comes from the messages, and the same seed gives the same bytes;
+//! in [`free_run`] both processes follow the machine's steady clock with absolute deadlines. Either way every tick is
+//! [recorded](recorder) and every sample accounted for ([`handover`]). [`run`] puts it together, [`result`] is what
+//! comes out.
+
+pub mod by_hand;
+pub mod bytes;
+pub mod child;
+pub mod cli;
+pub mod clock;
+pub mod control;
+pub mod controller;
+pub mod describe;
+pub mod error;
+pub mod free_run;
+pub mod handover;
+pub mod interrupt;
+pub mod link;
+pub mod lockstep;
+pub mod output;
+pub mod peer;
+pub mod plant;
+pub mod recorder;
+pub mod replay;
+pub mod report;
+pub mod result;
+pub mod run;
+pub mod sensors;
+pub mod statistics;
+pub mod strategy;
+pub mod summary;
+pub mod timing;
+pub mod world;

@@ -1,0 +1,82 @@
+//! What can go wrong with shared memory.
+
+use std::path::PathBuf;
+
+/// Failure of the link; says what to do where that is known.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LinkError {
+    /// The name cannot be part of a file name.
+    #[error("`{name}` cannot name a link: use 1 to {} letters, digits, `-` or `_`", super::space::LONGEST_NAME)]
+    Name {
+        /// The name.
+        name: String,
+    },
+    /// The directory for the link's files cannot be made.
+    #[error("cannot make the directory {} for shared memory: {source}", path.display())]
+    Directory {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The node, the process's own entry in shared memory, cannot be created.
+    #[error("cannot enter shared memory: {0}")]
+    Node(#[source] iceoryx2::node::NodeCreationFailure),
+    /// A service cannot be opened or created.
+    #[error("cannot open the service `{service}`: {source}")]
+    Service {
+        /// Name of the service.
+        service: &'static str,
+        /// Why.
+        source: iceoryx2::service::builder::publish_subscribe::PublishSubscribeOpenOrCreateError,
+    },
+    /// Somebody else already has the one place of this kind.
+    #[error("somebody else already {role} `{service}` on this link; end that process or choose another --link name")]
+    Taken {
+        /// Name of the service.
+        service: &'static str,
+        /// `publishes` or `reads`.
+        role: &'static str,
+    },
+    /// A publisher cannot be created.
+    #[error("cannot publish `{service}`: {source}")]
+    Publisher {
+        /// Name of the service.
+        service: &'static str,
+        /// Why.
+        source: iceoryx2::port::publisher::PublisherCreateError,
+    },
+    /// A subscriber cannot be created.
+    #[error("cannot read `{service}`: {source}")]
+    Subscriber {
+        /// Name of the service.
+        service: &'static str,
+        /// Why.
+        source: iceoryx2::port::subscriber::SubscriberCreateError,
+    },
+    /// Connections to new peers cannot be made.
+    #[error("cannot connect `{service}` to its reader: {source}")]
+    Connect {
+        /// Name of the service.
+        service: &'static str,
+        /// Why.
+        source: iceoryx2::port::update_connections::ConnectionFailure,
+    },
+    /// A frame did not leave.
+    #[error("cannot send on `{service}`: {source}")]
+    Send {
+        /// Name of the service.
+        service: &'static str,
+        /// Why.
+        source: iceoryx2::port::SendError,
+    },
+    /// A frame cannot be read.
+    #[error("cannot receive on `{service}`: {source}")]
+    Receive {
+        /// Name of the service.
+        service: &'static str,
+        /// Why.
+        source: iceoryx2::port::ReceiveError,
+    },
+}

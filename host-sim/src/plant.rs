@@ -1,0 +1,202 @@
+//! What is out there: tissue, needle and paddle, solved anew at every step with the full nonlinear model.
+
+use std::collections::VecDeque;
+
+use model_offline::placement::{Body, TissueModel};
+use model_offline::solver::equilibrium::NewtonSettings;
+use nalgebra::Vector2;
+
+use crate::error::SimError;
+
+/// Start and stop of the needle take this long, s: no needle drive starts with a jump in speed.
+const RAMP_S: f64 = 0.1;
+
+/// Newton's method for small steps from a converged state: the last factor nearly always does. What the plant's error
+/// is compared with is 1e-5 of the target's motion; a residual of 1e-7 is far below it.
+const STEP_SETTINGS: NewtonSettings = NewtonSettings {
+    residual_tolerance: 1e-7,
+    step_tolerance: 1e-6,
+    max_iterations: 25,
+    max_cutbacks: 8,
+    line_search: true,
+    require_stability: false,
+    reuse_tangent: true,
+};
+
+/// The needle's way in: constant speed between two short ramps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trajectory {
+    depth: f64,
+    insertion_s: f64,
+    ramp_s: f64,
+}
+
+impl Trajectory {
+    /// To `depth` (length) in `insertion_s` seconds.
+    pub fn new(depth: f64, insertion_s: f64) -> Self {
+        Self { depth, insertion_s, ramp_s: RAMP_S.min(0.25 * insertion_s) }
+    }
+
+    /// Depth, length, and velocity, length/s, a time after the start, s (negative: not started).
+    pub fn at(&self, time_s: f64) -> (f64, f64) {
+        let (total, ramp) = (self.insertion_s, self.ramp_s);
+        let speed = self.depth / (total - ramp);
+        if time_s <= 0.0 {
+            (0.0, 0.0)
+        } else if time_s < ramp {
+            (0.5 * speed * time_s * time_s / ramp, speed * time_s / ramp)
+        } else if time_s < total - ramp {
+            (speed * (time_s - 0.5 * ramp), speed)
+        } else if time_s < total {
+            let left = total - time_s;
+            (self.depth - 0.5 * speed * left * left / ramp, speed * left / ramp)
+        } else {
+            (self.depth, 0.0)
+        }
+    }
+}
+
+/// How the paddle's actuator follows commands. The default is a servo that is there within one tick, at its rate limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ActuatorModel {
+    /// Largest speed, length/s.
+    pub max_rate: f64,
+    /// Time constant of a first-order lag, s; 0: none.
+    pub lag_s: f64,
+    /// Ticks that a command waits before it acts.
+    pub delay_ticks: u32,
+    /// Part of the commanded displacement that is reached.
+    pub gain: f64,
+}
+
+/// The paddle with its actuator.
+#[derive(Clone, Debug)]
+pub struct Paddle {
+    model: ActuatorModel,
+    waiting: VecDeque<Vector2<f64>>,
+    goal: Vector2<f64>,
+    position: Vector2<f64>,
+}
+
+impl Paddle {
+    /// A paddle at rest where it touches the undeformed tissue.
+    pub fn new(model: ActuatorModel) -> Self {
+        Self { model, waiting: VecDeque::new(), goal: Vector2::zeros(), position: Vector2::zeros() }
+    }
+
+    /// Displacement now, length.
+    pub fn position(&self) -> Vector2<f64> {
+        self.position
+    }
+
+    /// `elapsed_s` pass with this command, or without one (the last goal stays).
+    pub fn advance(&mut self, command: Option<Vector2<f64>>, elapsed_s: f64) {
+        self.waiting.push_back(command.unwrap_or(*self.waiting.back().unwrap_or(&self.goal)));
+        while self.waiting.len() > self.model.delay_ticks as usize {
+            let Some(goal) = self.waiting.pop_front() else {
+                break;
+            };
+            self.goal = goal;
+        }
+        let approached = if self.model.lag_s > 0.0 { 1.0 - (-elapsed_s / self.model.lag_s).exp() } else { 1.0 };
+        let way = self.goal * self.model.gain - self.position;
+        let step = way * approached;
+        let longest = self.model.max_rate * elapsed_s;
+        // A command that keeps to the same limit arrives, whatever the rounding of its length.
+        self.position += if step.norm() > longest * (1.0 + 1e-9) { step * (longest / step.norm()) } else { step };
+    }
+}
+
+/// Tissue with needle and perhaps a paddle.
+#[derive(Debug)]
+pub struct Plant<'m> {
+    model: &'m TissueModel,
+    body: Body<'m>,
+}
+
+impl<'m> Plant<'m> {
+    /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
+    ///
+    /// # Errors
+    /// [`SimError::Tissue`] when the body is not held.
+    pub fn new(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, SimError> {
+        let body = model.body(paddle, STEP_SETTINGS).map_err(|source| SimError::Tissue { depth: 0.0, source })?;
+        Ok(Self { model, body })
+    }
+
+    /// Takes needle and paddle to where they are now; returns the target displacement.
+    ///
+    /// # Errors
+    /// [`SimError::Tissue`] when there is no equilibrium.
+    pub fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, SimError> {
+        if depth != self.body.depth() || paddle != self.body.paddle() {
+            self.body.drive(depth, paddle).map_err(|source| SimError::Tissue { depth, source })?;
+        }
+        Ok(self.body.target_displacement())
+    }
+
+    /// Where the nodes are now.
+    pub fn deformed_nodes(&self) -> Vec<[f64; 2]> {
+        let displacements = self.model.nodal_displacements(self.body.equilibrium().coefficients()).unwrap_or_default();
+        self.model
+            .positions()
+            .iter()
+            .zip(displacements)
+            .map(|(rest, displacement)| [rest.x + displacement.x, rest.y + displacement.y])
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SERVO: ActuatorModel = ActuatorModel { max_rate: 0.1, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
+
+    #[test]
+    fn the_needle_arrives_without_jumps() {
+        let trajectory = Trajectory::new(0.1, 5.0);
+        assert_eq!(trajectory.at(-1.0), (0.0, 0.0));
+        assert_eq!(trajectory.at(5.0), (0.1, 0.0));
+        let step_s = 1e-3;
+        let mut before = trajectory.at(0.0);
+        for tick in 1..=5000 {
+            let now = trajectory.at(f64::from(tick) * step_s);
+            let mean = 0.5 * (now.1 + before.1);
+            assert!((now.0 - before.0 - mean * step_s).abs() < 1e-9, "velocity is the slope");
+            assert!((now.1 - before.1).abs() < 3e-4, "no jump of the velocity");
+            before = now;
+        }
+    }
+
+    #[test]
+    fn the_paddle_keeps_its_rate_limit() {
+        let mut paddle = Paddle::new(SERVO);
+        let goal = Vector2::new(0.03, 0.04);
+        for _ in 0..100 {
+            let before = paddle.position();
+            paddle.advance(Some(goal), 1e-3);
+            assert!((paddle.position() - before).norm() <= 1e-4 * (1.0 + 1e-9));
+        }
+        assert!((paddle.position().norm() - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn delay_lag_and_gain_act() {
+        let goal = Vector2::new(1e-5, 0.0);
+        let mut delayed = Paddle::new(ActuatorModel { delay_ticks: 2, ..SERVO });
+        delayed.advance(Some(goal), 1e-3);
+        delayed.advance(Some(goal), 1e-3);
+        assert_eq!(delayed.position(), Vector2::zeros());
+        delayed.advance(Some(goal), 1e-3);
+        assert_eq!(delayed.position(), goal);
+
+        let mut lagging = Paddle::new(ActuatorModel { lag_s: 1e-3, ..SERVO });
+        lagging.advance(Some(goal), 1e-3);
+        assert!((lagging.position().x / goal.x - (1.0 - (-1.0f64).exp())).abs() < 1e-12);
+
+        let mut weak = Paddle::new(ActuatorModel { gain: 0.5, ..SERVO });
+        weak.advance(Some(goal), 1e-3);
+        assert_eq!(weak.position(), goal * 0.5);
+    }
+}

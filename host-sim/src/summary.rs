@@ -1,0 +1,121 @@
+//! The first screen: what was found, in a few lines.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use crate::result::{CaseResult, RunResult, StrategyResult};
+
+/// Scenes that reproduce the paper, and what the paper found: tissue, static and dynamic optimum.
+const PAPER_SCENES: [&str; 2] = ["paper", "paper-hull"];
+const PAPER_OPTIMA: [(&str, u32, u32); 2] = [("homogeneous", 4, 3), ("inclusion", 2, 3)];
+
+/// What the paper found for a tissue of this scene.
+pub fn paper_optima(scene: &str, tissue: &str) -> Option<(u32, u32)> {
+    if !PAPER_SCENES.contains(&scene) {
+        return None;
+    }
+    PAPER_OPTIMA.iter().find(|(known, ..)| *known == tissue).map(|(_, fixture, dynamic)| (*fixture, *dynamic))
+}
+
+/// The summary of a run that is at `directory`.
+pub fn summary(run: &RunResult, directory: &Path) -> String {
+    let mut text = String::new();
+    write_all(&mut text, run, directory).expect("a string takes everything");
+    text
+}
+
+fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::Result {
+    let settings = &run.settings;
+    writeln!(text, "Scene {}, {}, seed {}\n", run.scene, run.mode, run.seed)?;
+    writeln!(text, "Best paddle       static   dynamic")?;
+    for placement in &run.placements {
+        let paper = match paper_optima(&run.scene, &placement.tissue) {
+            None => String::new(),
+            Some((fixture, dynamic)) => {
+                let agrees = (fixture, dynamic) == (placement.best_static, placement.best_dynamic);
+                let verdict = if agrees { "same" } else { "DIFFERENT" };
+                format!("      paper: {fixture} and {dynamic}, {verdict}")
+            }
+        };
+        writeln!(text, "  {:<15} {:>6} {:>9}{paper}", placement.tissue, placement.best_static, placement.best_dynamic)?;
+    }
+    writeln!(
+        text,
+        "\nLargest target displacement orthogonal to the needle, depth {} in {} s,\n\
+         target seen at {} Hz, {} ms late, noise {:.1e}; paddle in brackets",
+        settings.depth, settings.insertion_s, settings.target_rate_hz, settings.target_latency_ms, settings.noise
+    )?;
+    writeln!(text, "  {:<13} {:<13} {:>10} {:>13} {:>13}", "tissue", "table", "none", "static", "dynamic")?;
+    for case in &run.cases {
+        write_case(text, case)?;
+    }
+    write_loop(text, run)?;
+    writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
+}
+
+fn error(strategy: Option<&StrategyResult>) -> String {
+    let Some(strategy) = strategy else {
+        return "–".to_owned();
+    };
+    let paddle = strategy.paddle.map_or_else(String::new, |index| format!(" ({index})"));
+    format!("{:.6}{paddle}", strategy.max_orthogonal_error)
+}
+
+fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
+    let strategies = &case.strategies;
+    let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+    write!(
+        text,
+        "  {:<13} {:<13} {:>10} {:>13} {:>13}",
+        case.tissue,
+        case.table_tissue,
+        error(strategies.none.as_ref()),
+        error(strategies.fixture.as_ref()),
+        error(dynamic),
+    )?;
+    match (case.improvement, dynamic) {
+        (Some(factor), Some(dynamic)) => {
+            writeln!(text, "   {factor:.0} times less, {}", dynamic.final_state)
+        }
+        _ => writeln!(text),
+    }
+}
+
+fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {
+    let strategies = || run.cases.iter().map(|case| &case.strategies);
+    let us = |ns: u64| ns as f64 * 1e-3;
+    if strategies().any(|strategies| strategies.dynamic_free_run.is_some()) {
+        writeln!(text, "\nFree-run at {} Hz, from the scheduled time", run.settings.rate_hz)?;
+    }
+    for case in &run.cases {
+        let free_run = case.strategies.dynamic_free_run.as_ref();
+        let Some(timing) = free_run.and_then(|strategy| strategy.timing.as_ref()) else {
+            continue;
+        };
+        let lateness = &timing.release_lateness;
+        writeln!(
+            text,
+            "  {}: {} ticks, lateness p50 {:.0} µs, p99 {:.0} µs, max {:.0} µs; {} deadline misses, {} skipped; {}",
+            case.tissue,
+            timing.ticks,
+            us(lateness.p50_ns),
+            us(lateness.p99_ns),
+            us(lateness.max_ns),
+            timing.deadline_misses,
+            timing.skipped,
+            timing.scheduling.policy,
+        )?;
+    }
+    let ledgers: Vec<_> = strategies()
+        .flat_map(|strategies| [&strategies.dynamic, &strategies.dynamic_free_run])
+        .flatten()
+        .filter_map(|strategy| strategy.ledger.as_ref())
+        .collect();
+    let ticks: u64 = ledgers.iter().map(|ledger| ledger.ticks.due).sum();
+    let unaccounted: u64 = ledgers.iter().map(|ledger| ledger.unaccounted).sum();
+    writeln!(
+        text,
+        "Ledger of {} controlled runs: {ticks} ticks due, {unaccounted} ticks or samples unaccounted",
+        ledgers.len()
+    )
+}
