@@ -1,5 +1,6 @@
 //! The command line of `model-offline`.
 
+use crate::discretization::DiscretizationError;
 use crate::output::{self, OutputError};
 use crate::placement::table::{self, TableBuildError, TableOptions};
 use crate::placement::{ModelError, Placement, TissueModel, study};
@@ -188,7 +189,7 @@ impl CliError {
         match self {
             Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => failure.reason.to_string(),
             Self::Model(ModelError::Uncontrollable { .. }) => "singular-jacobian".into(),
-            Self::Model(ModelError::Shape(_)) => "singular-moment-matrix".into(),
+            Self::Model(ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_))) => "singular-moment-matrix".into(),
             _ => "failed".into(),
         }
     }

@@ -99,6 +99,13 @@ pub fn direct_nodal(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resul
 /// Two-point Gauss rule on [0, 1], each point with weight ½.
 const GAUSS_2: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
+/// Three-point Gauss rule on [0, 1]: positions and weights.
+const GAUSS_3: [(f64, f64); 3] = [
+    (0.112_701_665_379_258_3, 5.0 / 18.0),
+    (0.5, 8.0 / 18.0),
+    (0.887_298_334_620_741_7, 5.0 / 18.0),
+];
+
 /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell by the divergence theorem,
 /// `g_I(L) = (1/A_L) ∮ Ψ_I n dΓ`, two Gauss points per cell edge. Passes the linear patch test and has no spurious
 /// zero-energy modes (Chen, Wu, Yoon & You 2001).
@@ -112,17 +119,168 @@ pub fn stabilised_conforming_nodal(
     let mut average = CellAverage::new(shape);
     let mut rule = Quadrature::default();
     for (node, cell) in cells.iter().enumerate() {
-        average.begin(cell);
-        for (a, b, _) in cell.edges() {
-            average.add_edge(node, a, b)?;
-        }
-        average.finish(cell.area);
+        average.compute(node, cell, &GAUSS_2.map(|s| (s, 0.5)))?;
         rule.push(cell.area, node, &average.nodes, &average.gradients);
     }
     Ok(rule)
 }
 
-/// Accumulates `∮ Ψ_I n dΓ` over one nodal cell after another, without allocating per cell.
+/// Naturally stabilised nodal integration (Hillman & Chen 2016): the energy of a cell is that of the gradient's linear
+/// variation over it. Here the variation is sampled at four points `F ± s_j ∂_j F`, `s_j = √(2 M_j / A)`, with M_j the
+/// second moment of the cell about its node: to second order this is NSNI's `W + ½ Σ_j (M_j/A) ∂_jF : 𝔸 : ∂_jF`, and it
+/// stays the derivative of an energy at finite strain.
+///
+/// With `consistent`, the average of the gradient over the cell is replaced by SCNI's, which makes the rule
+/// variationally consistent to first order (patch test) while the gradient's variation keeps the stabilisation.
+///
+/// # Errors
+/// [`ShapeError`] names the node whose moment matrix fails.
+pub fn naturally_stabilised_nodal(
+    shape: &ShapeFunctions<'_, 2>,
+    cells: &[NodalCell],
+    consistent: bool,
+) -> Result<Quadrature<2>, ShapeError> {
+    let mut rule = Quadrature::default();
+    let mut average = CellAverage::new(shape);
+    let mut candidates = Vec::new();
+    let (mut field, mut derivative) = (Stencil::default(), [Stencil::default(), Stencil::default()]);
+    for (node, cell) in cells.iter().enumerate() {
+        let x = shape.cloud().positions()[node];
+        shape.cloud().covering(&x, &x, &mut candidates);
+        shape.evaluate(&x, node, &candidates, Reproduce::Field, true, &mut field)?;
+        for (axis, stencil) in derivative.iter_mut().enumerate() {
+            shape.evaluate(&x, node, &candidates, Reproduce::Derivative(axis), true, stencil)?;
+        }
+        let mean = if consistent {
+            average.compute(node, cell, &GAUSS_2.map(|s| (s, 0.5)))?;
+            (average.nodes.clone(), average.gradients.clone())
+        } else {
+            (field.nodes.clone(), field.gradients.clone())
+        };
+        let moments = second_moments(cell, x);
+        for (axis, stencil) in derivative.iter().enumerate() {
+            // ∂_j g_I: the gradient of the implicit derivative.
+            let reach = (2.0 * moments[axis] / cell.area).sqrt();
+            for side in [reach, -reach] {
+                let (nodes, gradients) = add_scaled(&mean.0, &mean.1, &stencil.nodes, &stencil.gradients, side);
+                rule.push(0.25 * cell.area, node, &nodes, &gradients);
+            }
+        }
+    }
+    Ok(rule)
+}
+
+/// Gauss points in triangular background cells: three per triangle (degree 2), or six (degree 4) for the quadratic
+/// basis.
+///
+/// With `consistent`, the mean gradient over every triangle is shifted to its boundary average, which makes the rule
+/// variationally consistent to first order.
+///
+/// # Errors
+/// [`ShapeError`] names a node near the point at which the moment matrix fails.
+pub fn gauss(
+    shape: &ShapeFunctions<'_, 2>,
+    triangles: &[[u32; 3]],
+    cells: &[NodalCell],
+    quadratic: bool,
+    consistent: bool,
+) -> Result<Quadrature<2>, ShapeError> {
+    let mut rule = Quadrature::default();
+    let mut average = CellAverage::new(shape);
+    let mut candidates = Vec::new();
+    let points: &[([f64; 3], f64)] = if quadratic { &TRIANGLE_6 } else { &TRIANGLE_3 };
+    for (index, (triangle, cell)) in triangles.iter().zip(cells).enumerate() {
+        let corners: Vec<Point2> = cell.corners();
+        let node = triangle[0] as usize;
+        let mut stencils = Vec::with_capacity(points.len());
+        for (l, _) in points {
+            let x = corners[0] * l[0] + corners[1] * l[1] + corners[2] * l[2];
+            shape.cloud().covering(&x, &x, &mut candidates);
+            let mut stencil = Stencil::default();
+            shape.evaluate(&x, node, &candidates, Reproduce::Field, true, &mut stencil)?;
+            stencils.push(stencil);
+        }
+        if consistent {
+            average.compute(node, cell, &GAUSS_3)?;
+        }
+        // shift = boundary average − mean of the points.
+        let (mut nodes, mut shift) = (average.nodes.clone(), average.gradients.clone());
+        if consistent {
+            for (stencil, (_, weight)) in stencils.iter().zip(points) {
+                (nodes, shift) = add_scaled(&nodes, &shift, &stencil.nodes, &stencil.gradients, -weight);
+            }
+        }
+        for (stencil, (_, weight)) in stencils.iter().zip(points) {
+            let (nodes, gradients) = add_scaled(&nodes, &shift, &stencil.nodes, &stencil.gradients, 1.0);
+            rule.push(weight * cell.area, index, &nodes, &gradients);
+        }
+    }
+    Ok(rule)
+}
+
+/// Degree 2 on a triangle (Strang & Fix 1973): barycentric coordinates, weight over the area.
+const TRIANGLE_3: [([f64; 3], f64); 3] = {
+    const A: f64 = 2.0 / 3.0;
+    const B: f64 = 1.0 / 6.0;
+    [([A, B, B], 1.0 / 3.0), ([B, A, B], 1.0 / 3.0), ([B, B, A], 1.0 / 3.0)]
+};
+
+/// Degree 4 on a triangle (Dunavant 1985).
+const TRIANGLE_6: [([f64; 3], f64); 6] = {
+    const A: f64 = 0.445_948_490_915_965;
+    const WA: f64 = 0.223_381_589_678_011;
+    const B: f64 = 0.091_576_213_509_771;
+    const WB: f64 = 0.109_951_743_655_322;
+    const A1: f64 = 1.0 - 2.0 * A;
+    const B1: f64 = 1.0 - 2.0 * B;
+    [
+        ([A1, A, A], WA),
+        ([A, A1, A], WA),
+        ([A, A, A1], WA),
+        ([B1, B, B], WB),
+        ([B, B1, B], WB),
+        ([B, B, B1], WB),
+    ]
+};
+
+/// Sum of two sparse rows of gradients, the second scaled; nodes ascending.
+fn add_scaled(
+    a_nodes: &[u32],
+    a: &[Point<2>],
+    b_nodes: &[u32],
+    b: &[Point<2>],
+    scale: f64,
+) -> (Vec<u32>, Vec<Point<2>>) {
+    let (mut nodes, mut sum) = (Vec::new(), Vec::new());
+    let (mut i, mut j) = (0, 0);
+    while i < a_nodes.len() || j < b_nodes.len() {
+        let next_a = a_nodes.get(i).copied().unwrap_or(u32::MAX);
+        let next_b = b_nodes.get(j).copied().unwrap_or(u32::MAX);
+        let mut value = Point::zeros();
+        if next_a <= next_b {
+            value += a[i];
+            i += 1;
+        }
+        if next_b <= next_a {
+            value += b[j] * scale;
+            j += 1;
+        }
+        nodes.push(next_a.min(next_b));
+        sum.push(value);
+    }
+    (nodes, sum)
+}
+
+/// Second moments ∫ (x_j − X_j)² dΩ of a cell about a point, exact for polygons.
+fn second_moments(cell: &NodalCell, about: Point2) -> Point2 {
+    cell.edges().fold(Point2::zeros(), |sum, (a, b, _)| {
+        let (a, b) = (a - about, b - about);
+        let twice = crate::scene::geometry::cross(a, b);
+        sum + (a.component_mul(&a) + a.component_mul(&b) + b.component_mul(&b)) * (twice / 12.0)
+    })
+}
+
+/// Computes `(1/A) ∮ Ψ_I n dΓ` for one cell after another, without allocating per cell.
 struct CellAverage<'a, 'c> {
     shape: &'a ShapeFunctions<'c, 2>,
     candidates: Vec<u32>,
@@ -135,45 +293,44 @@ struct CellAverage<'a, 'c> {
 
 impl<'a, 'c> CellAverage<'a, 'c> {
     fn new(shape: &'a ShapeFunctions<'c, 2>) -> Self {
-        let sum = vec![Point::zeros(); shape.cloud().len()];
         Self {
             shape,
             candidates: Vec::new(),
             stencil: Stencil::default(),
-            sum,
+            sum: vec![Point::zeros(); shape.cloud().len()],
             nodes: Vec::new(),
             gradients: Vec::new(),
         }
     }
 
-    fn begin(&mut self, cell: &NodalCell) {
-        let (low, high) = crate::scene::geometry::bounds(&cell.corners());
+    /// Fills `nodes` and `gradients`; `node` is the one that an error names, `points` the rule per edge.
+    fn compute(&mut self, node: usize, cell: &NodalCell, points: &[(f64, f64)]) -> Result<(), ShapeError> {
+        let (low, high) = cell.boundary.iter().fold(
+            (Point2::repeat(f64::INFINITY), Point2::repeat(f64::NEG_INFINITY)),
+            |(low, high), c| (low.inf(&c.0), high.sup(&c.0)),
+        );
         self.shape.cloud().covering(&low, &high, &mut self.candidates);
         self.nodes.clear();
         self.gradients.clear();
-    }
-
-    fn add_edge(&mut self, node: usize, a: Point2, b: Point2) -> Result<(), ShapeError> {
-        let weighted_normal = Point2::new(b.y - a.y, a.x - b.x) * 0.5;
-        if weighted_normal.norm_squared() == 0.0 {
-            return Ok(());
-        }
-        for s in GAUSS_2 {
-            let x = a + (b - a) * s;
-            self.shape.evaluate(&x, node, &self.candidates, Reproduce::Field, false, &mut self.stencil)?;
-            for (&i, &value) in self.stencil.nodes.iter().zip(&self.stencil.values) {
-                self.nodes.push(i);
-                self.sum[i as usize] += weighted_normal * value;
+        for (a, b, _) in cell.edges() {
+            let normal = Point2::new(b.y - a.y, a.x - b.x);
+            if normal.norm_squared() == 0.0 {
+                continue;
+            }
+            for (s, weight) in points {
+                let x = a + (b - a) * *s;
+                self.shape.evaluate(&x, node, &self.candidates, Reproduce::Field, false, &mut self.stencil)?;
+                for (&i, &value) in self.stencil.nodes.iter().zip(&self.stencil.values) {
+                    self.nodes.push(i);
+                    self.sum[i as usize] += normal * (weight * value);
+                }
             }
         }
-        Ok(())
-    }
-
-    fn finish(&mut self, area: f64) {
         self.nodes.sort_unstable();
         self.nodes.dedup();
         for &i in &self.nodes {
-            self.gradients.push(std::mem::take(&mut self.sum[i as usize]) / area);
+            self.gradients.push(std::mem::take(&mut self.sum[i as usize]) / cell.area);
         }
+        Ok(())
     }
 }

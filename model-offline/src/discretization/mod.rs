@@ -5,6 +5,7 @@
 //! `Ψ_I(X) = Hᵀ(0) M⁻¹(X) H(X − X_I) φ_a(X − X_I)`. The d_I are *coefficients*, not displacements: Ψ_I(X_J) ≠ δ_IJ.
 //! Everything here is written for D dimensions; only the construction of nodes and cells is planar.
 
+pub mod finite_element;
 pub mod integration;
 pub mod kernel;
 pub mod lattice;
@@ -12,11 +13,12 @@ pub mod nodal_cells;
 pub mod node_cloud;
 pub mod planar;
 pub mod shape_functions;
+pub mod triangulation;
 
 pub use integration::Quadrature;
 pub use nodal_cells::NodalCell;
 pub use node_cloud::NodeCloud;
-pub use planar::{Method, Planar};
+pub use planar::{DiscretizationError, Method, Planar};
 pub use shape_functions::{ShapeError, ShapeFunctions, Stencil};
 
 /// A point or vector in D dimensions, in scene length units.

@@ -1,6 +1,8 @@
 //! A planar body discretised: nodes, cells and an integration rule, from nodes that are given.
 
+use super::finite_element::Elements;
 use super::nodal_cells::clipped_voronoi;
+use super::triangulation::{TriangulationError, triangulate};
 use super::{NodalCell, NodeCloud, Point, Quadrature, ShapeError, ShapeFunctions, Stencil, integration};
 use crate::scene::schema::{Basis, Integration};
 use crate::scene::{Point2, Polygon};
@@ -15,45 +17,95 @@ pub struct Method {
     pub basis: Basis,
     /// Kernel support over local spacing.
     pub support: f64,
+    /// Whether `nsni` and `gauss` are corrected to be variationally consistent; SCNI and the elements are by nature.
+    pub consistent: bool,
+}
+
+/// Why a body cannot be discretised.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum DiscretizationError {
+    /// Shape functions do not exist somewhere.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+    /// The nodes cannot be triangulated.
+    #[error(transparent)]
+    Triangulation(#[from] TriangulationError),
+}
+
+#[derive(Debug)]
+enum Approximation {
+    Kernels(NodeCloud<2>),
+    Elements(Elements),
 }
 
 /// Nodes, cells that tile the body, and an integration rule over them. Cheap to clone.
 #[derive(Debug, Clone)]
 pub struct Planar {
-    cloud: Arc<NodeCloud<2>>,
+    approximation: Arc<Approximation>,
     cells: Arc<Vec<NodalCell>>,
     rule: Arc<Quadrature<2>>,
     method: Method,
 }
 
 impl Planar {
-    /// Discretises the body inside `outline` with the given nodes, each with its local spacing.
+    /// Discretises the body inside `outline` with the given nodes, each with its local spacing. Quadratic triangles add
+    /// nodes of their own.
     ///
     /// # Errors
-    /// [`ShapeError`] names the node whose moment matrix fails.
-    pub fn new(outline: &Polygon, nodes: Vec<Point2>, spacing: &[f64], method: Method) -> Result<Self, ShapeError> {
+    /// [`DiscretizationError`] names the node whose moment matrix fails, or says why there is no triangulation.
+    pub fn new(
+        outline: &Polygon,
+        nodes: Vec<Point2>,
+        spacing: &[f64],
+        method: Method,
+    ) -> Result<Self, DiscretizationError> {
+        let done = |approximation, cells, rule| Self {
+            approximation: Arc::new(approximation),
+            cells: Arc::new(cells),
+            rule: Arc::new(rule),
+            method,
+        };
+        if matches!(method.integration, Integration::FemT3 | Integration::FemT6) {
+            let triangles = triangulate(&nodes, outline)?;
+            let elements = match method.integration {
+                Integration::FemT3 => Elements::linear(nodes, triangles),
+                _ => Elements::quadratic(nodes, triangles),
+            };
+            let (cells, rule) = (elements.cells(), elements.rule());
+            return Ok(done(Approximation::Elements(elements), cells, rule));
+        }
         let half_widths = spacing.iter().map(|h| h * method.support).collect();
-        let cells = clipped_voronoi(&nodes, outline);
+        let (cells, triangles) = if method.integration == Integration::Gauss {
+            let triangles = triangulate(&nodes, outline)?;
+            (Elements::linear(nodes.clone(), triangles.clone()).cells(), triangles)
+        } else {
+            (clipped_voronoi(&nodes, outline), Vec::new())
+        };
         let cloud = NodeCloud::new(nodes, half_widths);
         let shape = ShapeFunctions::new(&cloud, method.basis);
         let rule = match method.integration {
             Integration::Dni => integration::direct_nodal(&shape, &cells)?,
-            _ => integration::stabilised_conforming_nodal(&shape, &cells)?,
+            Integration::Nsni => integration::naturally_stabilised_nodal(&shape, &cells, method.consistent)?,
+            Integration::Gauss => {
+                let quadratic = method.basis == Basis::Quadratic;
+                integration::gauss(&shape, &triangles, &cells, quadratic, method.consistent)?
+            }
+            Integration::Scni | Integration::FemT3 | Integration::FemT6 => {
+                integration::stabilised_conforming_nodal(&shape, &cells)?
+            }
         };
-        Ok(Self { cloud: Arc::new(cloud), cells: Arc::new(cells), rule: Arc::new(rule), method })
+        Ok(done(Approximation::Kernels(cloud), cells, rule))
     }
 
-    /// The nodes.
-    pub fn cloud(&self) -> &NodeCloud<2> {
-        &self.cloud
-    }
-
-    /// Node positions.
+    /// Node positions, those that elements add included.
     pub fn positions(&self) -> &[Point<2>] {
-        self.cloud.positions()
+        match &*self.approximation {
+            Approximation::Kernels(cloud) => cloud.positions(),
+            Approximation::Elements(elements) => elements.positions(),
+        }
     }
 
-    /// Cells that tile the body.
+    /// Cells that tile the body: nodal cells or triangles.
     pub fn cells(&self) -> &[NodalCell] {
         &self.cells
     }
@@ -73,6 +125,9 @@ impl Planar {
     /// # Errors
     /// [`ShapeError`] where too few kernels cover the point.
     pub fn value_stencil(&self, x: &Point<2>) -> Result<Stencil<2>, ShapeError> {
-        ShapeFunctions::new(&self.cloud, self.method.basis).at(x, false)
+        match &*self.approximation {
+            Approximation::Kernels(cloud) => ShapeFunctions::new(cloud, self.method.basis).at(x, false),
+            Approximation::Elements(elements) => Ok(elements.value_stencil(x)),
+        }
     }
 }

@@ -185,27 +185,17 @@ pub fn tangent<const D: usize>(
             }
         }
         for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {
-            // t[i][m][k] = A_imkl g_J,l: shared by all rows of this column.
-            let mut t = [[[0.0; D]; D]; D];
-            for i in 0..D {
-                for m in 0..D {
-                    for k in 0..D {
-                        for l in 0..D {
-                            t[i][m][k] += a[i][m][k][l] * gj[l];
-                        }
-                    }
-                }
-            }
+            // t[k][i][m] = A_imkl g_J,l: shared by all rows of this column.
+            let t: [[[f64; D]; D]; D] = std::array::from_fn(|k| {
+                std::array::from_fn(|i| std::array::from_fn(|m| (0..D).map(|l| a[i][m][k][l] * gj[l]).sum()))
+            });
             let stride = pattern.column_length(j);
             let rows = &point.gradients[column..];
             for (gi, &at) in rows.iter().zip(&scatter.positions[next..next + rows.len()]) {
-                for k in 0..D {
+                for (k, t) in t.iter().enumerate() {
                     let start = at as usize + k * stride;
-                    let block = &mut values[start..start + D];
-                    for i in 0..D {
-                        for m in 0..D {
-                            block[i] += gi[m] * t[i][m][k];
-                        }
+                    for (entry, t) in values[start..start + D].iter_mut().zip(t) {
+                        *entry += (0..D).map(|m| gi[m] * t[m]).sum::<f64>();
                     }
                 }
             }

@@ -188,6 +188,9 @@ impl Material {
     }
 
     /// The law of small strains with the same tangent at rest: what a linear model of this tissue would use.
+    ///
+    /// # Errors
+    /// Never for the laws there are: their moduli were checked when they were made.
     pub fn linearised(&self) -> Result<Self, MaterialError> {
         match &self.law {
             Law::Fung { lambda, mu, c, lambda_c, mu_c } => Self::linear(lambda + c * lambda_c, mu + c * mu_c),

@@ -1,10 +1,10 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
 use crate::discretization::lattice::lattice_nodes;
-use crate::discretization::{Method, NodalCell, Planar, Quadrature, ShapeError, Stencil};
+use crate::discretization::{DiscretizationError, Method, NodalCell, Planar, Quadrature, ShapeError, Stencil};
 use crate::mechanics::{Material, Tissue};
 use crate::scene::geometry::{Point2, distance_to_polyline, overlap_area};
-use crate::scene::schema::{Basis, Essential, Integration};
+use crate::scene::schema::Essential;
 use crate::scene::{Resolution, Scene};
 use crate::solver::constrained::HeldRows;
 use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings};
@@ -17,6 +17,9 @@ pub enum ModelError {
     /// Shape functions do not exist somewhere.
     #[error(transparent)]
     Shape(#[from] ShapeError),
+    /// The body cannot be discretised.
+    #[error(transparent)]
+    Discretization(#[from] DiscretizationError),
     /// The tangent at rest cannot be solved with, or a Jacobian cannot be computed.
     #[error("{0}")]
     Solve(#[from] Failure),
@@ -63,20 +66,12 @@ impl TissueModel {
                 "tolerance is not available yet: give a spacing in [discretization] or with --spacing".into(),
             ));
         };
-        if spec.basis != Basis::Linear || spec.essential != Essential::Transformation {
-            return Err(ModelError::Unsupported(
-                "only the linear basis with the transformation method is available yet".into(),
-            ));
-        }
-        if !matches!(spec.integration, Integration::Dni | Integration::Scni) {
-            return Err(ModelError::Unsupported(format!(
-                "integration {:?} is not available yet: use dni or scni",
-                spec.integration
-            )));
+        if spec.essential != Essential::Transformation {
+            return Err(ModelError::Unsupported("only the transformation method is available yet".into()));
         }
         let nodes = lattice_nodes(scene, spacing);
         let spacings = vec![spacing; nodes.len()];
-        let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support };
+        let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
         let planar = Planar::new(&scene.outline, nodes, &spacings, method)?;
         Self::on(scene, planar, spacing)
     }
@@ -124,12 +119,12 @@ impl TissueModel {
 
     /// Number of nodes.
     pub fn nodes(&self) -> usize {
-        self.planar.cloud().len()
+        self.planar.positions().len()
     }
 
     /// Number of unknowns.
     pub fn dofs(&self) -> usize {
-        2 * self.planar.cloud().len()
+        2 * self.planar.positions().len()
     }
 
     /// Node positions at rest.

@@ -166,11 +166,14 @@ fn path_slope(direction: Vector2<f64>, sensitivity: Vector2<f64>, normal: Vector
     -direction * normal.dot(&sensitivity)
 }
 
+/// Actuation Jacobian, J⁻¹n, and d(target)/d(depth).
+type Linearisation = (Matrix2<f64>, Vector2<f64>, Vector2<f64>);
+
 fn linearise(
     body: &mut Body<'_>,
     paddle: u32,
     normal: Vector2<f64>,
-) -> Result<(Matrix2<f64>, Vector2<f64>, Vector2<f64>), ModelError> {
+) -> Result<Linearisation, ModelError> {
     let jacobian = body.actuation_jacobian()?;
     let direction =
         best_direction(&jacobian, normal).map_err(|condition| ModelError::Uncontrollable { paddle, condition })?;

@@ -2,6 +2,7 @@
 
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// A scene that cannot be used: one message with file, line and column, and what to do about it.
 #[derive(Debug, Clone, thiserror::Error, Diagnostic)]
@@ -20,7 +21,7 @@ pub struct SceneError {
     pub help: String,
     /// The file's text, for the excerpt.
     #[source_code]
-    pub source_text: NamedSource<String>,
+    pub source_text: Arc<NamedSource<String>>,
     /// The part of the text that is at fault.
     #[label("here")]
     pub at: SourceSpan,
@@ -44,7 +45,7 @@ impl Source<'_> {
             column: before[line_start..].chars().count() + 1,
             message: message.into(),
             help: help.into(),
-            source_text: NamedSource::new(self.file, self.text.to_owned()),
+            source_text: Arc::new(NamedSource::new(self.file, self.text.to_owned())),
             at: (start, span.end.min(self.text.len()).saturating_sub(start)).into(),
         }
     }

@@ -1,0 +1,63 @@
+//! Constrained Delaunay triangulation of the nodes inside the outline: elements of the baselines, background cells of
+//! the Gauss rule.
+
+use crate::scene::geometry::{Point2, Polygon, cross, distance_to_segment};
+use spade::{ConstrainedDelaunayTriangulation, Point2 as Site, Triangulation as _};
+
+/// The nodes cannot be triangulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("the nodes cannot be triangulated: {0}")]
+pub struct TriangulationError(pub String);
+
+/// Triangles (counter-clockwise node numbers) that tile the outline.
+///
+/// # Errors
+/// Nodes that coincide, or an outline that its nodes do not follow.
+pub fn triangulate(nodes: &[Point2], outline: &Polygon) -> Result<Vec<[u32; 3]>, TriangulationError> {
+    let fail = |reason: &str| TriangulationError(reason.to_owned());
+    let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
+    let edges = boundary_edges(nodes, outline);
+    let mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt(sites, edges)
+        .map_err(|error| fail(&error.to_string()))?;
+    if mesh.num_vertices() != nodes.len() {
+        return Err(fail("two nodes coincide"));
+    }
+    let smallest = 1e-12 * outline.size() * outline.size();
+    let triangles: Vec<[u32; 3]> = mesh
+        .inner_faces()
+        .filter_map(|face| {
+            let corners = face.vertices().map(|v| v.index() as u32);
+            let [a, b, c] = corners.map(|i| nodes[i as usize]);
+            let inside = outline.contains((a + b + c) / 3.0);
+            (inside && cross(b - a, c - a) > smallest).then_some(corners)
+        })
+        .collect();
+    let area: f64 = triangles.iter().map(|t| area(nodes, t)).sum();
+    if (area - outline.area()).abs() > 1e-6 * outline.area() {
+        return Err(fail("the nodes do not follow the outline: put nodes on every corner"));
+    }
+    Ok(triangles)
+}
+
+/// Area of a triangle of nodes.
+pub fn area(nodes: &[Point2], t: &[u32; 3]) -> f64 {
+    let [a, b, c] = t.map(|i| nodes[i as usize]);
+    0.5 * cross(b - a, c - a)
+}
+
+/// Pairs of nodes that follow each other along the outline.
+fn boundary_edges(nodes: &[Point2], outline: &Polygon) -> Vec<[usize; 2]> {
+    let tolerance = 1e-9 * outline.size();
+    let mut edges = Vec::new();
+    for (a, b) in outline.edges() {
+        let mut on: Vec<(f64, usize)> = nodes
+            .iter()
+            .enumerate()
+            .filter(|(_, x)| distance_to_segment(**x, a, b) <= tolerance)
+            .map(|(i, x)| ((x - a).dot(&(b - a)), i))
+            .collect();
+        on.sort_by(|p, q| p.0.total_cmp(&q.0));
+        edges.extend(on.windows(2).map(|w| [w[0].1, w[1].1]));
+    }
+    edges
+}
