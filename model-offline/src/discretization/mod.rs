@@ -6,6 +6,7 @@
 //! Everything here is written for D dimensions; only the construction of nodes and cells is planar.
 
 pub mod finite_element;
+pub mod graded;
 pub mod integration;
 pub mod kernel;
 pub mod lattice;

@@ -3,9 +3,8 @@
 //! On a lattice they are the lattice squares clipped by the outline.
 
 use super::Point;
+use super::triangulation::TriangulationError;
 use crate::scene::geometry::{Point2, Polygon, clip_half_plane, signed_area};
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
 /// What lies on the other side of a cell's edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,6 +31,15 @@ impl NodalCell {
         (0..n).map(move |i| (self.boundary[i].0, self.boundary[(i + 1) % n].0, self.boundary[i].1))
     }
 
+    /// Centroid.
+    pub fn centroid(&self) -> Point2 {
+        let origin = self.boundary.first().map_or_else(Point2::zeros, |c| c.0);
+        let moment = self.edges().fold(Point2::zeros(), |sum, (a, b, _)| {
+            sum + (a + b - origin * 2.0) * (crate::scene::geometry::cross(a - origin, b - origin) / 6.0)
+        });
+        origin + moment / self.area
+    }
+
     /// Corners without labels.
     pub fn corners(&self) -> Vec<Point2> {
         self.boundary.iter().map(|c| c.0).collect()
@@ -39,16 +47,19 @@ impl NodalCell {
 }
 
 /// Voronoi cells of the nodes, clipped by the outline.
-pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Vec<NodalCell> {
-    let sites: RTree<GeomWithData<[f64; 2], u32>> =
-        RTree::bulk_load(nodes.iter().enumerate().map(|(i, x)| GeomWithData::new([x.x, x.y], i as u32)).collect());
+///
+/// # Errors
+/// Nodes that coincide.
+pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Result<Vec<NodalCell>, TriangulationError> {
+    let neighbours = super::triangulation::neighbours(nodes)?;
     let boundary: Vec<(Point2, Across)> =
         outline.vertices().iter().enumerate().map(|(i, &v)| (v, Across::Outline(i as u32))).collect();
     let mut scratch = Vec::new();
-    nodes
+    Ok(nodes
         .iter()
-        .map(|x| {
-            let cell = unclipped_cell(x, &sites, outline.size(), &mut scratch);
+        .zip(&neighbours)
+        .map(|(x, near)| {
+            let cell = unclipped_cell(x, near, nodes, outline.size(), &mut scratch);
             let radius = cell.iter().map(|c| (c.0 - x).norm()).fold(0.0, f64::max);
             let boundary = if radius < outline.distance_to_boundary(*x) {
                 cell
@@ -58,33 +69,23 @@ pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Vec<NodalCell> 
             let corners: Vec<Point2> = boundary.iter().map(|c| c.0).collect();
             NodalCell { area: signed_area(&corners).max(0.0), boundary }
         })
-        .collect()
+        .collect())
 }
 
-/// The Voronoi cell of `x` in a square large enough to contain the body.
+/// The Voronoi cell of `x`, bounded by the bisectors to its Delaunay neighbours, in a square larger than the body.
 fn unclipped_cell(
     x: &Point2,
-    sites: &RTree<GeomWithData<[f64; 2], u32>>,
+    neighbours: &[u32],
+    nodes: &[Point<2>],
     size: f64,
     scratch: &mut Vec<(Point2, Across)>,
 ) -> Vec<(Point2, Across)> {
     let corner = |sx: f64, sy: f64| (x + Point2::new(sx, sy) * (2.0 * size), Across::Outline(u32::MAX));
     let mut cell = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
-    let mut radius = f64::INFINITY;
-    for site in sites.nearest_neighbor_iter(&[x.x, x.y]) {
-        let other = Point2::from(*site.geom());
-        let separation = other - x;
-        let distance = separation.norm();
-        if distance == 0.0 {
-            continue;
-        }
-        // A bisector farther away than the farthest corner cuts nothing, nor does any after it.
-        if 0.5 * distance > radius {
-            break;
-        }
-        clip_half_plane(&cell, (x + other) * 0.5, separation, Across::Node(site.data), scratch);
+    for &i in neighbours {
+        let other = nodes[i as usize];
+        clip_half_plane(&cell, (x + other) * 0.5, other - x, Across::Node(i), scratch);
         std::mem::swap(&mut cell, scratch);
-        radius = cell.iter().map(|c| (c.0 - x).norm()).fold(0.0, f64::max);
     }
     cell
 }
@@ -132,7 +133,7 @@ mod tests {
                 nodes.push(p);
             }
         }
-        let cells = clipped_voronoi(&nodes, &outline);
+        let cells = clipped_voronoi(&nodes, &outline).unwrap();
         let total: f64 = cells.iter().map(|c| c.area).sum();
         assert!((total - outline.area()).abs() < 1e-13 * outline.area(), "{total}");
         // ∮ n dΓ = 0 on every cell: what makes a constant field strain-free under SCNI.

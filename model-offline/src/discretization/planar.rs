@@ -48,15 +48,15 @@ pub struct Planar {
 }
 
 impl Planar {
-    /// Discretises the body inside `outline` with the given nodes, each with its local spacing. Quadratic triangles add
-    /// nodes of their own.
+    /// Discretises the body inside `outline` with the given nodes. Their local spacing, which supports are relative to,
+    /// is either given or taken from the nodal cells. Quadratic triangles add nodes of their own.
     ///
     /// # Errors
     /// [`DiscretizationError`] names the node whose moment matrix fails, or says why there is no triangulation.
     pub fn new(
         outline: &Polygon,
         nodes: Vec<Point2>,
-        spacing: &[f64],
+        spacing: Option<f64>,
         method: Method,
     ) -> Result<Self, DiscretizationError> {
         let done = |approximation, cells, rule| Self {
@@ -74,13 +74,19 @@ impl Planar {
             let (cells, rule) = (elements.cells(), elements.rule());
             return Ok(done(Approximation::Elements(elements), cells, rule));
         }
-        let half_widths = spacing.iter().map(|h| h * method.support).collect();
-        let (cells, triangles) = if method.integration == Integration::Gauss {
-            let triangles = triangulate(&nodes, outline)?;
-            (Elements::linear(nodes.clone(), triangles.clone()).cells(), triangles)
-        } else {
-            (clipped_voronoi(&nodes, outline), Vec::new())
+        let mut cells = Vec::new();
+        if spacing.is_none() || method.integration != Integration::Gauss {
+            cells = clipped_voronoi(&nodes, outline)?;
+        }
+        let half_widths = match spacing {
+            Some(h) => vec![h * method.support; nodes.len()],
+            None => local_spacing(&nodes, &cells).into_iter().map(|h| h * method.support).collect(),
         };
+        let mut triangles = Vec::new();
+        if method.integration == Integration::Gauss {
+            triangles = triangulate(&nodes, outline)?;
+            cells = Elements::linear(nodes.clone(), triangles.clone()).cells();
+        }
         let cloud = NodeCloud::new(nodes, half_widths);
         let shape = ShapeFunctions::new(&cloud, method.basis);
         let rule = match method.integration {
@@ -130,4 +136,17 @@ impl Planar {
             Approximation::Elements(elements) => Ok(elements.value_stencil(x)),
         }
     }
+}
+
+/// Local spacing of scattered nodes: √2 times the distance to the farthest corner of the nodal cell, which on a square
+/// lattice is the spacing. Every point of the cell is then well inside the node's support, however nodes are graded.
+fn local_spacing(nodes: &[Point2], cells: &[NodalCell]) -> Vec<f64> {
+    nodes
+        .iter()
+        .zip(cells)
+        .map(|(x, cell)| {
+            let radius = cell.boundary.iter().map(|c| (c.0 - x).norm()).fold(0.0, f64::max);
+            std::f64::consts::SQRT_2 * radius
+        })
+        .collect()
 }

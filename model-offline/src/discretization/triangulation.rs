@@ -2,7 +2,7 @@
 //! the Gauss rule.
 
 use crate::scene::geometry::{Point2, Polygon, cross, distance_to_segment};
-use spade::{ConstrainedDelaunayTriangulation, Point2 as Site, Triangulation as _};
+use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
 
 /// The nodes cannot be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -17,7 +17,7 @@ pub fn triangulate(nodes: &[Point2], outline: &Polygon) -> Result<Vec<[u32; 3]>,
     let fail = |reason: &str| TriangulationError(reason.to_owned());
     let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
     let edges = boundary_edges(nodes, outline);
-    let mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt(sites, edges)
+    let mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt_stable(sites, edges)
         .map_err(|error| fail(&error.to_string()))?;
     if mesh.num_vertices() != nodes.len() {
         return Err(fail("two nodes coincide"));
@@ -37,6 +37,20 @@ pub fn triangulate(nodes: &[Point2], outline: &Polygon) -> Result<Vec<[u32; 3]>,
         return Err(fail("the nodes do not follow the outline: put nodes on every corner"));
     }
     Ok(triangles)
+}
+
+/// Delaunay neighbours of every node.
+///
+/// # Errors
+/// Nodes that coincide.
+pub fn neighbours(nodes: &[Point2]) -> Result<Vec<Vec<u32>>, TriangulationError> {
+    let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
+    let mesh = DelaunayTriangulation::<Site<f64>>::bulk_load_stable(sites)
+        .map_err(|error| TriangulationError(error.to_string()))?;
+    if mesh.num_vertices() != nodes.len() {
+        return Err(TriangulationError("two nodes coincide".to_owned()));
+    }
+    Ok(mesh.vertices().map(|v| v.out_edges().map(|e| e.to().index() as u32).collect()).collect())
 }
 
 /// Area of a triangle of nodes.

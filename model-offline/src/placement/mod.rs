@@ -2,6 +2,7 @@
 //! study, and the rankings for the static and the dynamic approach.
 
 pub mod model;
+pub mod rest;
 pub mod study;
 pub mod table;
 

@@ -70,9 +70,8 @@ impl TissueModel {
             return Err(ModelError::Unsupported("only the transformation method is available yet".into()));
         }
         let nodes = lattice_nodes(scene, spacing);
-        let spacings = vec![spacing; nodes.len()];
         let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
-        let planar = Planar::new(&scene.outline, nodes, &spacings, method)?;
+        let planar = Planar::new(&scene.outline, nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)
     }
 
@@ -171,14 +170,32 @@ impl TissueModel {
         self.scene.paddles.iter().position(|p| p.index == index)
     }
 
+    /// Stencils of the held nodes, in the order immobile, needle, paddle.
+    pub(crate) fn held_stencils(&self, paddle: Option<usize>) -> impl Iterator<Item = &Stencil<2>> {
+        let paddle = paddle.map_or(&[][..], |p| &self.paddles[p]);
+        self.immobile.iter().chain(&self.needle).chain(paddle)
+    }
+
+    /// Values of all held rows, in the same order.
+    pub(crate) fn held_values(&self, paddle: Option<usize>, depth: f64, displacement: Vector2<f64>) -> Vec<f64> {
+        let repeat = |value: Vector2<f64>, count: usize| std::iter::repeat_n([value.x, value.y], count).flatten();
+        repeat(Vector2::zeros(), self.immobile.len())
+            .chain(repeat(self.scene.needle.axis * depth, self.needle.len()))
+            .chain(repeat(displacement, paddle.map_or(0, |p| self.paddles[p].len())))
+            .collect()
+    }
+
+    /// The target's row: `u(X_t) = Σ_I Ψ_I(X_t) d_I`.
+    pub(crate) fn target_row(&self) -> &Stencil<2> {
+        &self.target
+    }
+
     /// A body at rest with the paddle at this place of the scene's list attached, or none.
     ///
     /// # Errors
     /// [`Failure`] when the tangent at rest is singular.
     pub fn body(&self, paddle: Option<usize>, settings: NewtonSettings) -> Result<Body<'_>, Failure> {
-        let none = Vec::new();
-        let paddle = paddle.map_or(&none, |p| &self.paddles[p]);
-        let held = HeldRows::new(self.immobile.iter().chain(&self.needle).chain(paddle));
+        let held = HeldRows::new(self.held_stencils(paddle));
         let equilibrium = Equilibrium::at_rest(
             Arc::clone(self.planar.rule()),
             self.tissue.clone(),
@@ -187,7 +204,7 @@ impl TissueModel {
             self.spacing,
             settings,
         )?;
-        Ok(Body { model: self, equilibrium, paddle_rows: paddle.len(), depth: 0.0, paddle: Vector2::zeros() })
+        Ok(Body { model: self, equilibrium, attached: paddle, depth: 0.0, paddle: Vector2::zeros() })
     }
 }
 
@@ -249,7 +266,7 @@ fn covered_fraction(region: &crate::scene::Polygon, corners: &[Point2], area: f6
 pub struct Body<'m> {
     model: &'m TissueModel,
     equilibrium: Equilibrium<2>,
-    paddle_rows: usize,
+    attached: Option<usize>,
     depth: f64,
     paddle: Vector2<f64>,
 }
@@ -285,7 +302,7 @@ impl Body<'_> {
     /// # Errors
     /// [`Failure`]; depth and paddle are then where the last converged state has them.
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Failure> {
-        let prescribed = self.held_values(depth, paddle);
+        let prescribed = self.model.held_values(self.attached, depth, paddle);
         let outcome = self.equilibrium.drive(&prescribed);
         let reached = outcome.as_ref().map_or_else(|failure| failure.reached, |()| 1.0);
         self.depth += (depth - self.depth) * reached;
@@ -310,7 +327,7 @@ impl Body<'_> {
     pub fn actuation_jacobian(&mut self) -> Result<Matrix2<f64>, Failure> {
         let mut jacobian = Matrix2::zeros();
         for axis in 0..2 {
-            let rates = self.held_values(0.0, Vector2::ith(axis, 1.0));
+            let rates = self.model.held_values(self.attached, 0.0, Vector2::ith(axis, 1.0));
             let response = self.equilibrium.sensitivity(&rates)?;
             jacobian.set_column(axis, &self.model.target.interpolate(&response));
         }
@@ -322,23 +339,8 @@ impl Body<'_> {
     /// # Errors
     /// [`Failure`] when the current state is not stable.
     pub fn depth_sensitivity(&mut self) -> Result<Vector2<f64>, Failure> {
-        let rates = self.held_values(1.0, Vector2::zeros());
+        let rates = self.model.held_values(self.attached, 1.0, Vector2::zeros());
         let response = self.equilibrium.sensitivity(&rates)?;
         Ok(self.model.target.interpolate(&response))
-    }
-
-    /// Values of all held rows, in the order immobile, needle, paddle.
-    fn held_values(&self, depth: f64, paddle: Vector2<f64>) -> Vec<f64> {
-        let model = self.model;
-        let mut values = vec![0.0; 2 * (model.immobile.len() + model.needle.len() + self.paddle_rows)];
-        let (_, rest) = values.split_at_mut(2 * model.immobile.len());
-        let (needle_values, paddle_values) = rest.split_at_mut(2 * model.needle.len());
-        for pair in needle_values.chunks_exact_mut(2) {
-            pair.copy_from_slice((model.scene.needle.axis * depth).as_slice());
-        }
-        for pair in paddle_values.chunks_exact_mut(2) {
-            pair.copy_from_slice(paddle.as_slice());
-        }
-        values
     }
 }

@@ -45,7 +45,7 @@ impl HeldRows {
 
     /// Number of held nodes.
     pub fn len(&self) -> usize {
-        self.offsets.len() - 1
+        self.offsets.len().saturating_sub(1)
     }
 
     /// Whether nothing is held.
@@ -116,19 +116,36 @@ impl<const D: usize> ConstrainedSolver<D> {
     /// When the pattern misses a pair of a held stencil.
     pub fn new(pattern: Pattern, held: HeldRows) -> Self {
         let cholesky = SparseCholesky::analyse(&pattern);
-        let mut positions = Vec::new();
+        let work = Work { solution: vec![0.0; pattern.unknowns()], ..Work::default() };
+        let mut solver = Self {
+            matrix: vec![0.0; pattern.entries()],
+            pattern,
+            cholesky,
+            held: HeldRows::default(),
+            penalty: 0.0,
+            positions: Vec::new(),
+            work,
+        };
+        solver.hold(held);
+        solver
+    }
+
+    /// Holds other rows from now on; the symbolic analysis is kept. The pattern must cover their stencils too.
+    ///
+    /// # Panics
+    /// When the pattern misses a pair of a held stencil.
+    pub fn hold(&mut self, held: HeldRows) {
+        self.positions.clear();
         for nodes in held.node_lists() {
             for (column, &j) in nodes.iter().enumerate() {
-                let find = |&i: &u32| pattern.block_position(i, j).expect("the pattern covers the held rows") as u32;
-                positions.extend(nodes[column..].iter().map(find));
+                let find =
+                    |&i: &u32| self.pattern.block_position(i, j).expect("the pattern covers the held rows") as u32;
+                self.positions.extend(nodes[column..].iter().map(find));
             }
         }
-        let work = Work {
-            solution: vec![0.0; pattern.unknowns()],
-            weighted: vec![0.0; held.len() * D],
-            violation: vec![0.0; held.len() * D],
-        };
-        Self { matrix: vec![0.0; pattern.entries()], pattern, cholesky, held, penalty: 0.0, positions, work }
+        self.work.weighted = vec![0.0; held.len() * D];
+        self.work.violation = vec![0.0; held.len() * D];
+        self.held = held;
     }
 
     /// The sparsity pattern.
@@ -150,6 +167,14 @@ impl<const D: usize> ConstrainedSolver<D> {
     pub fn assemble(&mut self, assemble: impl FnOnce(&Pattern, &mut [f64])) {
         self.matrix.fill(0.0);
         assemble(&self.pattern, &mut self.matrix);
+    }
+
+    /// Sets the matrix to a tangent assembled before.
+    ///
+    /// # Panics
+    /// When the tangent is not laid out by this pattern.
+    pub fn load(&mut self, tangent: &[f64]) {
+        self.matrix.copy_from_slice(tangent);
     }
 
     /// Mean diagonal entry of the tangent at the first factorisation: force per displacement of a node.

@@ -1,0 +1,254 @@
+//! Graded nodes: fitted to the outline and to every feature, and gathered where the solution is singular.
+//!
+//! Where boundary conditions change type (ends of paddles, of the needle contact and of the immobile part) the strain
+//! grows like r^(−1/2) or so, and on uniform nodes the error falls only linearly. A spacing that grows in proportion to
+//! the distance from such points spends the same number of nodes on every octave of r.
+
+use super::Point;
+use super::lattice::feature_points;
+use crate::scene::Scene;
+use crate::scene::geometry::{Location, Point2, distance_to_segment};
+use rstar::RTree;
+
+/// How nodes are graded.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grading {
+    /// Largest spacing, length units.
+    pub coarsest: f64,
+    /// Spacing at singular points, length units.
+    pub finest: f64,
+    /// Growth of the spacing with distance from a singular point.
+    pub slope: f64,
+    /// Spacing along the edges of inclusions, length units.
+    pub interface: f64,
+    /// Where nodes lie with respect to those edges.
+    pub fit: InterfaceFit,
+}
+
+/// How nodes meet the edge of an inclusion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InterfaceFit {
+    /// In mirrored pairs on either side, so that edges of nodal cells follow it and no cell mixes two stiffnesses.
+    Between,
+    /// On it, so that edges of triangles follow it.
+    On,
+}
+
+/// Interior nodes keep this many local spacings from nodes on the boundary and from feature points.
+const CLEARANCE: f64 = 0.55;
+/// Features closer than this (relative to the body) are one point.
+const COINCIDENT: f64 = 1e-9;
+
+/// What the spacing depends on: singular points with a factor on the finest spacing, and edges of inclusions.
+struct Field<'a> {
+    grading: &'a Grading,
+    singular: Vec<(Point2, f64)>,
+    interfaces: Vec<(Point2, Point2)>,
+}
+
+impl Field<'_> {
+    /// Spacing wanted at `x`.
+    fn spacing(&self, x: Point2) -> f64 {
+        let Grading { coarsest, finest, slope, interface, .. } = *self.grading;
+        let points = self.singular.iter().map(|(s, weight)| finest * weight + slope * (x - s).norm());
+        let edges = self.interfaces.iter().map(|(a, b)| interface + slope * distance_to_segment(x, *a, *b));
+        points.chain(edges).fold(coarsest, f64::min)
+    }
+}
+
+/// Points where the solution is singular, each with a factor on the finest spacing: 1 where the type of boundary
+/// condition changes, more where the singularity is weaker.
+fn singular_points(scene: &Scene) -> Vec<(Point2, f64)> {
+    let mut points: Vec<(Point2, f64)> = scene.paddles.iter().flat_map(|p| p.segment).map(|p| (p, 1.0)).collect();
+    points.extend(scene.needle.contact.first().map(|p| (*p, 1.0)));
+    points.extend(scene.needle.contact.last().map(|p| (*p, 1.0)));
+    for path in &scene.immobile {
+        points.extend(path.first().map(|p| (*p, 2.0)));
+        points.extend(path.last().map(|p| (*p, 2.0)));
+    }
+    // Corners of the outline that turn inwards are singular too.
+    let v = scene.outline.vertices();
+    for i in 0..v.len() {
+        let (a, b, c) = (v[(i + v.len() - 1) % v.len()], v[i], v[(i + 1) % v.len()]);
+        if crate::scene::geometry::cross(b - a, c - b) < -1e-9 * (b - a).norm() * (c - b).norm() {
+            points.push((b, 2.0));
+        }
+    }
+    points
+}
+
+/// Generates graded nodes for a scene.
+pub fn graded_nodes(scene: &Scene, grading: &Grading) -> Vec<Point<2>> {
+    let outline = &scene.outline;
+    let tolerance = COINCIDENT * outline.size();
+    let interfaces: Vec<(Point2, Point2)> = scene.inclusions.iter().flat_map(|i| i.outline.edges()).collect();
+    let field = Field { grading, singular: singular_points(scene), interfaces };
+
+    // Features first, then nodes along outline and needle contact between them.
+    let mut positions: Vec<Point2> = Vec::new();
+    let mut features = feature_points(scene);
+    if grading.fit == InterfaceFit::On {
+        let corners = scene.inclusions.iter().flat_map(|i| i.outline.vertices()).copied();
+        features.extend(corners.filter(|v| outline.locate(*v, tolerance) != Location::Outside));
+    }
+    for p in features {
+        if positions.iter().all(|x| (x - p).norm() > tolerance) {
+            positions.push(p);
+        }
+    }
+    let mut lines: Vec<(Point2, Point2)> = outline.edges().collect();
+    // A contact on the boundary is part of an outline edge already.
+    let contact = scene.needle.contact.windows(2).map(|s| (s[0], s[1]));
+    lines.extend(contact.filter(|(a, b)| !outline.segment_on_boundary(*a, *b, tolerance)));
+    let features = positions.clone();
+    for (a, b) in lines {
+        for (p, q) in pieces(a, b, &features, tolerance) {
+            positions.extend(graded_line(p, q, &|x| field.spacing(x)));
+        }
+    }
+    // Then the edges of inclusions, which give way to all of these.
+    let mut taken = Taken::new(&positions);
+    for inclusion in &scene.inclusions {
+        for (x, size) in interface_nodes(inclusion.outline.vertices(), &field, grading.fit) {
+            let inside = outline.contains(x) && outline.distance_to_boundary(x) >= CLEARANCE * size;
+            if inside && taken.is_free(x, CLEARANCE * size) {
+                taken.insert(x);
+                positions.push(x);
+            }
+        }
+    }
+    // Then the interior.
+    let (low, high) = outline.bounds();
+    let mut interior = Vec::new();
+    subdivide(low, (high - low).max(), &|x| field.spacing(x), &mut interior);
+    positions.extend(interior.into_iter().filter_map(|(x, size)| {
+        let inside = outline.contains(x) && outline.distance_to_boundary(x) >= CLEARANCE * size;
+        (inside && taken.is_free(x, CLEARANCE * size)).then_some(x)
+    }));
+    positions
+}
+
+/// The nodes that others must keep away from.
+struct Taken(RTree<[f64; 2]>);
+
+impl Taken {
+    fn new(positions: &[Point2]) -> Self {
+        Self(RTree::bulk_load(positions.iter().map(|x| [x.x, x.y]).collect()))
+    }
+
+    fn insert(&mut self, x: Point2) {
+        self.0.insert([x.x, x.y]);
+    }
+
+    fn is_free(&self, x: Point2, clearance: f64) -> bool {
+        let free = |n: &[f64; 2]| (Point2::from(*n) - x).norm() >= clearance;
+        self.0.nearest_neighbor(&[x.x, x.y]).is_none_or(free)
+    }
+}
+
+/// The segment from `a` to `b`, cut at the features on it.
+fn pieces(a: Point2, b: Point2, features: &[Point2], tolerance: f64) -> Vec<(Point2, Point2)> {
+    let direction = (b - a).normalize();
+    let mut stations: Vec<f64> = features
+        .iter()
+        .filter(|x| distance_to_segment(**x, a, b) <= tolerance)
+        .map(|x| (x - a).dot(&direction))
+        .collect();
+    stations.sort_by(f64::total_cmp);
+    stations.windows(2).map(|s| (a + direction * s[0], a + direction * s[1])).collect()
+}
+
+/// Nodes along the edges of an inclusion (vertices counter-clockwise), with their local spacing.
+fn interface_nodes(vertices: &[Point2], field: &Field<'_>, fit: InterfaceFit) -> Vec<(Point2, f64)> {
+    let n = vertices.len();
+    let mut nodes = Vec::new();
+    for i in 0..n {
+        let (a, b) = (vertices[i], vertices[(i + 1) % n]);
+        let line = graded_line(a, b, &|x| field.spacing(x));
+        match fit {
+            InterfaceFit::On => nodes.extend(line.into_iter().map(|x| (x, field.spacing(x)))),
+            InterfaceFit::Between => {
+                // Pairs across the middle of every interval: their bisector is the edge.
+                let outward = Point2::new(b.y - a.y, a.x - b.x).normalize();
+                let stations: Vec<Point2> = std::iter::once(a).chain(line).chain(std::iter::once(b)).collect();
+                for pair in stations.windows(2) {
+                    let (middle, gap) = ((pair[0] + pair[1]) * 0.5, (pair[1] - pair[0]).norm());
+                    nodes.push((middle + outward * (0.5 * gap), gap));
+                    nodes.push((middle - outward * (0.5 * gap), gap));
+                }
+                // Round a convex corner outside, so that the four cells at the corner meet in it.
+                let before = vertices[(i + n - 1) % n];
+                let ahead = (b - a).normalize() - (a - before).normalize();
+                if crate::scene::geometry::cross(a - before, b - a) > 0.0 {
+                    let gap = (stations[1] - a).norm();
+                    nodes.push((a - ahead * (0.5 * gap), gap));
+                }
+            }
+        }
+    }
+    nodes
+}
+
+/// Nodes strictly between `p` and `q` such that equal numbers of local spacings lie between them.
+fn graded_line(p: Point2, q: Point2, spacing: &impl Fn(Point2) -> f64) -> Vec<Point2> {
+    let length = (q - p).norm();
+    if length == 0.0 {
+        return Vec::new();
+    }
+    // Cumulative ∫ ds/h, stepping by a fraction of the local spacing.
+    let mut table = vec![(0.0, 0.0)];
+    let (mut s, mut total) = (0.0, 0.0);
+    while s < length {
+        let here = spacing(p + (q - p) * (s / length));
+        let step = (0.1 * here).min(length - s).max(1e-6 * length);
+        let middle = spacing(p + (q - p) * ((s + 0.5 * step) / length).min(1.0));
+        total += step / middle;
+        s += step;
+        table.push((total, s.min(length)));
+    }
+    let pieces = total.round().max(1.0) as usize;
+    let mut at = 0;
+    (1..pieces)
+        .map(|k| {
+            let wanted = total * k as f64 / pieces as f64;
+            while table[at + 1].0 < wanted {
+                at += 1;
+            }
+            let ((t0, s0), (t1, s1)) = (table[at], table[at + 1]);
+            p + (q - p) * ((s0 + (s1 - s0) * (wanted - t0) / (t1 - t0)) / length)
+        })
+        .collect()
+}
+
+/// Splits a square until it is no larger than the spacing wanted at its centre; collects centres and sizes.
+fn subdivide(low: Point2, side: f64, spacing: &impl Fn(Point2) -> f64, out: &mut Vec<(Point2, f64)>) {
+    let centre = low + Point2::repeat(0.5 * side);
+    if side <= spacing(centre) {
+        out.push((centre, side));
+        return;
+    }
+    let half = 0.5 * side;
+    for (sx, sy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+        subdivide(low + Point2::new(sx, sy) * half, half, spacing, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_follow_the_outline_and_gather_at_the_paddles() {
+        let scene = Scene::bundled("paper").unwrap();
+        let nodes = graded_nodes(&scene, &Grading { coarsest: 0.1, finest: 0.005, slope: 0.3, interface: 0.05, fit: InterfaceFit::Between });
+        assert!(scene.outline.vertices().iter().all(|v| nodes.contains(v)));
+        assert!(nodes.contains(&scene.target));
+        for paddle in &scene.paddles {
+            assert!(nodes.iter().filter(|x| distance_to_segment(**x, paddle.segment[0], paddle.segment[1]) < 1e-9).count() > 5);
+            let nearest = |p: Point2| {
+                nodes.iter().filter(|x| **x != p).map(|x| (x - p).norm()).fold(f64::INFINITY, f64::min)
+            };
+            assert!(nearest(paddle.segment[0]) < 0.008);
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! Actuation Jacobians at rest for all paddles at once: one assembly and one symbolic analysis serve them all, since
+//! they differ only in which nodal values are held.
+
+use super::model::{ModelError, TissueModel};
+use super::study::best_direction;
+use crate::mechanics::assembly::{Scatter, State, internal_force, tangent};
+use crate::solver::constrained::{ConstrainedSolver, HeldRows};
+use crate::solver::equilibrium::{Failure, FailureReason};
+use crate::solver::linear::Pattern;
+use nalgebra::{Matrix2, Vector2};
+
+/// How the target answers to one paddle and to the needle, at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RestResponse {
+    /// Actuation Jacobian, needle held: rows target x, y, columns paddle x, y.
+    pub jacobian: Matrix2<f64>,
+    /// ‖J⁻¹ n‖.
+    pub controllability_measure: f64,
+    /// d(target displacement)/d(depth), paddle held.
+    pub target_per_depth: Vector2<f64>,
+}
+
+/// Responses of all paddles of the model's scene, in its order.
+///
+/// # Errors
+/// [`ModelError`] when the tangent at rest is singular or a paddle cannot control the target.
+pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelError> {
+    let rule = model.rule();
+    let nodes = model.nodes();
+    let held = |p: usize| HeldRows::new(model.held_stencils(Some(p)));
+    let all: Vec<HeldRows> = (0..model.scene().paddles.len()).map(held).collect();
+    let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(all.iter().flat_map(HeldRows::node_lists));
+    let pattern = Pattern::new(2, nodes, lists);
+    let scatter = Scatter::new(rule, &pattern);
+    let (mut state, mut force) = (State::default(), vec![0.0; 2 * nodes]);
+    internal_force(rule, model.tissue(), &vec![0.0; 2 * nodes], &mut state, &mut force)
+        .map_err(|_| singular("at rest"))?;
+    let mut at_rest = vec![0.0; pattern.entries()];
+    tangent(rule, model.tissue(), &state, &pattern, &scatter, &mut at_rest);
+
+    let mut solver = ConstrainedSolver::<2>::new(pattern, HeldRows::default());
+    let zero = vec![0.0; 2 * nodes];
+    let mut response = vec![0.0; 2 * nodes];
+    let mut responses = Vec::with_capacity(all.len());
+    for (paddle, held) in all.into_iter().enumerate() {
+        let rows = 2 * held.len();
+        solver.hold(held);
+        solver.load(&at_rest);
+        solver.factorise().map_err(|_| singular("the tangent at rest is not positive definite"))?;
+        let mut respond = |rates: &[f64]| {
+            solver.solve(&zero, rates, 1e-12, &mut response, &mut vec![0.0; rows]);
+            model.target_row().interpolate(&response)
+        };
+        let mut jacobian = Matrix2::zeros();
+        for axis in 0..2 {
+            jacobian.set_column(axis, &respond(&model.held_values(Some(paddle), 0.0, Vector2::ith(axis, 1.0))));
+        }
+        let target_per_depth = respond(&model.held_values(Some(paddle), 1.0, Vector2::zeros()));
+        let scene = model.scene();
+        let direction = best_direction(&jacobian, scene.needle.orthogonal())
+            .map_err(|condition| ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition })?;
+        responses.push(RestResponse { jacobian, controllability_measure: direction.norm(), target_per_depth });
+    }
+    Ok(responses)
+}
+
+fn singular(detail: &str) -> Failure {
+    Failure { reason: FailureReason::SingularTangent, reached: 0.0, detail: detail.to_owned() }
+}
