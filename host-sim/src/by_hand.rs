@@ -9,7 +9,7 @@ use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 
 use crate::error::SimError;
-use crate::link::{PlantPorts, Space};
+use crate::link::{Departure, PlantPorts, Space};
 use crate::peer::{Patience, Peer};
 use crate::recorder::RunMode;
 use crate::run::{Tissue, WorldArgs};
@@ -59,7 +59,7 @@ pub fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let mut world = World::new(&model, Some(paddle), &simulation)?;
     let space = Space::new(&args.link)?;
     let outcome = insertion(args, &mut world, &space);
-    space.leave::<ipc::Service>();
+    space.leave::<ipc::Service>(Departure::Last);
     outcome?;
     let normal = scene.needle.orthogonal();
     let error = |target: [f64; 2]| Vector2::from(target).dot(&normal).abs();
@@ -74,7 +74,7 @@ pub fn plant(args: &PlantArgs) -> Result<(), SimError> {
 fn insertion(args: &PlantArgs, world: &mut World<'_>, space: &Space) -> Result<(), SimError> {
     let timeout = Duration::from_secs_f64(args.patience);
     let mut ports = PlantPorts::<ipc::Service>::open(space)?;
-    let mut peer = Peer::Elsewhere(space.clone(), "controller");
+    let mut peer = Peer::Elsewhere(Box::new(space.clone()), "controller");
     let mut patience = Patience::new(timeout);
     while !ports.has_peer() {
         patience.wait::<ipc::Service>(&mut peer)?;

@@ -41,13 +41,14 @@ pub struct Scheduling {
 /// Pages of the future are not locked: under a limit on locked memory that turns later allocations into failures.
 pub fn request_real_time() -> Scheduling {
     let memory_locked = mlockall(MlockAllFlags::CURRENT).is_ok();
-    let fifo = ThreadPriority::Crossplatform(FIFO_PRIORITY.try_into().expect("the priority is between 0 and 99"));
     // Refused without the right to it; what was obtained is asked for below.
-    let _ = set_thread_priority_and_policy(
-        thread_native_id(),
-        fifo,
-        ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo),
-    );
+    if let Ok(priority) = FIFO_PRIORITY.try_into() {
+        let _ = set_thread_priority_and_policy(
+            thread_native_id(),
+            ThreadPriority::Crossplatform(priority),
+            ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo),
+        );
+    }
     Scheduling { policy: policy_name(), memory_locked }
 }
 

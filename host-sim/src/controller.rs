@@ -15,7 +15,7 @@ use crate::control::LoopArgs;
 use crate::error::SimError;
 use crate::handover::{Handover, SequenceSpan};
 use crate::interrupt;
-use crate::link::{ClockKind, ControllerPorts, LinkError, Space};
+use crate::link::{ClockKind, ControllerPorts, Departure, LinkError, Space};
 use crate::peer::{Patience, Peer};
 use crate::recorder::{Exchange, RunMode};
 use crate::result::{LoopTiming, TickResult};
@@ -73,7 +73,7 @@ pub fn serve(args: &ControllerArgs) -> Result<(), SimError> {
     let controller = Controller::new(&table, &settings)?;
     let space = Space::new(&args.link)?;
     let outcome = serve_in(&controller, &space, args);
-    space.leave::<ipc::Service>();
+    space.leave::<ipc::Service>(Departure::First);
     let (handover, exchanges) = outcome?;
     if args.parent.is_some() {
         let said = std::io::stdout().write_all(&handover.encode(&exchanges));
@@ -93,7 +93,7 @@ fn serve_in(
     args: &ControllerArgs,
 ) -> Result<(Handover, Vec<Exchange>), SimError> {
     let parent = args.parent.and_then(rustix::process::Pid::from_raw);
-    let mut peer = parent.map_or_else(|| Peer::Elsewhere(space.clone(), "plant"), Peer::Parent);
+    let mut peer = parent.map_or_else(|| Peer::Elsewhere(Box::new(space.clone()), "plant"), Peer::Parent);
     let timeout = Duration::from_secs_f64(args.patience);
     let mut ports = ControllerPorts::<ipc::Service>::open(space)?;
     let mut patience = Patience::new(timeout);
@@ -150,11 +150,12 @@ impl<'c> Session<'c> {
     ) -> Result<(), SimError> {
         let mut patience = Patience::new(timeout);
         loop {
-            let Some(frame) = ports.clock.next()? else {
+            let Some(frame) = ports.clock.oldest()? else {
                 patience.wait::<S>(peer)?;
                 continue;
             };
             patience = Patience::new(timeout);
+            interrupt::check()?;
             match frame.kind() {
                 Some(ClockKind::Step) => self.tick(ports, frame.tick, frame.time_ns)?,
                 Some(ClockKind::Stop) => return Ok(()),
@@ -181,7 +182,7 @@ impl<'c> Session<'c> {
     ) -> Result<(), SimError> {
         let mut patience = Patience::new(timeout);
         let start = loop {
-            match ports.clock.next()? {
+            match ports.clock.oldest()? {
                 Some(frame) if frame.kind() == Some(ClockKind::Start) => break frame.time_ns,
                 Some(frame) => {
                     return Err(SimError::Protocol {
@@ -214,7 +215,7 @@ impl<'c> Session<'c> {
     ) -> Result<(), SimError> {
         loop {
             sleep_until(schedule.next_release_ns());
-            if let Some(frame) = ports.clock.next()?
+            if let Some(frame) = ports.clock.oldest()?
                 && frame.kind() == Some(ClockKind::Stop)
             {
                 return Ok(());
@@ -244,7 +245,7 @@ impl<'c> Session<'c> {
                 span.see(sequence);
             }
         }
-        self.faults = self.faults | self.state.faults();
+        self.faults |= self.state.faults();
         // Growing would allocate in the loop.
         if self.exchanges.len() < self.exchanges.capacity() {
             self.exchanges.push(Exchange { inputs, command });

@@ -18,12 +18,12 @@ pub enum SimError {
     /// The scene is not valid.
     #[error(transparent)]
     #[diagnostic(transparent)]
-    Scene(#[from] SceneError),
+    Scene(Box<SceneError>),
     /// A combination of options that makes no sense.
     #[error("{0}")]
     Usage(String),
     /// A table cannot be used.
-    #[error("the table {} cannot be used: {source}", path.display())]
+    #[error("the table {} cannot be used", path.display())]
     Table {
         /// File, or what it was computed from.
         path: PathBuf,
@@ -31,10 +31,10 @@ pub enum SimError {
         source: TableError,
     },
     /// The controller refuses its settings.
-    #[error("the controller refuses its settings: {0}")]
+    #[error("the controller refuses its settings")]
     Settings(#[from] SettingsError),
     /// A recording cannot be used.
-    #[error("the recording {} cannot be used: {source}", path.display())]
+    #[error("the recording {} cannot be used", path.display())]
     Recording {
         /// File.
         path: PathBuf,
@@ -42,7 +42,7 @@ pub enum SimError {
         source: RecordingError,
     },
     /// A file cannot be read.
-    #[error("cannot read {}: {source}", path.display())]
+    #[error("cannot read {}", path.display())]
     Read {
         /// File.
         path: PathBuf,
@@ -50,7 +50,7 @@ pub enum SimError {
         source: std::io::Error,
     },
     /// A file cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}", path.display())]
     Write {
         /// File or directory.
         path: PathBuf,
@@ -66,13 +66,13 @@ pub enum SimError {
         reason: String,
     },
     /// The tissue cannot be modelled.
-    #[error("the tissue cannot be modelled: {0}")]
+    #[error("the tissue cannot be modelled")]
     Model(#[from] ModelError),
     /// The table cannot be computed.
-    #[error("the controller table cannot be computed: {0}")]
+    #[error("the controller table cannot be computed")]
     TableBuild(#[from] model_offline::placement::table::TableBuildError),
     /// The tissue of the simulation has no equilibrium any more.
-    #[error("the simulated tissue failed at depth {depth:.4}: {source}")]
+    #[error("the simulated tissue failed at depth {depth:.4}")]
     Tissue {
         /// Needle depth, length.
         depth: f64,

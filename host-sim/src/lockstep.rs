@@ -7,6 +7,7 @@ use iceoryx2::service::Service;
 
 use crate::error::SimError;
 use crate::handover::CommandAccount;
+use crate::interrupt;
 use crate::link::{ClockFrame, ClockKind, PlantPorts};
 use crate::peer::{Patience, Peer};
 use crate::world::World;
@@ -30,6 +31,7 @@ pub fn run<S: Service>(
             ports.clock.send(ClockFrame::new(ClockKind::Stop, tick, time_ns))?;
             break;
         }
+        interrupt::check()?;
         world.publish(tick, time_ns, ports)?;
         ports.clock.send(ClockFrame::new(ClockKind::Step, tick, time_ns))?;
         let command = answer(ports, peer, tick, timeout)?;
@@ -49,7 +51,7 @@ fn answer<S: Service>(
 ) -> Result<PaddleCommand, SimError> {
     let mut patience = Patience::new(timeout);
     loop {
-        match ports.command.next()? {
+        match ports.command.oldest()? {
             Some(command) if command.tick == tick => return Ok(command),
             Some(command) => {
                 return Err(SimError::Protocol {

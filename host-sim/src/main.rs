@@ -5,10 +5,16 @@ use std::process::ExitCode;
 use clap::Parser as _;
 
 fn main() -> ExitCode {
-    match host_sim::cli::execute(host_sim::cli::Cli::parse()) {
+    let cli = host_sim::cli::Cli::parse();
+    // Two processes share one terminal: whose error is it?
+    let is_controller = matches!(cli.command, Some(host_sim::cli::Command::Controller(_)));
+    match host_sim::cli::execute(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
+            if is_controller {
+                eprintln!("controller process:");
+            }
             eprintln!("{:?}", miette::Report::new(error));
             ExitCode::from(code)
         }

@@ -26,7 +26,7 @@ pub enum Peer {
     /// The plant that has started this controller.
     Parent(Pid),
     /// A process in another terminal, known by its marks in the link's space; the name is for messages.
-    Elsewhere(Space, &'static str),
+    Elsewhere(Box<Space>, &'static str),
     /// A thread of this process, in tests.
     Thread,
 }

@@ -83,7 +83,8 @@ impl WorldArgs {
     /// [`SimError::Scene`].
     pub fn scene(&self) -> Result<Scene, SimError> {
         let path = self.scene.as_deref().unwrap_or(Path::new("paper"));
-        Ok(Scene::read(path)?)
+        // Boxed: errors travel through every result, and this one carries the scene's text.
+        Scene::read(path).map_err(|error| SimError::Scene(error.into()))
     }
 
     /// Checks the numbers and combines them with the scene's.
@@ -168,27 +169,32 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
     let studies = Studies::new(&scene, &cases, args, &simulation)?;
     let program = std::env::current_exe().map_err(SimError::Spawn)?;
 
+    let tables = cases
+        .iter()
+        .map(|case| {
+            let (table, bytes) = given_table.clone().map_or_else(|| studies.table(case.table_tissue), Ok)?;
+            // Refused settings are bad input: found before anything runs.
+            Controller::new(&table, &simulation.loop_args.settings(table.validity.depth_end))?;
+            Ok((table, bytes))
+        })
+        .collect::<Result<Vec<_>, SimError>>()?;
     let mut artifacts = Vec::new();
     let passive = studies.passive(&cases, &simulation)?;
     let mut results = Vec::new();
-    for (case, (none, fixture)) in cases.iter().zip(passive) {
+    for ((case, (none, fixture)), (table, table_bytes)) in cases.iter().zip(passive).zip(&tables) {
         let mut keep = |measured: Measured| {
             artifacts.extend(measured.1);
             measured.0
         };
         let mut strategies =
             Strategies { none: none.map(&mut keep), fixture: fixture.map(&mut keep), ..Strategies::default() };
-        let (table, table_bytes) = match &given_table {
-            Some(given) => given.clone(),
-            None => studies.table(case.table_tissue)?,
-        };
         let dynamic = |mode: RunMode| {
             let name = match mode {
                 RunMode::Lockstep => "dynamic",
                 RunMode::FreeRun => "dynamic-free-run",
             };
             studies.say(&format!("{}: dynamic, {mode}", case.tissue.name()));
-            let controller = Active { program: &program, table: &table, table_bytes: &table_bytes, mode };
+            let controller = Active { program: &program, table, table_bytes, mode };
             let model = studies.model(case.tissue);
             let progress = || studies.bar.inc(1);
             active(model, &controller, &simulation, &case.label(name), &progress)
@@ -203,7 +209,7 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
         if free_run {
             strategies.dynamic_free_run = Some(keep(dynamic(RunMode::FreeRun)?));
         }
-        results.push(case_result(case, &table, &table_bytes, strategies, &simulation)?);
+        results.push(case_result(case, table, table_bytes, strategies, &simulation)?);
     }
     studies.bar.finish_and_clear();
 

@@ -13,7 +13,7 @@ use crate::child::{ControllerCall, ControllerProcess};
 use crate::error::SimError;
 use crate::handover::Handover;
 use crate::interrupt;
-use crate::link::{PlantPorts, Space};
+use crate::link::{Departure, PlantPorts, Space};
 use crate::peer::{Patience, Peer};
 use crate::recorder::{Exchange, Header, Record, Recording, RunMode, Truth};
 use crate::result::{LedgerResult, LoopTiming, RecordingResult, SeriesPoint, StrategyResult};
@@ -115,7 +115,7 @@ pub fn active(
 ) -> Result<Measured, SimError> {
     let space = Space::unique()?;
     let outcome = in_space(model, controller, simulation, &space, progress);
-    space.leave::<ipc::Service>();
+    space.leave::<ipc::Service>(Departure::Last);
     let run = outcome?;
 
     let paddle = controller.table.paddle.index;

@@ -3,7 +3,7 @@
 //! Wake-up tails on a shared machine describe the machine. So an empty loop and the controller's take turns, block by
 //! block, and the ratio of their medians says what the controller adds.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use firmware::contract::frames::TARGET_VISIBLE;
@@ -65,7 +65,7 @@ pub fn timing(args: &TimingArgs) -> Result<TimingResult, SimError> {
     interrupt::install();
     positive("--rate", args.rate)?;
     positive("--seconds", args.seconds)?;
-    let scene = Scene::bundled("paper").expect("bundled scenes are valid");
+    let scene = Scene::read(Path::new("paper")).map_err(|error| SimError::Scene(error.into()))?;
     let model = TissueModel::new(&scene)?;
     let table = build(&model, PADDLE, &TableOptions::default())?;
     let loop_args = LoopArgs { rate: args.rate, target_rate: f64::min(50.0, args.rate), latency: 20.0, noise: None };

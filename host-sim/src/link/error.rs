@@ -13,7 +13,7 @@ pub enum LinkError {
         name: String,
     },
     /// The directory for the link's files cannot be made.
-    #[error("cannot make the directory {} for shared memory: {source}", path.display())]
+    #[error("cannot make the directory {} for shared memory", path.display())]
     Directory {
         /// Where.
         path: PathBuf,
@@ -21,10 +21,10 @@ pub enum LinkError {
         source: std::io::Error,
     },
     /// The node, the process's own entry in shared memory, cannot be created.
-    #[error("cannot enter shared memory: {0}")]
+    #[error("cannot enter shared memory")]
     Node(#[source] iceoryx2::node::NodeCreationFailure),
     /// A service cannot be opened or created.
-    #[error("cannot open the service `{service}`: {source}")]
+    #[error("cannot open the service `{service}`")]
     Service {
         /// Name of the service.
         service: &'static str,
@@ -40,7 +40,7 @@ pub enum LinkError {
         role: &'static str,
     },
     /// A publisher cannot be created.
-    #[error("cannot publish `{service}`: {source}")]
+    #[error("cannot publish `{service}`")]
     Publisher {
         /// Name of the service.
         service: &'static str,
@@ -48,7 +48,7 @@ pub enum LinkError {
         source: iceoryx2::port::publisher::PublisherCreateError,
     },
     /// A subscriber cannot be created.
-    #[error("cannot read `{service}`: {source}")]
+    #[error("cannot read `{service}`")]
     Subscriber {
         /// Name of the service.
         service: &'static str,
@@ -56,7 +56,7 @@ pub enum LinkError {
         source: iceoryx2::port::subscriber::SubscriberCreateError,
     },
     /// Connections to new peers cannot be made.
-    #[error("cannot connect `{service}` to its reader: {source}")]
+    #[error("cannot connect `{service}` to its reader")]
     Connect {
         /// Name of the service.
         service: &'static str,
@@ -64,7 +64,7 @@ pub enum LinkError {
         source: iceoryx2::port::update_connections::ConnectionFailure,
     },
     /// A frame did not leave.
-    #[error("cannot send on `{service}`: {source}")]
+    #[error("cannot send on `{service}`")]
     Send {
         /// Name of the service.
         service: &'static str,
@@ -72,7 +72,7 @@ pub enum LinkError {
         source: iceoryx2::port::SendError,
     },
     /// A frame cannot be read.
-    #[error("cannot receive on `{service}`: {source}")]
+    #[error("cannot receive on `{service}`")]
     Receive {
         /// Name of the service.
         service: &'static str,

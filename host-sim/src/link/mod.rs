@@ -17,6 +17,6 @@ mod wire;
 
 pub use error::LinkError;
 pub use ports::{ControllerPorts, PlantPorts, ReceiveCounts};
-pub use space::Space;
+pub use space::{Departure, Space};
 pub use stream::{Receiver, Sender};
 pub use wire::{ClockFrame, ClockKind, Frame, Wire};

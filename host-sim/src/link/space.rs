@@ -18,8 +18,17 @@ pub(super) const LONGEST_NAME: usize = 40;
 /// Where POSIX shared memory appears as files.
 const SHARED_MEMORY: &str = "/dev/shm";
 
-/// How long the remains of a dead peer are waited for: its locks go when the kernel has reaped it.
+/// How long others are waited for that are about to go.
 const CLEAN_UP_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Whether a process that leaves a space waits for the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Departure {
+    /// Others are still at work; whoever leaves last tidies up.
+    First,
+    /// The others are about to go: wait for them, then tidy up.
+    Last,
+}
 
 /// Shared memory of one link.
 #[derive(Clone, Debug)]
@@ -82,29 +91,35 @@ impl Space {
     }
 
     /// Removes the space if nobody is alive in it: what dead peers left, then every file of ours. The caller has
-    /// dropped its ports and waited for its children (an unreaped child counts as alive).
-    pub fn leave<S: Service>(&self) {
-        let until = Instant::now() + CLEAN_UP_TIMEOUT;
+    /// dropped its ports and waited for its children (an unreaped child counts as alive). The one who is to leave
+    /// last waits for the others with [`Departure::Last`].
+    pub fn leave<S: Service>(&self, departure: Departure) {
+        let started = Instant::now();
+        let waits_for_living = match departure {
+            Departure::First => Duration::ZERO,
+            Departure::Last => CLEAN_UP_TIMEOUT,
+        };
         loop {
-            let mut alive = false;
+            let (mut alive, mut dead) = (false, false);
             // A space whose files are partly gone cannot be listed; then nobody can be in it either.
             let _ = Node::<S>::list(&self.config, |node| {
                 match node {
                     NodeState::Alive(_) => alive = true,
-                    NodeState::Dead(dead) => {
-                        let _ = dead.try_remove_stale_resources();
+                    NodeState::Dead(view) => {
+                        dead |= view.try_remove_stale_resources().is_err();
                     }
                     NodeState::Inaccessible(_) | NodeState::Undefined(_) => {}
                 }
                 CallbackProgression::Continue
             });
-            if !alive {
+            if !alive && !dead {
                 return self.remove_files();
             }
-            if Instant::now() >= until {
-                return; // Somebody is at work here; the last one to leave tidies up.
+            let limit = if dead { CLEAN_UP_TIMEOUT } else { waits_for_living };
+            if started.elapsed() >= limit {
+                break;
             }
-            std::thread::sleep(Duration::from_millis(5));
+            std::thread::sleep(Duration::from_millis(2));
         }
     }
 

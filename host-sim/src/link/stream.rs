@@ -146,7 +146,7 @@ impl<S: Service, F: Frame> Receiver<S, F> {
     ///
     /// # Errors
     /// [`LinkError::Receive`].
-    pub fn next(&mut self) -> Result<Option<F>, LinkError> {
+    pub fn oldest(&mut self) -> Result<Option<F>, LinkError> {
         let sample = self.subscriber.receive().map_err(|source| LinkError::Receive { service: F::SERVICE, source })?;
         Ok(sample.map(|sample| {
             self.received += 1;
@@ -160,7 +160,7 @@ impl<S: Service, F: Frame> Receiver<S, F> {
     /// [`LinkError::Receive`].
     pub fn newest(&mut self) -> Result<Option<F>, LinkError> {
         let mut newest = None;
-        while let Some(frame) = self.next()? {
+        while let Some(frame) = self.oldest()? {
             self.superseded += u64::from(newest.is_some());
             newest = Some(frame);
         }

@@ -1,0 +1,244 @@
+//! Plant and controller as two processes over real shared memory, with short insertions.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use host_sim::output::read_run;
+use host_sim::recorder::Recording;
+
+fn host_sim() -> Command {
+    Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
+}
+
+fn run(out: &Path, extra: &[&str]) -> Output {
+    host_sim()
+        .args(["run", "--tissue", "homogeneous", "--quiet"])
+        .args(["--insertion-time", "0.4", "--duration", "0.5", "--out"])
+        .arg(out)
+        .args(extra)
+        .output()
+        .unwrap()
+}
+
+fn succeeded(output: &Output) {
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{}: {stderr}", output.status);
+}
+
+/// Every file of ours in shared memory and in the directory for temporary files that belongs to `process`.
+fn left_behind(process: u32) -> Vec<PathBuf> {
+    let ours = format!("run-{process}-");
+    ["/dev/shm".into(), std::env::temp_dir()]
+        .into_iter()
+        .flat_map(|directory: PathBuf| std::fs::read_dir(directory).into_iter().flatten())
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.to_string_lossy().contains(&ours))
+        .collect()
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_and_replays() {
+    let folder = tempfile::tempdir().unwrap();
+    let recordings: Vec<Vec<u8>> = ["a", "b", "c"]
+        .iter()
+        .map(|name| {
+            let out = folder.path().join(name);
+            let seed = if *name == "c" { "8" } else { "7" };
+            succeeded(&run(&out, &["--mode", "lockstep", "--seed", seed]));
+            std::fs::read(out.join("homogeneous-dynamic.rec")).unwrap()
+        })
+        .collect();
+    assert!(recordings[0] == recordings[1], "same seed");
+    assert!(recordings[0] != recordings[2], "another seed");
+
+    let path = folder.path().join("a/homogeneous-dynamic.rec");
+    let replayed = host_sim().arg("replay").arg(&path).output().unwrap();
+    succeeded(&replayed);
+
+    // A command altered under a whole chain is found by the replay.
+    let mut forged = Recording::decode(&recordings[0]).unwrap();
+    let record = &mut forged.records[300];
+    record.exchange.command.displacement[0] += f64::EPSILON;
+    std::fs::write(&path, forged.encode()).unwrap();
+    let replayed = host_sim().arg("replay").arg(&path).output().unwrap();
+    assert_eq!(replayed.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&replayed.stderr).replace(['\n', '│'], " ");
+    assert!(message.contains("1 of"), "{message}");
+
+    std::fs::write(&path, &recordings[0][..5000]).unwrap();
+    let replayed = host_sim().arg("replay").arg(&path).output().unwrap();
+    assert_eq!(replayed.status.code(), Some(2), "cut off");
+}
+
+#[test]
+fn both_modes_account_for_everything() {
+    let folder = tempfile::tempdir().unwrap();
+    for mode in ["lockstep", "free-run"] {
+        let out = folder.path().join(mode);
+        succeeded(&run(&out, &["--mode", mode]));
+        let result = read_run(&out).unwrap();
+        let strategies = &result.cases[0].strategies;
+        let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref()).unwrap();
+        let ledger = dynamic.ledger.as_ref().unwrap();
+        assert_eq!(ledger.unaccounted, 0, "{ledger:?}");
+        assert!(ledger.ticks.due >= 500);
+        assert_eq!(mode == "free-run", dynamic.timing.is_some());
+        std::fs::remove_file(out.join("report.html")).unwrap();
+        succeeded(&host_sim().arg("report").arg(&out).output().unwrap());
+        assert!(out.join("report.html").is_file());
+    }
+}
+
+/// A run that goes on until it is killed, and its controller.
+fn endless(out: &Path) -> (Child, u32) {
+    let mut plant = host_sim()
+        .args(["run", "--tissue", "homogeneous", "--quiet"])
+        .args(["--mode", "free-run", "--duration", "60", "--threads", "1"])
+        .args(["--rate", "500", "--insertion-time", "1", "--out"])
+        .arg(out)
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let children = format!("/proc/{0}/task/{0}/children", plant.id());
+    let until = Instant::now() + Duration::from_secs(120);
+    loop {
+        let found = std::fs::read_to_string(&children).unwrap_or_default();
+        if let Some(controller) = found.split_whitespace().next() {
+            // In the middle of things: after the handshake.
+            std::thread::sleep(Duration::from_millis(300));
+            return (plant, controller.parse().unwrap());
+        }
+        assert!(Instant::now() < until, "the controller has not started");
+        assert!(plant.try_wait().unwrap().is_none(), "the plant has ended");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+fn signal(process: u32, name: &str) {
+    let status = Command::new("kill").args([&format!("-{name}"), &process.to_string()]).status().unwrap();
+    assert!(status.success());
+}
+
+fn wait_until_gone(process: u32) {
+    let until = Instant::now() + Duration::from_secs(30);
+    // A zombie has ended as well; who reaps it is not ours to say.
+    let alive = || std::fs::read_to_string(format!("/proc/{process}/stat")).is_ok_and(|stat| !stat.contains(") Z "));
+    while alive() {
+        assert!(Instant::now() < until, "process {process} goes on");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+#[test]
+fn a_killed_controller_ends_the_run_with_a_message_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    for name in ["KILL", "TERM"] {
+        let (plant, controller) = endless(&out);
+        let id = plant.id();
+        signal(controller, name);
+        let output = plant.wait_with_output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{message}");
+        assert!(message.contains("controller process has died"), "{message}");
+        assert_eq!(left_behind(id), Vec::<PathBuf>::new());
+        assert!(!out.exists(), "no report of a void run");
+    }
+}
+
+#[test]
+fn a_killed_plant_leaves_nothing_and_its_controller_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut plant, controller) = endless(&folder.path().join("report"));
+    let id = plant.id();
+    signal(id, "KILL");
+    let mut stderr = plant.stderr.take().unwrap();
+    plant.wait().unwrap();
+    wait_until_gone(controller);
+    let mut message = String::new();
+    std::io::Read::read_to_string(&mut stderr, &mut message).unwrap();
+    assert!(message.contains("plant process has died"), "{message}");
+    assert_eq!(left_behind(id), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn ctrl_c_ends_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let (plant, controller) = endless(&folder.path().join("report"));
+    let id = plant.id();
+    signal(id, "INT");
+    let output = plant.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(message.contains("Ctrl-C"), "{message}");
+    wait_until_gone(controller);
+    assert_eq!(left_behind(id), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn bad_input_has_exit_code_2_and_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let table = folder.path().join("bad.table");
+    std::fs::write(&table, b"no table").unwrap();
+    let table = table.to_str().unwrap();
+    let bad: [&[&str]; 6] = [
+        &["--scene", "no-such-scene.toml"],
+        &["--rate", "-5"],
+        &["--noise", "nan"],
+        &["--table", table],
+        &["--target-rate", "5000"],
+        &["--insertion-time", "0"],
+    ];
+    for extra in bad {
+        let output =
+            host_sim().args(["run", "--tissue", "homogeneous", "--out"]).arg(&out).args(extra).output().unwrap();
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{extra:?}: {message}");
+        assert!(!message.is_empty() && !out.exists());
+    }
+}
+
+#[test]
+fn two_terminals_find_each_other_in_any_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    succeeded(&run(&out, &["--mode", "lockstep"]));
+    let recording = std::fs::read(out.join("homogeneous-dynamic.rec")).unwrap();
+    let table = folder.path().join("paper.table");
+    std::fs::write(&table, Recording::decode(&recording).unwrap().header.table).unwrap();
+    for (i, plant_first) in [true, false].into_iter().enumerate() {
+        let link = format!("hand-{}-{i}", std::process::id());
+        let plant = || {
+            host_sim()
+                .args(["plant", "--tissue", "homogeneous", "--link", &link])
+                .args(["--insertion-time", "0.4", "--duration", "0.5"])
+                .stdout(Stdio::null())
+                .spawn()
+                .unwrap()
+        };
+        let controller = || {
+            host_sim()
+                .args(["controller", "--link", &link, "--table"])
+                .arg(&table)
+                .stdout(Stdio::null())
+                .spawn()
+                .unwrap()
+        };
+        let (mut first, mut second) = if plant_first {
+            let first = plant();
+            std::thread::sleep(Duration::from_millis(200));
+            (first, controller())
+        } else {
+            let first = controller();
+            std::thread::sleep(Duration::from_millis(200));
+            (first, plant())
+        };
+        assert!(first.wait().unwrap().success());
+        assert!(second.wait().unwrap().success());
+        let root = std::env::temp_dir().join(format!("stillpoint-{link}"));
+        assert!(!root.exists(), "nothing stays behind");
+    }
+}
