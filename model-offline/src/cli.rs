@@ -2,6 +2,7 @@
 
 use crate::discretization::DiscretizationError;
 use crate::output::{self, OutputError};
+use crate::placement::adaptive::{self, ErrorEstimate};
 use crate::placement::table::{self, TableBuildError, TableOptions};
 use crate::placement::{ModelError, Placement, TissueModel, study};
 use crate::scene::schema::{self, Basis, Essential, Integration};
@@ -189,7 +190,9 @@ impl CliError {
         match self {
             Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => failure.reason.to_string(),
             Self::Model(ModelError::Uncontrollable { .. }) => "singular-jacobian".into(),
-            Self::Model(ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_))) => "singular-moment-matrix".into(),
+            Self::Model(ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_))) => {
+                "singular-moment-matrix".into()
+            }
             _ => "failed".into(),
         }
     }
@@ -328,9 +331,9 @@ fn report_failure(error: CliError, json: Option<&Path>, scene: &Scene) -> CliErr
 
 fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_json::Value, String), CliError> {
     let start = Instant::now();
-    let model = TissueModel::new(scene)?;
+    let (model, estimate) = adaptive::discretise(scene)?;
     let bar = common.progress(study::progress_steps(&model));
-    let placement = study::place(&model, NewtonSettings::default(), common.threads(), &|| bar.inc(1))?;
+    let placement = study::place(&model, study::settings_for(scene), common.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     if let Some(path) = table {
         let built = table::build(&model, placement.optimum.dynamic, &TableOptions::default())?;
@@ -344,13 +347,20 @@ fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_
         "dofs": model.dofs(),
         "integration": scene.discretization.integration,
         "wall_s": wall_s,
+        "error_estimate": estimate,
         "paddles": placement.paddles,
         "optimum": placement.optimum,
     });
-    Ok((document, summary(scene, &model, &placement, wall_s)))
+    Ok((document, summary(scene, &model, &placement, estimate, wall_s)))
 }
 
-fn summary(scene: &Scene, model: &TissueModel, placement: &Placement, wall_s: f64) -> String {
+fn summary(
+    scene: &Scene,
+    model: &TissueModel,
+    placement: &Placement,
+    estimate: Option<ErrorEstimate>,
+    wall_s: f64,
+) -> String {
     use std::fmt::Write as _;
     let mut out = format!(
         "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖   J⁻¹n                  max orthogonal (fixture)\n",
@@ -376,6 +386,14 @@ fn summary(scene: &Scene, model: &TissueModel, placement: &Placement, wall_s: f6
             p.best_direction[1],
             p.fixture.max_orthogonal,
             mark(placement.optimum.fixture),
+        );
+    }
+    if let Some(e) = estimate {
+        let _ = writeln!(
+            out,
+            "\nestimated error: controllability {:.2} %, small-depth target displacement {:.2} % of the largest",
+            100.0 * e.controllability,
+            100.0 * e.target_displacement
         );
     }
     let _ = writeln!(

@@ -17,7 +17,7 @@ fn patch_error(integration: Integration, jitter: f64) -> f64 {
     let spacing = 0.1;
     let nodes = jittered_rectangle(1.0, 1.0, 10, 10, jitter, 11);
     let method = Method { integration, basis: Basis::Linear, support: 2.0, consistent: false };
-    let planar = Planar::new(&rectangle(1.0, 1.0), nodes.clone(), Some(spacing), method).unwrap();
+    let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes.clone(), Some(spacing), method).unwrap();
     let boundary: Vec<_> =
         nodes.iter().filter(|x| [x.x, x.y].iter().any(|c| c.abs() < 1e-12 || (c - 1.0).abs() < 1e-12)).collect();
     let stencils: Vec<_> = boundary.iter().map(|x| planar.value_stencil(x).unwrap()).collect();

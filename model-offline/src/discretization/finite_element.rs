@@ -93,7 +93,15 @@ impl Elements {
             .max_by(|a, b| lowest(&a.1).total_cmp(&lowest(&b.1)));
         let Some((cell, l)) = best else { return Stencil::default() };
         // A node's own row is exactly one: rounding must not couple it to its neighbours.
-        let l = l.map(|v| if v.abs() < 1e-9 { 0.0 } else if (v - 1.0).abs() < 1e-9 { 1.0 } else { v });
+        let l = l.map(|v| {
+            if v.abs() < 1e-9 {
+                0.0
+            } else if (v - 1.0).abs() < 1e-9 {
+                1.0
+            } else {
+                v
+            }
+        });
         let t = self.corners[cell];
         let mut pairs: Vec<(u32, f64)> = match &self.middles {
             None => (0..3).map(|i| (t[i], l[i])).collect(),

@@ -39,6 +39,30 @@ const CLEARANCE: f64 = 0.55;
 /// Features closer than this (relative to the body) are one point.
 const COINCIDENT: f64 = 1e-9;
 
+impl Grading {
+    /// Refinement level of a scene: the finest spacing and the interface spacing halve from level to level, the coarsest
+    /// falls by √2 and the slope by 2^¼, so that all sources of error shrink together.
+    pub fn level(scene: &Scene, level: u32, fit: InterfaceFit) -> Self {
+        let halved = 0.5_f64.powi(level as i32);
+        let paddle = scene.paddles.iter().map(|p| (p.segment[1] - p.segment[0]).norm()).fold(f64::INFINITY, f64::min);
+        let contact: f64 = scene.needle.contact.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
+        let edge = scene
+            .inclusions
+            .iter()
+            .flat_map(|i| i.outline.edges())
+            .map(|(a, b)| (b - a).norm())
+            .fold(f64::INFINITY, f64::min);
+        let coarsest = 0.2 * scene.outline.area().sqrt() * halved.sqrt();
+        Self {
+            coarsest,
+            finest: (0.2 * paddle.min(contact) * halved).min(coarsest),
+            slope: 0.6 * halved.powf(0.25),
+            interface: (0.2 * edge * halved).min(coarsest),
+            fit,
+        }
+    }
+}
+
 /// What the spacing depends on: singular points with a factor on the finest spacing, and edges of inclusions.
 struct Field<'a> {
     grading: &'a Grading,
@@ -240,14 +264,19 @@ mod tests {
     #[test]
     fn nodes_follow_the_outline_and_gather_at_the_paddles() {
         let scene = Scene::bundled("paper").unwrap();
-        let nodes = graded_nodes(&scene, &Grading { coarsest: 0.1, finest: 0.005, slope: 0.3, interface: 0.05, fit: InterfaceFit::Between });
+        let nodes = graded_nodes(
+            &scene,
+            &Grading { coarsest: 0.1, finest: 0.005, slope: 0.3, interface: 0.05, fit: InterfaceFit::Between },
+        );
         assert!(scene.outline.vertices().iter().all(|v| nodes.contains(v)));
         assert!(nodes.contains(&scene.target));
         for paddle in &scene.paddles {
-            assert!(nodes.iter().filter(|x| distance_to_segment(**x, paddle.segment[0], paddle.segment[1]) < 1e-9).count() > 5);
-            let nearest = |p: Point2| {
-                nodes.iter().filter(|x| **x != p).map(|x| (x - p).norm()).fold(f64::INFINITY, f64::min)
-            };
+            assert!(
+                nodes.iter().filter(|x| distance_to_segment(**x, paddle.segment[0], paddle.segment[1]) < 1e-9).count()
+                    > 5
+            );
+            let nearest =
+                |p: Point2| nodes.iter().filter(|x| **x != p).map(|x| (x - p).norm()).fold(f64::INFINITY, f64::min);
             assert!(nearest(paddle.segment[0]) < 0.008);
         }
     }

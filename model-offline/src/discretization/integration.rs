@@ -100,11 +100,8 @@ pub fn direct_nodal(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resul
 const GAUSS_2: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 /// Three-point Gauss rule on [0, 1]: positions and weights.
-const GAUSS_3: [(f64, f64); 3] = [
-    (0.112_701_665_379_258_3, 5.0 / 18.0),
-    (0.5, 8.0 / 18.0),
-    (0.887_298_334_620_741_7, 5.0 / 18.0),
-];
+const GAUSS_3: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell by the divergence theorem,
 /// `g_I(L) = (1/A_L) ∮ Ψ_I n dΓ`, two Gauss points per cell edge. Passes the linear patch test and has no spurious
@@ -233,14 +230,7 @@ const TRIANGLE_6: [([f64; 3], f64); 6] = {
     const WB: f64 = 0.109_951_743_655_322;
     const A1: f64 = 1.0 - 2.0 * A;
     const B1: f64 = 1.0 - 2.0 * B;
-    [
-        ([A1, A, A], WA),
-        ([A, A1, A], WA),
-        ([A, A, A1], WA),
-        ([B1, B, B], WB),
-        ([B, B1, B], WB),
-        ([B, B, B1], WB),
-    ]
+    [([A1, A, A], WA), ([A, A1, A], WA), ([A, A, A1], WA), ([B1, B, B], WB), ([B, B1, B], WB), ([B, B, B1], WB)]
 };
 
 /// Sum of two sparse rows of gradients, the second scaled; nodes ascending.
@@ -305,10 +295,12 @@ impl<'a, 'c> CellAverage<'a, 'c> {
 
     /// Fills `nodes` and `gradients`; `node` is the one that an error names, `points` the rule per edge.
     fn compute(&mut self, node: usize, cell: &NodalCell, points: &[(f64, f64)]) -> Result<(), ShapeError> {
-        let (low, high) = cell.boundary.iter().fold(
-            (Point2::repeat(f64::INFINITY), Point2::repeat(f64::NEG_INFINITY)),
-            |(low, high), c| (low.inf(&c.0), high.sup(&c.0)),
-        );
+        let (low, high) = cell
+            .boundary
+            .iter()
+            .fold((Point2::repeat(f64::INFINITY), Point2::repeat(f64::NEG_INFINITY)), |(low, high), c| {
+                (low.inf(&c.0), high.sup(&c.0))
+            });
         self.shape.cloud().covering(&low, &high, &mut self.candidates);
         self.nodes.clear();
         self.gradients.clear();

@@ -48,13 +48,14 @@ pub struct Planar {
 }
 
 impl Planar {
-    /// Discretises the body inside `outline` with the given nodes. Their local spacing, which supports are relative to,
+    /// Discretises the body inside `outline` with the given nodes; triangles follow the edges of `inclusions`. Their local spacing, which supports are relative to,
     /// is either given or taken from the nodal cells. Quadratic triangles add nodes of their own.
     ///
     /// # Errors
     /// [`DiscretizationError`] names the node whose moment matrix fails, or says why there is no triangulation.
     pub fn new(
         outline: &Polygon,
+        inclusions: &[Polygon],
         nodes: Vec<Point2>,
         spacing: Option<f64>,
         method: Method,
@@ -66,7 +67,7 @@ impl Planar {
             method,
         };
         if matches!(method.integration, Integration::FemT3 | Integration::FemT6) {
-            let triangles = triangulate(&nodes, outline)?;
+            let triangles = triangulate(&nodes, outline, inclusions)?;
             let elements = match method.integration {
                 Integration::FemT3 => Elements::linear(nodes, triangles),
                 _ => Elements::quadratic(nodes, triangles),
@@ -84,7 +85,7 @@ impl Planar {
         };
         let mut triangles = Vec::new();
         if method.integration == Integration::Gauss {
-            triangles = triangulate(&nodes, outline)?;
+            triangles = triangulate(&nodes, outline, inclusions)?;
             cells = Elements::linear(nodes.clone(), triangles.clone()).cells();
         }
         let cloud = NodeCloud::new(nodes, half_widths);

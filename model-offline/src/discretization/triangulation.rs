@@ -3,24 +3,37 @@
 
 use crate::scene::geometry::{Point2, Polygon, cross, distance_to_segment};
 use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
+use spade::handles::FixedVertexHandle;
 
 /// The nodes cannot be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("the nodes cannot be triangulated: {0}")]
 pub struct TriangulationError(pub String);
 
-/// Triangles (counter-clockwise node numbers) that tile the outline.
+/// Triangles (counter-clockwise node numbers) that tile the outline. Their edges follow the outlines of `inclusions`
+/// wherever nodes lie on them.
 ///
 /// # Errors
 /// Nodes that coincide, or an outline that its nodes do not follow.
-pub fn triangulate(nodes: &[Point2], outline: &Polygon) -> Result<Vec<[u32; 3]>, TriangulationError> {
+pub fn triangulate(
+    nodes: &[Point2],
+    outline: &Polygon,
+    inclusions: &[Polygon],
+) -> Result<Vec<[u32; 3]>, TriangulationError> {
     let fail = |reason: &str| TriangulationError(reason.to_owned());
     let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
-    let edges = boundary_edges(nodes, outline);
-    let mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt_stable(sites, edges)
+    let tolerance = 1e-9 * outline.size();
+    let edges = edges_along(nodes, outline, tolerance);
+    let mut mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt(sites, edges)
         .map_err(|error| fail(&error.to_string()))?;
     if mesh.num_vertices() != nodes.len() {
         return Err(fail("two nodes coincide"));
+    }
+    for [a, b] in inclusions.iter().flat_map(|i| edges_along(nodes, i, tolerance)) {
+        let (a, b) = (FixedVertexHandle::from_index(a), FixedVertexHandle::from_index(b));
+        if mesh.can_add_constraint(a, b) {
+            mesh.add_constraint(a, b);
+        }
     }
     let smallest = 1e-12 * outline.size() * outline.size();
     let triangles: Vec<[u32; 3]> = mesh
@@ -59,11 +72,10 @@ pub fn area(nodes: &[Point2], t: &[u32; 3]) -> f64 {
     0.5 * cross(b - a, c - a)
 }
 
-/// Pairs of nodes that follow each other along the outline.
-fn boundary_edges(nodes: &[Point2], outline: &Polygon) -> Vec<[usize; 2]> {
-    let tolerance = 1e-9 * outline.size();
+/// Pairs of nodes that follow each other along the edges of a polygon.
+fn edges_along(nodes: &[Point2], polygon: &Polygon, tolerance: f64) -> Vec<[usize; 2]> {
     let mut edges = Vec::new();
-    for (a, b) in outline.edges() {
+    for (a, b) in polygon.edges() {
         let mut on: Vec<(f64, usize)> = nodes
             .iter()
             .enumerate()

@@ -1,6 +1,7 @@
 //! Where to put the paddle: the actuation Jacobian d(target)/d(paddle), the controllability measure ‖J⁻¹n‖, the static
 //! study, and the rankings for the static and the dynamic approach.
 
+pub mod adaptive;
 pub mod model;
 pub mod rest;
 pub mod study;

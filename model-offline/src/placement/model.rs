@@ -36,6 +36,24 @@ pub enum ModelError {
         /// Condition number of the Jacobian.
         condition: f64,
     },
+    /// A model of more nodes than are tried.
+    #[error("{nodes} nodes are needed, at most {limit} are tried")]
+    TooManyNodes {
+        /// Nodes it would take.
+        nodes: usize,
+        /// Nodes that are accepted.
+        limit: usize,
+    },
+    /// Refinement ended before the tolerance.
+    #[error(
+        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; ask for less, or use a method that converges faster (fem-t6)"
+    )]
+    ToleranceNotReached {
+        /// Asked for.
+        tolerance: f64,
+        /// Best estimate.
+        reached: f64,
+    },
     /// A choice of methods that does not exist yet.
     #[error("{0}")]
     Unsupported(String),
@@ -62,16 +80,15 @@ impl TissueModel {
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
         let spec = scene.discretization;
         let Resolution::Spacing(spacing) = spec.resolution else {
-            return Err(ModelError::Unsupported(
-                "tolerance is not available yet: give a spacing in [discretization] or with --spacing".into(),
-            ));
+            return Ok(super::adaptive::discretise(scene)?.0);
         };
         if spec.essential != Essential::Transformation {
             return Err(ModelError::Unsupported("only the transformation method is available yet".into()));
         }
         let nodes = lattice_nodes(scene, spacing);
-        let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
-        let planar = Planar::new(&scene.outline, nodes, Some(spacing), method)?;
+        let method =
+            Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
+        let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)
     }
 

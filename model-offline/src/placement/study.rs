@@ -114,8 +114,19 @@ pub fn place(
         parallel(model.scene().paddles.len(), threads, |paddle| study_paddle(model, paddle, settings, progress))
             .into_iter()
             .collect::<Result<Vec<_>, _>>()?;
-    let optimum = rank(&paddles);
+    let optimum = rank(&paddles, model.scene().needle.orthogonal());
     Ok(Placement { paddles, optimum })
+}
+
+/// Settings for the static study of a scene. On nodes refined to a tolerance the law loses stability under the needle's
+/// edge long before the full depth; finding that depth to a sixteenth of an increment is enough there.
+pub fn settings_for(scene: &crate::scene::Scene) -> NewtonSettings {
+    match scene.discretization.resolution {
+        crate::scene::Resolution::Spacing(_) => NewtonSettings::default(),
+        crate::scene::Resolution::Tolerance(_) => {
+            NewtonSettings { max_cutbacks: 4, max_iterations: 12, ..NewtonSettings::default() }
+        }
+    }
 }
 
 /// Number of times [`place`] calls its progress function.
@@ -218,17 +229,18 @@ pub fn rows(m: &Matrix2<f64>) -> [[f64; 2]; 2] {
     [[m[(0, 0)], m[(0, 1)]], [m[(1, 0)], m[(1, 1)]]]
 }
 
-/// The best paddles. A fixture that did not reach the depth ranks below every one that did, and among those that
-/// failed the deepest is best.
-fn rank(paddles: &[PaddleResult]) -> Optimum {
-    let fixture = paddles.iter().min_by(|a, b| {
-        let key = |p: &PaddleResult| match &p.fixture.failure {
-            None => (0, p.fixture.max_orthogonal),
-            Some(failure) => (1, -failure.depth),
-        };
-        let ((a_failed, a_value), (b_failed, b_value)) = (key(a), key(b));
-        a_failed.cmp(&b_failed).then(a_value.total_cmp(&b_value))
-    });
+/// The best paddles. A fixture that did not reach the depth ranks below every one that did. When none did, they are
+/// compared over the depth that all of them reached, or by their small-depth limit when there is none.
+fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
+    let complete = paddles.iter().any(|p| p.fixture.failure.is_none());
+    let common = paddles.iter().map(|p| p.fixture.depth.len()).min().unwrap_or(0);
+    let key = |p: &PaddleResult| match &p.fixture.failure {
+        None => p.fixture.max_orthogonal,
+        Some(_) if complete => f64::INFINITY,
+        Some(_) if common > 0 => p.fixture.orthogonal[..common].iter().fold(0.0, |m, x| f64::max(m, x.abs())),
+        Some(_) => Vector2::from(p.target_per_depth).dot(&normal).abs(),
+    };
+    let fixture = paddles.iter().min_by(|a, b| key(a).total_cmp(&key(b)));
     let dynamic = paddles.iter().min_by(|a, b| a.controllability_measure.total_cmp(&b.controllability_measure));
     Optimum { fixture: fixture.map_or(0, |p| p.index), dynamic: dynamic.map_or(0, |p| p.index) }
 }

@@ -169,11 +169,7 @@ fn path_slope(direction: Vector2<f64>, sensitivity: Vector2<f64>, normal: Vector
 /// Actuation Jacobian, J⁻¹n, and d(target)/d(depth).
 type Linearisation = (Matrix2<f64>, Vector2<f64>, Vector2<f64>);
 
-fn linearise(
-    body: &mut Body<'_>,
-    paddle: u32,
-    normal: Vector2<f64>,
-) -> Result<Linearisation, ModelError> {
+fn linearise(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<Linearisation, ModelError> {
     let jacobian = body.actuation_jacobian()?;
     let direction =
         best_direction(&jacobian, normal).map_err(|condition| ModelError::Uncontrollable { paddle, condition })?;

@@ -192,6 +192,11 @@ impl Scene {
         Self { inclusions: Vec::new(), ..self.clone() }
     }
 
+    /// The regions of the inclusions.
+    pub fn inclusion_outlines(&self) -> Vec<Polygon> {
+        self.inclusions.iter().map(|i| i.outline.clone()).collect()
+    }
+
     /// The label of the tissue, as reports and tables carry it.
     pub fn tissue(&self) -> &'static str {
         if self.inclusions.is_empty() { "homogeneous" } else { "inclusion" }
