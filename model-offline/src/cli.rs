@@ -280,7 +280,7 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             let options = TableOptions { knots, ..TableOptions::default() };
             let paddle = match paddle {
                 Some(index) => index,
-                None => study::best_dynamic(&model, common.threads())?,
+                None => study::best_dynamic(&model)?,
             };
             let table = table::build(&model, paddle, &options)?;
             let bytes = table::to_bytes(&table)?;
@@ -332,8 +332,12 @@ fn report_failure(error: CliError, json: Option<&Path>, scene: &Scene) -> CliErr
 fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_json::Value, String), CliError> {
     let start = Instant::now();
     let (model, estimate) = adaptive::discretise(scene)?;
+    let profile = match estimate {
+        Some(_) => adaptive::profile_model(&model)?,
+        None => model.clone(),
+    };
     let bar = common.progress(study::progress_steps(&model));
-    let placement = study::place(&model, study::settings_for(scene), common.threads(), &|| bar.inc(1))?;
+    let placement = study::place_on(&model, &profile, study::settings_for(scene), common.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     if let Some(path) = table {
         let built = table::build(&model, placement.optimum.dynamic, &TableOptions::default())?;
@@ -348,6 +352,7 @@ fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_
         "integration": scene.discretization.integration,
         "wall_s": wall_s,
         "error_estimate": estimate,
+        "static_nodes": profile.nodes(),
         "paddles": placement.paddles,
         "optimum": placement.optimum,
     });

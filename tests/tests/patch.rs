@@ -28,7 +28,7 @@ fn patch_error(integration: Integration, jitter: f64) -> f64 {
         Arc::clone(planar.rule()),
         tissue,
         HeldRows::new(stencils.iter()),
-        nodes.len(),
+        &nodes,
         spacing,
         NewtonSettings::default(),
     )

@@ -2,8 +2,8 @@
 //! the Gauss rule.
 
 use crate::scene::geometry::{Point2, Polygon, cross, distance_to_segment};
-use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
 use spade::handles::FixedVertexHandle;
+use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
 
 /// The nodes cannot be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -217,7 +217,7 @@ impl TissueModel {
             Arc::clone(self.planar.rule()),
             self.tissue.clone(),
             held,
-            self.nodes(),
+            self.positions(),
             self.spacing,
             settings,
         )?;

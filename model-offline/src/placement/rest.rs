@@ -16,6 +16,8 @@ pub struct RestResponse {
     pub jacobian: Matrix2<f64>,
     /// ‖J⁻¹ n‖.
     pub controllability_measure: f64,
+    /// J⁻¹ n.
+    pub best_direction: Vector2<f64>,
     /// d(target displacement)/d(depth), paddle held.
     pub target_per_depth: Vector2<f64>,
 }
@@ -38,7 +40,7 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
     let mut at_rest = vec![0.0; pattern.entries()];
     tangent(rule, model.tissue(), &state, &pattern, &scatter, &mut at_rest);
 
-    let mut solver = ConstrainedSolver::<2>::new(pattern, HeldRows::default());
+    let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), HeldRows::default());
     let zero = vec![0.0; 2 * nodes];
     let mut response = vec![0.0; 2 * nodes];
     let mut responses = Vec::with_capacity(all.len());
@@ -59,7 +61,12 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
         let scene = model.scene();
         let direction = best_direction(&jacobian, scene.needle.orthogonal())
             .map_err(|condition| ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition })?;
-        responses.push(RestResponse { jacobian, controllability_measure: direction.norm(), target_per_depth });
+        responses.push(RestResponse {
+            jacobian,
+            controllability_measure: direction.norm(),
+            best_direction: direction,
+            target_per_depth,
+        });
     }
     Ok(responses)
 }

@@ -1,6 +1,7 @@
 //! The placement study: every paddle, static and dynamic.
 
 use super::model::{ModelError, TissueModel};
+use super::rest::{RestResponse, rest_responses};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
@@ -110,8 +111,24 @@ pub fn place(
     threads: usize,
     progress: &(dyn Fn() + Sync),
 ) -> Result<Placement, ModelError> {
+    place_on(model, model, settings, threads, progress)
+}
+
+/// The same with the insertion followed to depth on a model of its own (see
+/// [`profile_model`](super::adaptive::profile_model)).
+///
+/// # Errors
+/// [`ModelError`] when a Jacobian cannot be computed.
+pub fn place_on(
+    model: &TissueModel,
+    profile: &TissueModel,
+    settings: NewtonSettings,
+    threads: usize,
+    progress: &(dyn Fn() + Sync),
+) -> Result<Placement, ModelError> {
+    let rest = rest_responses(model)?;
     let paddles =
-        parallel(model.scene().paddles.len(), threads, |paddle| study_paddle(model, paddle, settings, progress))
+        parallel(rest.len(), threads, |paddle| study_paddle(profile, &rest[paddle], paddle, settings, progress))
             .into_iter()
             .collect::<Result<Vec<_>, _>>()?;
     let optimum = rank(&paddles, model.scene().needle.orthogonal());
@@ -119,12 +136,12 @@ pub fn place(
 }
 
 /// Settings for the static study of a scene. On nodes refined to a tolerance the law loses stability under the needle's
-/// edge long before the full depth; finding that depth to a sixteenth of an increment is enough there.
+/// edge long before the full depth; finding that depth to an eighth of an increment is enough there.
 pub fn settings_for(scene: &crate::scene::Scene) -> NewtonSettings {
     match scene.discretization.resolution {
         crate::scene::Resolution::Spacing(_) => NewtonSettings::default(),
         crate::scene::Resolution::Tolerance(_) => {
-            NewtonSettings { max_cutbacks: 4, max_iterations: 12, ..NewtonSettings::default() }
+            NewtonSettings { max_cutbacks: 3, max_iterations: 8, ..NewtonSettings::default() }
         }
     }
 }
@@ -138,23 +155,20 @@ pub fn progress_steps(model: &TissueModel) -> u64 {
 ///
 /// # Errors
 /// [`ModelError`] when a Jacobian cannot be computed.
-pub fn best_dynamic(model: &TissueModel, threads: usize) -> Result<u32, ModelError> {
-    let scene = model.scene();
-    let measures = parallel(scene.paddles.len(), threads, |paddle| {
-        let index = scene.paddles[paddle].index;
-        let jacobian = model.body(Some(paddle), NewtonSettings::default())?.actuation_jacobian()?;
-        match best_direction(&jacobian, scene.needle.orthogonal()) {
-            Ok(direction) => Ok((index, direction.norm())),
-            Err(condition) => Err(ModelError::Uncontrollable { paddle: index, condition }),
-        }
-    })
-    .into_iter()
-    .collect::<Result<Vec<_>, ModelError>>()?;
-    Ok(measures.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |m| m.0))
+pub fn best_dynamic(model: &TissueModel) -> Result<u32, ModelError> {
+    let measures = rest_responses(model)?;
+    let best = model
+        .scene()
+        .paddles
+        .iter()
+        .zip(&measures)
+        .min_by(|a, b| a.1.controllability_measure.total_cmp(&b.1.controllability_measure));
+    Ok(best.map_or(0, |b| b.0.index))
 }
 
 fn study_paddle(
     model: &TissueModel,
+    rest: &RestResponse,
     paddle: usize,
     settings: NewtonSettings,
     progress: &(dyn Fn() + Sync),
@@ -163,10 +177,6 @@ fn study_paddle(
     let index = scene.paddles[paddle].index;
     let normal = scene.needle.orthogonal();
     let mut body = model.body(Some(paddle), settings)?;
-    let jacobian = body.actuation_jacobian()?;
-    let best_direction = best_direction(&jacobian, normal)
-        .map_err(|condition| ModelError::Uncontrollable { paddle: index, condition })?;
-    let target_per_depth = body.depth_sensitivity()?;
 
     let mut fixture = StaticStudy {
         depth: Vec::new(),
@@ -202,10 +212,10 @@ fn study_paddle(
     }
     Ok(PaddleResult {
         index,
-        jacobian: rows(&jacobian),
-        controllability_measure: best_direction.norm(),
-        best_direction: best_direction.into(),
-        target_per_depth: target_per_depth.into(),
+        jacobian: rows(&rest.jacobian),
+        controllability_measure: rest.controllability_measure,
+        best_direction: rest.best_direction.into(),
+        target_per_depth: rest.target_per_depth.into(),
         jacobians,
         fixture,
     })

@@ -15,7 +15,7 @@
 //! on μ. The constraint error shrinks by about ρ⁻¹ K per round; a few rounds reach rounding error.
 
 use super::linear::{NotPositiveDefinite, Pattern, SparseCholesky};
-use crate::discretization::Stencil;
+use crate::discretization::{Point, Stencil};
 
 /// Penalty over the mean diagonal of the tangent. Large enough that two or three rounds of multipliers reach rounding
 /// error, small enough that the factor of K_ρ keeps its digits.
@@ -110,12 +110,12 @@ struct Work {
 }
 
 impl<const D: usize> ConstrainedSolver<D> {
-    /// Analyses the pattern, which must cover the stencils of the held rows.
+    /// Analyses the pattern of nodes at `positions`, which must cover the stencils of the held rows.
     ///
     /// # Panics
     /// When the pattern misses a pair of a held stencil.
-    pub fn new(pattern: Pattern, held: HeldRows) -> Self {
-        let cholesky = SparseCholesky::analyse(&pattern);
+    pub fn new(pattern: Pattern, positions: &[Point<D>], held: HeldRows) -> Self {
+        let cholesky = SparseCholesky::analyse(&pattern, positions);
         let work = Work { solution: vec![0.0; pattern.unknowns()], ..Work::default() };
         let mut solver = Self {
             matrix: vec![0.0; pattern.entries()],

@@ -7,7 +7,7 @@
 
 use super::constrained::{ConstrainedSolver, HeldRows};
 use super::linear::Pattern;
-use crate::discretization::Quadrature;
+use crate::discretization::{Point, Quadrature};
 use crate::mechanics::assembly::{self, Inverted, Scatter, State, Tissue};
 use serde::Serialize;
 use std::sync::Arc;
@@ -123,7 +123,7 @@ enum Attempt {
 }
 
 impl<const D: usize> Equilibrium<D> {
-    /// A body at rest: `nodes` coefficients vectors, integrated by `rule`, made of `tissue`, with `held` rows whose
+    /// A body at rest with nodes at `positions`, integrated by `rule`, made of `tissue`, with `held` rows whose
     /// values will be prescribed. `spacing` is a typical node spacing.
     ///
     /// # Errors
@@ -132,10 +132,11 @@ impl<const D: usize> Equilibrium<D> {
         rule: Arc<Quadrature<D>>,
         tissue: Tissue,
         held: HeldRows,
-        nodes: usize,
+        positions: &[Point<D>],
         spacing: f64,
         settings: NewtonSettings,
     ) -> Result<Self, Failure> {
+        let nodes = positions.len();
         let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(held.node_lists());
         let pattern = Pattern::new(D, nodes, lists);
         let scatter = Scatter::new(&rule, &pattern);
@@ -147,7 +148,7 @@ impl<const D: usize> Equilibrium<D> {
             energy: 0.0,
             state: State::default(),
         };
-        let solver = ConstrainedSolver::new(pattern, held);
+        let solver = ConstrainedSolver::new(pattern, positions, held);
         let mut body = Self {
             rule,
             tissue,

@@ -1,8 +1,11 @@
 //! Sparse symmetric systems of node blocks, factorised by faer: symbolic analysis once per pattern, numbers per
 //! iteration.
 
+use super::ordering::{Graph, nested_dissection};
+use crate::discretization::Point;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
@@ -104,11 +107,44 @@ impl Pattern {
         self.column_starts[u] as usize + u % self.dimension
     }
 
+    /// The graph of nodes that share a block.
+    fn graph(&self) -> Graph {
+        let nodes = self.block_starts.len() - 1;
+        let column = |j: usize| &self.block_rows[self.block_starts[j] as usize + 1..self.block_starts[j + 1] as usize];
+        let mut starts = vec![0_u32; nodes + 1];
+        for j in 0..nodes {
+            starts[j + 1] += column(j).len() as u32;
+            for &i in column(j) {
+                starts[i as usize + 1] += 1;
+            }
+        }
+        for i in 0..nodes {
+            starts[i + 1] += starts[i];
+        }
+        let mut fill = starts.clone();
+        let mut neighbours = vec![0_u32; starts[nodes] as usize];
+        let mut join = |a: usize, b: usize| {
+            neighbours[fill[a] as usize] = b as u32;
+            fill[a] += 1;
+        };
+        for j in 0..nodes {
+            for &i in column(j) {
+                join(i as usize, j);
+                join(j, i as usize);
+            }
+        }
+        Graph { starts, neighbours }
+    }
+
     fn symbolic(&self) -> SymbolicSparseColMatRef<'_, u32> {
         let n = self.unknowns();
         SymbolicSparseColMatRef::new_checked(n, n, &self.column_starts, None, &self.row_indices)
     }
 }
+
+/// From this many nodes on, nested dissection gives less fill than minimum degree (SCNI, support 2: 6.28 against 6.49
+/// million entries at 5,741 nodes, but 1.08 against 1.00 at 1,471).
+const DISSECTION_PAYS: usize = 3000;
 
 /// The matrix is not positive definite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -131,18 +167,29 @@ impl std::fmt::Debug for SparseCholesky {
 }
 
 impl SparseCholesky {
-    /// Orders and analyses a pattern.
+    /// Orders and analyses a pattern of nodes at `positions`.
     ///
     /// # Panics
     /// When memory for the analysis cannot be had.
-    pub fn analyse(pattern: &Pattern) -> Self {
-        let symbolic = factorize_symbolic_cholesky(
-            pattern.symbolic(),
-            Side::Lower,
-            SymmetricOrdering::Amd,
-            CholeskySymbolicParams::default(),
-        )
-        .expect("memory for the symbolic factorisation");
+    pub fn analyse<const D: usize>(pattern: &Pattern, positions: &[Point<D>]) -> Self {
+        let nodes = pattern.unknowns() / pattern.dimension;
+        let (forward, inverse);
+        let ordering = if nodes < DISSECTION_PAYS {
+            SymmetricOrdering::Amd
+        } else {
+            let d = pattern.dimension as u32;
+            let order = nested_dissection(&pattern.graph(), positions);
+            forward = order.iter().flat_map(|i| (0..d).map(move |k| i * d + k)).collect::<Vec<u32>>();
+            let mut places = vec![0_u32; forward.len()];
+            for (place, &u) in forward.iter().enumerate() {
+                places[u as usize] = place as u32;
+            }
+            inverse = places;
+            SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, forward.len()))
+        };
+        let symbolic =
+            factorize_symbolic_cholesky(pattern.symbolic(), Side::Lower, ordering, CholeskySymbolicParams::default())
+                .expect("memory for the symbolic factorisation");
         let factor = vec![0.0; symbolic.len_val()];
         let workspace = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()));
         let solve_workspace = MemBuffer::new(StackReq::EMPTY);

@@ -3,3 +3,4 @@
 pub mod constrained;
 pub mod equilibrium;
 pub mod linear;
+mod ordering;
