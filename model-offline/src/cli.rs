@@ -181,6 +181,7 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Usage(..) | Self::BadTable { .. } => 2,
+            Self::Model(ModelError::Unsupported(_)) => 2,
             Self::Table(TableBuildError::NoSuchPaddle(_) | TableBuildError::Knots(_)) => 2,
             _ => 1,
         }

@@ -44,11 +44,18 @@ impl Elements {
 
     /// The triangles as cells.
     pub fn cells(&self) -> Vec<NodalCell> {
+        let mut owner: BTreeMap<(u32, u32), u32> = BTreeMap::new();
+        let directed = |t: &[u32; 3], e: usize| (t[e], t[(e + 1) % 3]);
+        for (cell, t) in self.corners.iter().enumerate() {
+            owner.extend((0..3).map(|e| (directed(t, e), cell as u32)));
+        }
+        // The same edge, run the other way, belongs to the triangle across it.
+        let across = |(a, b): (u32, u32)| owner.get(&(b, a)).map_or(Across::Outline(u32::MAX), |c| Across::Cell(*c));
         self.corners
             .iter()
-            .map(|t| {
-                let boundary = t.map(|i| (self.positions[i as usize], Across::Outline(u32::MAX))).to_vec();
-                NodalCell { boundary, area: super::triangulation::area(&self.positions, t) }
+            .map(|t| NodalCell {
+                boundary: (0..3).map(|e| (self.positions[t[e] as usize], across(directed(t, e)))).collect(),
+                area: super::triangulation::area(&self.positions, t),
             })
             .collect()
     }

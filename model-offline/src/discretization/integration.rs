@@ -96,11 +96,11 @@ pub fn direct_nodal(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resul
     Ok(rule)
 }
 
-/// Two-point Gauss rule on [0, 1], each point with weight ½.
-const GAUSS_2: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+/// Two-point Gauss rule on [0, 1]: positions and weights.
+pub(super) const GAUSS_2: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
 /// Three-point Gauss rule on [0, 1]: positions and weights.
-const GAUSS_3: [(f64, f64); 3] =
+pub(super) const GAUSS_3: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell by the divergence theorem,
@@ -116,7 +116,7 @@ pub fn stabilised_conforming_nodal(
     let mut average = CellAverage::new(shape);
     let mut rule = Quadrature::default();
     for (node, cell) in cells.iter().enumerate() {
-        average.compute(node, cell, &GAUSS_2.map(|s| (s, 0.5)))?;
+        average.compute(node, cell, &GAUSS_2)?;
         rule.push(cell.area, node, &average.nodes, &average.gradients);
     }
     Ok(rule)
@@ -149,7 +149,7 @@ pub fn naturally_stabilised_nodal(
             shape.evaluate(&x, node, &candidates, Reproduce::Derivative(axis), true, stencil)?;
         }
         let mean = if consistent {
-            average.compute(node, cell, &GAUSS_2.map(|s| (s, 0.5)))?;
+            average.compute(node, cell, &GAUSS_2)?;
             (average.nodes.clone(), average.gradients.clone())
         } else {
             (field.nodes.clone(), field.gradients.clone())
@@ -223,7 +223,7 @@ const TRIANGLE_3: [([f64; 3], f64); 3] = {
 };
 
 /// Degree 4 on a triangle (Dunavant 1985).
-const TRIANGLE_6: [([f64; 3], f64); 6] = {
+pub(super) const TRIANGLE_6: [([f64; 3], f64); 6] = {
     const A: f64 = 0.445_948_490_915_965;
     const WA: f64 = 0.223_381_589_678_011;
     const B: f64 = 0.091_576_213_509_771;

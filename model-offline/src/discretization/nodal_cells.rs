@@ -9,9 +9,9 @@ use crate::scene::geometry::{Point2, Polygon, clip_half_plane, signed_area};
 /// What lies on the other side of a cell's edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Across {
-    /// The cell of this node.
-    Node(u32),
-    /// Nothing: this edge of the outline.
+    /// Another cell.
+    Cell(u32),
+    /// Nothing: this edge of the outline (`u32::MAX` where it is not known which).
     Outline(u32),
 }
 
@@ -86,7 +86,7 @@ fn cut_by_bisectors(
 ) -> Vec<(Point2, Across)> {
     for &i in neighbours {
         let other = nodes[i as usize];
-        clip_half_plane(&current, (x + other) * 0.5, other - x, Across::Node(i), scratch);
+        clip_half_plane(&current, (x + other) * 0.5, other - x, Across::Cell(i), scratch);
         std::mem::swap(&mut current, scratch);
     }
     current

@@ -6,6 +6,7 @@ use super::triangulation::{TriangulationError, triangulate};
 use super::{NodalCell, NodeCloud, Point, Quadrature, ShapeError, ShapeFunctions, Stencil, integration};
 use crate::scene::schema::{Basis, Integration};
 use crate::scene::{Point2, Polygon};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// How the displacement is approximated and the weak form integrated.
@@ -125,6 +126,26 @@ impl Planar {
     /// How the displacement is approximated.
     pub fn method(&self) -> Method {
         self.method
+    }
+
+    /// Gauss points per boundary edge: those that cell gradients are averaged with.
+    pub(super) fn edge_rule(&self) -> &'static [(f64, f64)] {
+        match self.method.integration {
+            Integration::Dni | Integration::Scni | Integration::Nsni => &integration::GAUSS_2,
+            Integration::Gauss | Integration::FemT3 | Integration::FemT6 => &integration::GAUSS_3,
+        }
+    }
+
+    /// Mean gradients of the shape functions over every cell: nodes (ascending) and gradients.
+    pub fn cell_gradients(&self) -> Vec<(Vec<u32>, Vec<Point<2>>)> {
+        let mut rows: Vec<BTreeMap<u32, Point<2>>> = vec![BTreeMap::new(); self.cells.len()];
+        for point in self.rule.points() {
+            let share = point.weight / self.cells[point.cell as usize].area;
+            for (&i, gradient) in point.nodes.iter().zip(point.gradients) {
+                *rows[point.cell as usize].entry(i).or_insert_with(Point::zeros) += gradient * share;
+            }
+        }
+        rows.into_iter().map(|row| row.into_iter().unzip()).collect()
     }
 
     /// Values of the shape functions at a point: `u(X) = Σ_I Ψ_I(X) d_I`.

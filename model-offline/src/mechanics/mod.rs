@@ -2,6 +2,7 @@
 
 pub mod assembly;
 pub mod material;
+pub mod nitsche;
 pub use assembly::Tissue;
 
 pub use material::{FungTensors, Material, MaterialError};

@@ -1,13 +1,15 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
+use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::lattice::lattice_nodes;
 use crate::discretization::{DiscretizationError, Method, NodalCell, Planar, Quadrature, ShapeError, Stencil};
+use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{Material, Tissue};
 use crate::scene::geometry::{Point2, distance_to_polyline, overlap_area};
 use crate::scene::schema::Essential;
 use crate::scene::{Resolution, Scene};
 use crate::solver::constrained::HeldRows;
-use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings};
+use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings, WeaklyHeld};
 use nalgebra::{Matrix2, Vector2};
 use std::sync::Arc;
 
@@ -66,10 +68,58 @@ pub struct TissueModel {
     planar: Planar,
     tissue: Tissue,
     spacing: f64,
-    immobile: Vec<Stencil<2>>,
-    needle: Vec<Stencil<2>>,
-    paddles: Vec<Vec<Stencil<2>>>,
+    held: Held,
     target: Stencil<2>,
+}
+
+/// What holds the body: nodes whose values are prescribed, or boundary points that Nitsche's method holds.
+#[derive(Debug, Clone)]
+enum Held {
+    Nodes(Groups<Stencil<2>>),
+    Boundary(Groups<BoundaryPoint>),
+}
+
+/// The same kind of thing for the immobile part, the needle contact and every paddle.
+#[derive(Debug, Clone)]
+struct Groups<T> {
+    immobile: Vec<T>,
+    needle: Vec<T>,
+    paddles: Vec<Vec<T>>,
+}
+
+impl<T> Groups<T> {
+    /// Collects each group by the polylines it lies on.
+    fn collect(scene: &Scene, on: impl Fn(&[&[Point2]]) -> Result<Vec<T>, ShapeError>) -> Result<Self, ModelError> {
+        let some = |paths: &[&[Point2]], name: &str| -> Result<Vec<T>, ModelError> {
+            let held = on(paths)?;
+            if held.is_empty() { Err(ModelError::NothingHeld(name.to_owned())) } else { Ok(held) }
+        };
+        let immobile: Vec<&[Point2]> = scene.immobile.iter().map(Vec::as_slice).collect();
+        Ok(Self {
+            immobile: some(&immobile, "immobile part")?,
+            needle: some(&[&scene.needle.contact], "needle contact")?,
+            paddles: scene
+                .paddles
+                .iter()
+                .map(|p| some(&[&p.segment], &format!("paddle {}", p.index)))
+                .collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// Immobile part, needle, and the paddle that is attached, in this order.
+    fn with_paddle(&self, paddle: Option<usize>) -> impl Iterator<Item = &T> {
+        let paddle = paddle.map_or(&[][..], |p| &self.paddles[p]);
+        self.immobile.iter().chain(&self.needle).chain(paddle)
+    }
+
+    /// Two prescribed numbers per member, in the same order.
+    fn values(&self, paddle: Option<usize>, needle_value: Vector2<f64>, paddle_value: Vector2<f64>) -> Vec<f64> {
+        let repeat = |value: Vector2<f64>, count: usize| std::iter::repeat_n([value.x, value.y], count).flatten();
+        repeat(Vector2::zeros(), self.immobile.len())
+            .chain(repeat(needle_value, self.needle.len()))
+            .chain(repeat(paddle_value, paddle.map_or(0, |p| self.paddles[p].len())))
+            .collect()
+    }
 }
 
 impl TissueModel {
@@ -82,9 +132,6 @@ impl TissueModel {
         let Resolution::Spacing(spacing) = spec.resolution else {
             return Ok(super::adaptive::discretise(scene)?.0);
         };
-        if spec.essential != Essential::Transformation {
-            return Err(ModelError::Unsupported("only the transformation method is available yet".into()));
-        }
         let nodes = lattice_nodes(scene, spacing);
         let method =
             Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
@@ -98,25 +145,32 @@ impl TissueModel {
     /// [`ModelError::NothingHeld`] when no node lies on a feature.
     pub fn on(scene: &Scene, planar: Planar, spacing: f64) -> Result<Self, ModelError> {
         let tolerance = 1e-9 * scene.outline.size();
-        let on = |paths: &[&[Point2]], name: &str| -> Result<Vec<Stencil<2>>, ModelError> {
-            let near = |x: &&Point2| paths.iter().any(|path| distance_to_polyline(**x, path) <= tolerance);
-            let held: Vec<_> =
-                planar.positions().iter().filter(near).map(|x| planar.value_stencil(x)).collect::<Result<_, _>>()?;
-            if held.is_empty() { Err(ModelError::NothingHeld(name.to_owned())) } else { Ok(held) }
+        let held = match scene.discretization.essential {
+            Essential::Transformation => Held::Nodes(Groups::collect(scene, |paths| {
+                let near = |x: &&Point2| paths.iter().any(|path| distance_to_polyline(**x, path) <= tolerance);
+                planar.positions().iter().filter(near).map(|x| planar.value_stencil(x)).collect()
+            })?),
+            Essential::Nitsche => {
+                let contact = &scene.needle.contact;
+                if !contact.windows(2).all(|s| scene.outline.segment_on_boundary(s[0], s[1], tolerance)) {
+                    return Err(ModelError::Unsupported(
+                        "Nitsche's method holds boundary, and this needle contact is inside the body: use essential = \"transformation\"".into(),
+                    ));
+                }
+                Held::Boundary(Groups::collect(scene, |paths| {
+                    paths
+                        .iter()
+                        .map(|path| planar.boundary_points_on(path))
+                        .collect::<Result<Vec<_>, _>>()
+                        .map(|v| v.concat())
+                })?)
+            }
         };
-        let immobile: Vec<&[Point2]> = scene.immobile.iter().map(Vec::as_slice).collect();
-        let paddles = scene
-            .paddles
-            .iter()
-            .map(|p| on(&[&p.segment], &format!("paddle {}", p.index)))
-            .collect::<Result<_, _>>()?;
         Ok(Self {
             tissue: tissue_of(scene, planar.cells()),
             scene: scene.clone(),
             spacing,
-            immobile: on(&immobile, "immobile part")?,
-            needle: on(&[&scene.needle.contact], "needle contact")?,
-            paddles,
+            held,
             target: planar.value_stencil(&scene.target)?,
             planar,
         })
@@ -187,19 +241,30 @@ impl TissueModel {
         self.scene.paddles.iter().position(|p| p.index == index)
     }
 
-    /// Stencils of the held nodes, in the order immobile, needle, paddle.
-    pub(crate) fn held_stencils(&self, paddle: Option<usize>) -> impl Iterator<Item = &Stencil<2>> {
-        let paddle = paddle.map_or(&[][..], |p| &self.paddles[p]);
-        self.immobile.iter().chain(&self.needle).chain(paddle)
+    /// Rows of the held nodes when a paddle is attached, or none where Nitsche's method holds them.
+    pub(crate) fn held_rows(&self, paddle: Option<usize>) -> Option<HeldRows> {
+        match &self.held {
+            Held::Nodes(groups) => Some(HeldRows::new(groups.with_paddle(paddle))),
+            Held::Boundary(_) => None,
+        }
     }
 
-    /// Values of all held rows, in the same order.
+    fn weakly_held(&self, paddle: Option<usize>) -> Option<Arc<dyn WeaklyHeld>> {
+        match &self.held {
+            Held::Nodes(_) => None,
+            Held::Boundary(groups) => {
+                Some(Arc::new(Nitsche::new(&self.planar, &self.tissue, groups.with_paddle(paddle).cloned())))
+            }
+        }
+    }
+
+    /// Prescribed values of everything held: needle at `depth`, paddle displaced.
     pub(crate) fn held_values(&self, paddle: Option<usize>, depth: f64, displacement: Vector2<f64>) -> Vec<f64> {
-        let repeat = |value: Vector2<f64>, count: usize| std::iter::repeat_n([value.x, value.y], count).flatten();
-        repeat(Vector2::zeros(), self.immobile.len())
-            .chain(repeat(self.scene.needle.axis * depth, self.needle.len()))
-            .chain(repeat(displacement, paddle.map_or(0, |p| self.paddles[p].len())))
-            .collect()
+        let needle = self.scene.needle.axis * depth;
+        match &self.held {
+            Held::Nodes(groups) => groups.values(paddle, needle, displacement),
+            Held::Boundary(groups) => groups.values(paddle, needle, displacement),
+        }
     }
 
     /// The target's row: `u(X_t) = Σ_I Ψ_I(X_t) d_I`.
@@ -212,11 +277,11 @@ impl TissueModel {
     /// # Errors
     /// [`Failure`] when the tangent at rest is singular.
     pub fn body(&self, paddle: Option<usize>, settings: NewtonSettings) -> Result<Body<'_>, Failure> {
-        let held = HeldRows::new(self.held_stencils(paddle));
-        let equilibrium = Equilibrium::at_rest(
+        let equilibrium = Equilibrium::at_rest_with(
             Arc::clone(self.planar.rule()),
             self.tissue.clone(),
-            held,
+            self.held_rows(paddle).unwrap_or_default(),
+            self.weakly_held(paddle),
             self.positions(),
             self.spacing,
             settings,

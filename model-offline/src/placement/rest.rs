@@ -5,7 +5,7 @@ use super::model::{ModelError, TissueModel};
 use super::study::best_direction;
 use crate::mechanics::assembly::{Scatter, State, internal_force, tangent};
 use crate::solver::constrained::{ConstrainedSolver, HeldRows};
-use crate::solver::equilibrium::{Failure, FailureReason};
+use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
 use crate::solver::linear::Pattern;
 use nalgebra::{Matrix2, Vector2};
 
@@ -29,8 +29,10 @@ pub struct RestResponse {
 pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelError> {
     let rule = model.rule();
     let nodes = model.nodes();
-    let held = |p: usize| HeldRows::new(model.held_stencils(Some(p)));
-    let all: Vec<HeldRows> = (0..model.scene().paddles.len()).map(held).collect();
+    let count = model.scene().paddles.len();
+    let Some(all) = (0..count).map(|p| model.held_rows(Some(p))).collect::<Option<Vec<HeldRows>>>() else {
+        return (0..count).map(|paddle| rest_response_weakly_held(model, paddle)).collect();
+    };
     let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(all.iter().flat_map(HeldRows::node_lists));
     let pattern = Pattern::new(2, nodes, lists);
     let scatter = Scatter::new(rule, &pattern);
@@ -58,17 +60,34 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
             jacobian.set_column(axis, &respond(&model.held_values(Some(paddle), 0.0, Vector2::ith(axis, 1.0))));
         }
         let target_per_depth = respond(&model.held_values(Some(paddle), 1.0, Vector2::zeros()));
-        let scene = model.scene();
-        let direction = best_direction(&jacobian, scene.needle.orthogonal())
-            .map_err(|condition| ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition })?;
-        responses.push(RestResponse {
-            jacobian,
-            controllability_measure: direction.norm(),
-            best_direction: direction,
-            target_per_depth,
-        });
+        responses.push(response_of(model, paddle, jacobian, target_per_depth)?);
     }
     Ok(responses)
+}
+
+/// Nitsche's terms change the matrix with the paddle: each has a body of its own.
+fn rest_response_weakly_held(model: &TissueModel, paddle: usize) -> Result<RestResponse, ModelError> {
+    let mut body = model.body(Some(paddle), NewtonSettings::default())?;
+    let jacobian = body.actuation_jacobian()?;
+    let target_per_depth = body.depth_sensitivity()?;
+    response_of(model, paddle, jacobian, target_per_depth)
+}
+
+fn response_of(
+    model: &TissueModel,
+    paddle: usize,
+    jacobian: Matrix2<f64>,
+    target_per_depth: Vector2<f64>,
+) -> Result<RestResponse, ModelError> {
+    let scene = model.scene();
+    let direction = best_direction(&jacobian, scene.needle.orthogonal())
+        .map_err(|condition| ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition })?;
+    Ok(RestResponse {
+        jacobian,
+        controllability_measure: direction.norm(),
+        best_direction: direction,
+        target_per_depth,
+    })
 }
 
 fn singular(detail: &str) -> Failure {

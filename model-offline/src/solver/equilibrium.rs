@@ -1,7 +1,7 @@
 //! Static equilibrium under held nodal values: Newton's method on the total Lagrangian weak form, with line search on
 //! the energy and adaptive cutback of the increment.
 //!
-//! All loading is by prescribed displacement, so an equilibrium is a stationary point of the strain energy over the
+//! Loading is by prescribed displacement and dead loads, so an equilibrium is a stationary point of the potential energy over the
 //! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
 //! tangent is not positive definite is reported as lost stability, never passed off as an answer.
 
@@ -86,6 +86,20 @@ pub struct Effort {
     pub cutbacks: u32,
 }
 
+/// Displacements that are held weakly, by terms of the energy instead of constraints (Nitsche's method).
+pub trait WeaklyHeld: std::fmt::Debug + Send + Sync {
+    /// How many numbers are prescribed.
+    fn prescribed(&self) -> usize;
+    /// Nodes that interact, list by list, each ascending.
+    fn node_lists(&self) -> Vec<&[u32]>;
+    /// Adds energy and its gradient at coefficients `d`, for the prescribed numbers.
+    fn add_force(&self, tissue: &Tissue, d: &[f64], prescribed: &[f64], force: &mut [f64]) -> f64;
+    /// Adds the second derivative.
+    fn add_tangent(&self, tissue: &Tissue, d: &[f64], pattern: &Pattern, values: &mut [f64]);
+    /// Adds the force that unit rates of the prescribed numbers cause: −∂(force)/∂(prescribed) · rates.
+    fn add_response(&self, tissue: &Tissue, d: &[f64], rates: &[f64], out: &mut [f64]);
+}
+
 /// A body in equilibrium, and the means to take it to the next.
 #[derive(Debug)]
 pub struct Equilibrium<const D: usize> {
@@ -93,6 +107,7 @@ pub struct Equilibrium<const D: usize> {
     tissue: Tissue,
     scatter: Scatter,
     solver: ConstrainedSolver<D>,
+    weak: Option<Arc<dyn WeaklyHeld>>,
     settings: NewtonSettings,
     /// Length that step tolerances are relative to.
     spacing: f64,
@@ -111,7 +126,11 @@ pub struct Equilibrium<const D: usize> {
 struct Snapshot<const D: usize> {
     coefficients: Vec<f64>,
     multipliers: Vec<f64>,
+    /// Values of the held rows, then those of the weakly held points.
     prescribed: Vec<f64>,
+    /// Dead load, D numbers per node.
+    external: Vec<f64>,
+    /// Gradient of the potential energy.
     force: Vec<f64>,
     energy: f64,
     state: State<D>,
@@ -136,14 +155,33 @@ impl<const D: usize> Equilibrium<D> {
         spacing: f64,
         settings: NewtonSettings,
     ) -> Result<Self, Failure> {
+        Self::at_rest_with(rule, tissue, held, None, positions, spacing, settings)
+    }
+
+    /// The same with points that are held weakly.
+    ///
+    /// # Errors
+    /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
+    pub fn at_rest_with(
+        rule: Arc<Quadrature<D>>,
+        tissue: Tissue,
+        held: HeldRows,
+        weak: Option<Arc<dyn WeaklyHeld>>,
+        positions: &[Point<D>],
+        spacing: f64,
+        settings: NewtonSettings,
+    ) -> Result<Self, Failure> {
         let nodes = positions.len();
-        let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(held.node_lists());
+        let weak_lists = weak.as_ref().map_or_else(Vec::new, |w| w.node_lists());
+        let lists =
+            (0..rule.len()).map(|q| rule.point(q).nodes).chain(held.node_lists()).chain(weak_lists.iter().copied());
         let pattern = Pattern::new(D, nodes, lists);
         let scatter = Scatter::new(&rule, &pattern);
         let at = Snapshot {
             coefficients: vec![0.0; nodes * D],
             multipliers: vec![0.0; held.len() * D],
-            prescribed: vec![0.0; held.len() * D],
+            prescribed: vec![0.0; held.len() * D + weak.as_ref().map_or(0, |w| w.prescribed())],
+            external: vec![0.0; nodes * D],
             force: vec![0.0; nodes * D],
             energy: 0.0,
             state: State::default(),
@@ -154,6 +192,7 @@ impl<const D: usize> Equilibrium<D> {
             tissue,
             scatter,
             solver,
+            weak,
             settings,
             spacing,
             smallest_force: f64::MIN_POSITIVE,
@@ -225,24 +264,34 @@ impl<const D: usize> Equilibrium<D> {
         self.solver.factor_entries()
     }
 
-    /// Takes the held values from where they are to `prescribed` (D numbers per row), cutting the way into pieces where
-    /// it must.
+    /// Takes the held values from where they are to `prescribed` (D numbers per row, then those of the weakly held
+    /// points), cutting the way into pieces where it must.
     ///
     /// # Errors
     /// [`Failure`] with the reason; the body is then at the last state that converged on the way.
     pub fn drive(&mut self, prescribed: &[f64]) -> Result<(), Failure> {
-        let start = self.at.prescribed.clone();
+        let external = self.at.external.clone();
+        self.drive_loaded(prescribed, &external)
+    }
+
+    /// Takes held values and dead load (D numbers per node) together to what is given.
+    ///
+    /// # Errors
+    /// [`Failure`] with the reason; the body is then at the last state that converged on the way.
+    pub fn drive_loaded(&mut self, prescribed: &[f64], external: &[f64]) -> Result<(), Failure> {
+        let (start, start_load) = (self.at.prescribed.clone(), self.at.external.clone());
+        let between = |a: &[f64], b: &[f64], t: f64| -> Vec<f64> {
+            // The end itself, not the end up to rounding.
+            if t >= 1.0 { b.to_vec() } else { a.iter().zip(b).map(|(a, b)| a + (b - a) * t).collect() }
+        };
         let (mut reached, mut step) = (0.0_f64, 1.0_f64);
         let mut cuts = 0;
         while reached < 1.0 {
             let next = (reached + step).min(1.0);
-            let goal: Vec<f64> = if next >= 1.0 {
-                prescribed.to_vec()
-            } else {
-                start.iter().zip(prescribed).map(|(a, b)| a + (b - a) * next).collect()
-            };
             let last = self.at.clone();
-            match self.attempt(&goal) {
+            self.at.prescribed = between(&start, prescribed, next);
+            self.at.external = between(&start_load, external, next);
+            match self.attempt() {
                 Attempt::Converged => {
                     reached = next;
                     // Grow back after success, so that one hard spot does not slow down the rest.
@@ -273,8 +322,12 @@ impl<const D: usize> Equilibrium<D> {
             return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
         }
         let n = self.at.coefficients.len();
-        let (mut x, mut mu) = (vec![0.0; n], vec![0.0; rates.len()]);
-        self.solver.solve(&vec![0.0; n], rates, 1e-14, &mut x, &mut mu);
+        let (strong, weak) = rates.split_at(self.at.multipliers.len());
+        let (mut x, mut mu, mut rhs) = (vec![0.0; n], vec![0.0; strong.len()], vec![0.0; n]);
+        if let Some(held) = &self.weak {
+            held.add_response(&self.tissue, &self.at.coefficients, weak, &mut rhs);
+        }
+        self.solver.solve(&rhs, strong, 1e-14, &mut x, &mut mu);
         Ok(x)
     }
 
@@ -282,16 +335,30 @@ impl<const D: usize> Equilibrium<D> {
         Failure { reason, reached, detail }
     }
 
+    /// Potential energy and its gradient at the current coefficients.
     fn evaluate(&mut self) -> Result<(), Inverted> {
         let at = &mut self.at;
         at.energy = assembly::internal_force(&self.rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
+        if let Some(weak) = &self.weak {
+            let values = &at.prescribed[at.multipliers.len()..];
+            at.energy += weak.add_force(&self.tissue, &at.coefficients, values, &mut at.force);
+        }
+        for ((f, load), d) in at.force.iter_mut().zip(&at.external).zip(&at.coefficients) {
+            *f -= load;
+            at.energy -= load * d;
+        }
         Ok(())
     }
 
     /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
     fn refactorise(&mut self) -> bool {
-        let (rule, tissue, state, scatter) = (&self.rule, &self.tissue, &self.at.state, &self.scatter);
-        self.solver.assemble(|pattern, values| assembly::tangent(rule, tissue, state, pattern, scatter, values));
+        let (rule, tissue, at, scatter, weak) = (&self.rule, &self.tissue, &self.at, &self.scatter, &self.weak);
+        self.solver.assemble(|pattern, values| {
+            assembly::tangent(rule, tissue, &at.state, pattern, scatter, values);
+            if let Some(weak) = weak {
+                weak.add_tangent(tissue, &at.coefficients, pattern, values);
+            }
+        });
         self.effort.factorisations += 1;
         self.factor_is_current = self.solver.factorise().is_ok();
         self.factor_exists |= self.factor_is_current;
@@ -312,11 +379,16 @@ impl<const D: usize> Equilibrium<D> {
         false
     }
 
-    /// Newton's method towards one set of prescribed values.
-    fn attempt(&mut self, prescribed: &[f64]) -> Attempt {
+    /// Newton's method towards the prescribed values and the load.
+    fn attempt(&mut self) -> Attempt {
         let n = self.at.coefficients.len();
+        // Load and weakly held values are part of the energy, which has changed with them.
+        let loaded = self.weak.is_some() || self.at.external.iter().any(|f| *f != 0.0);
+        if loaded && self.evaluate().is_err() {
+            return Attempt::Failed(FailureReason::ElementInverted, "before the first step".into());
+        }
         let (mut step, mut rhs) = (vec![0.0; n], vec![0.0; n]);
-        let mut gap = vec![0.0; prescribed.len()];
+        let mut gap = vec![0.0; self.at.multipliers.len()];
         let mut mu = self.at.multipliers.clone();
         let may_reuse = self.settings.reuse_tangent || self.tissue.is_linear();
         let mut factor_usable = self.factor_is_current || (may_reuse && self.factor_exists);
@@ -331,7 +403,7 @@ impl<const D: usize> Equilibrium<D> {
                 }
             }
             self.solver.held().apply::<D>(&self.at.coefficients, &mut gap);
-            for (g, p) in gap.iter_mut().zip(prescribed) {
+            for (g, p) in gap.iter_mut().zip(&self.at.prescribed) {
                 *g = p - *g;
             }
             let feasible = gap.iter().all(|g| g.abs() <= 1e-10 * self.spacing);
@@ -357,7 +429,6 @@ impl<const D: usize> Equilibrium<D> {
                 && (linear || largest <= self.settings.step_tolerance * self.spacing || residual <= 1e-12)
             {
                 self.at.multipliers.copy_from_slice(&mu);
-                self.at.prescribed.copy_from_slice(prescribed);
                 if linear {
                     self.factor_is_current = true;
                     return Attempt::Converged;
@@ -423,13 +494,14 @@ impl<const D: usize> Equilibrium<D> {
         }
     }
 
-    /// ‖f + Λᵀ μ‖ over ‖Λᵀ μ‖, or over the force of a negligible displacement where the body is (nearly) at rest.
+    /// ‖f + Λᵀ μ‖ over the largest of ‖Λᵀ μ‖, the load, and (near rest) the force of a negligible displacement.
     fn relative_residual(&self, mu: &[f64]) -> f64 {
         let mut reaction = vec![0.0; self.at.force.len()];
         self.solver.held().add_transpose::<D>(mu, &mut reaction);
-        let norm2 = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>();
-        let scale = norm2(&mut reaction.iter().copied());
-        let residual = norm2(&mut reaction.iter().zip(&self.at.force).map(|(r, f)| r + f));
-        residual.sqrt() / scale.sqrt().max(self.smallest_force)
+        let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+        let residual = norm(&mut reaction.iter().zip(&self.at.force).map(|(r, f)| r + f));
+        let held = norm(&mut reaction.iter().copied());
+        let load = norm(&mut self.at.external.iter().copied());
+        residual / held.max(load).max(self.smallest_force)
     }
 }
