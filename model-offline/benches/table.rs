@@ -1,0 +1,150 @@
+//! `cargo bench -p model-offline --bench table`: the speed goals as a table, ours beside a recorded table of a peer
+//! (DOLFINx 0.5 with MUMPS, one thread, on a machine of the same kind), and how cost grows with nodes.
+//!
+//! To run the peer on your machine: install Debian's `python3-dolfinx` and solve the same scene with linear or quadratic
+//! triangles and a direct solver, form compilation not counted; the numbers to compare are those in `PEER`.
+
+use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::discretization::{Method, Planar};
+use model_offline::placement::adaptive::discretise;
+use model_offline::placement::rest::rest_responses;
+use model_offline::placement::{TissueModel, study};
+use model_offline::scene::schema::{Basis, Integration};
+use model_offline::scene::{Resolution, Scene};
+use model_offline::solver::equilibrium::NewtonSettings;
+use nalgebra::Vector2;
+use std::time::Instant;
+
+/// Degree, degrees of freedom, seconds for five Jacobians, worst error of the measures, milliseconds per Newton iteration.
+const PEER: [(u32, u32, f64, f64, f64); 7] = [
+    (1, 212, 0.0051, 13.9, 0.63),
+    (1, 2_942, 0.039, 4.2, 7.2),
+    (1, 45_362, 0.98, 1.1, 189.0),
+    (2, 772, 0.011, 4.7, 2.1),
+    (2, 2_942, 0.059, 2.5, 9.1),
+    (2, 11_482, 0.22, 1.25, 47.0),
+    (2, 45_362, 1.25, 0.6, 242.0),
+];
+
+/// Continuum limits of the measures of `paper`, homogeneous (tests/golden).
+const LIMITS: [f64; 5] = [5.2935, 3.7929, 3.3150, 3.5596, 4.5066];
+
+fn homogeneous() -> Scene {
+    Scene::bundled("paper").expect("bundled").without_inclusions()
+}
+
+fn milliseconds(mut work: impl FnMut(), repeats: u32) -> f64 {
+    (0..repeats)
+        .map(|_| {
+            let start = Instant::now();
+            work();
+            1e3 * start.elapsed().as_secs_f64()
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn worst_error(model: &TissueModel) -> f64 {
+    let responses = rest_responses(model).expect("held");
+    responses.iter().zip(LIMITS).map(|(r, l)| (r.controllability_measure / l - 1.0).abs()).fold(0.0, f64::max)
+}
+
+/// Milliseconds per Newton iteration, best of three, and the number of nodes.
+fn newton(integration: Integration, spacing: f64) -> (usize, f64) {
+    let mut scene = homogeneous();
+    scene.discretization.resolution = Resolution::Spacing(spacing);
+    scene.discretization.integration = integration;
+    let model = TissueModel::new(&scene).expect("the paper's scene");
+    let best = (0..3)
+        .map(|_| {
+            let mut body = model.body(Some(2), NewtonSettings::default()).expect("held");
+            let before = body.equilibrium().effort().iterations;
+            let start = Instant::now();
+            for k in 1..=3 {
+                body.drive(0.001 * f64::from(k), Vector2::zeros()).expect("shallow");
+            }
+            1e3 * start.elapsed().as_secs_f64() / f64::from(body.equilibrium().effort().iterations - before)
+        })
+        .fold(f64::INFINITY, f64::min);
+    (model.nodes(), best)
+}
+
+/// All five Jacobians with known grading, node generation included: milliseconds, worst error, nodes.
+fn five_jacobians(integration: Integration, grading: Grading, support: f64) -> (f64, f64, usize) {
+    let scene = homogeneous();
+    let method = Method { integration, basis: Basis::Linear, support, consistent: true };
+    let build = || {
+        let planar =
+            Planar::new(&scene.outline, &[], graded_nodes(&scene, &grading), None, method).expect("graded nodes");
+        TissueModel::on(&scene, planar, grading.finest).expect("features have nodes")
+    };
+    let time = milliseconds(|| drop(rest_responses(&build()).expect("held")), 5);
+    let model = build();
+    (time, 100.0 * worst_error(&model), model.nodes())
+}
+
+fn main() {
+    println!("one thread; best of several runs\n");
+    println!("{:<72} {:>10} {:>10} {:>10}", "work", "ours", "at most", "stretch");
+    let row = |work: &str, ours: f64, goal: f64, stretch: f64| {
+        println!("{work:<72} {ours:>7.2} ms {goal:>7.1} ms {stretch:>7.1} ms");
+    };
+    let sizes = [(0.1, 0.4, 0.2), (0.025, 12.0, 6.0), (0.0125, 70.0, 40.0)];
+    for (spacing, goal, stretch) in sizes {
+        let (nodes, time) = newton(Integration::Scni, spacing);
+        row(&format!("Newton iteration, {nodes} nodes, SCNI, support 2"), time, goal, stretch);
+    }
+    let fine = Grading { coarsest: 0.1, finest: 0.002, slope: 0.4, interface: 1.0, fit: InterfaceFit::Between };
+    let (time, error, nodes) = five_jacobians(Integration::Scni, fine, 1.5);
+    row(&format!("five Jacobians, SCNI, graded, {nodes} nodes, worst error {error:.2} %"), time, 50.0, 10.0);
+    let coarse = Grading { coarsest: 0.2, finest: 0.015, slope: 0.55, interface: 1.0, fit: InterfaceFit::On };
+    let (time, error, nodes) = five_jacobians(Integration::FemT6, coarse, 2.0);
+    row(&format!("five Jacobians, quadratic triangles, graded, {nodes} nodes, error {error:.2} %"), time, 50.0, 10.0);
+    for integration in [Integration::Scni, Integration::FemT6] {
+        let mut scene = homogeneous();
+        scene.discretization.integration = integration;
+        scene.discretization.resolution = Resolution::Tolerance(0.01);
+        let (model, _) = discretise(&scene).expect("the tolerance is reached");
+        let time = milliseconds(|| drop(discretise(&scene).expect("reached")), 3);
+        let error = 100.0 * worst_error(&model);
+        row(&format!("the same from tolerance 0.01 alone, {integration:?}, error {error:.2} %"), time, 250.0, 60.0);
+        let study = milliseconds(
+            || {
+                let (model, _) = discretise(&scene).expect("reached");
+                let profile = model_offline::placement::adaptive::profile_model(&model).expect("graded");
+                drop(study::place_on(&model, &profile, study::settings_for(&scene), 1, &|| {}).expect("controllable"));
+            },
+            1,
+        );
+        row(&format!("whole placement study of one tissue at 1 %, {integration:?}"), study, 2000.0, 500.0);
+    }
+
+    println!("\npeer, recorded (DOLFINx + MUMPS, one thread)");
+    println!("{:>7} {:>8} {:>18} {:>12} {:>16}", "degree", "dofs", "five Jacobians", "worst error", "Newton iteration");
+    for (degree, dofs, seconds, error, newton) in PEER {
+        println!("{degree:>7} {dofs:>8} {:>15.1} ms {error:>10.1} % {newton:>13.1} ms", 1e3 * seconds);
+    }
+
+    println!("\nhow the cost of a Newton iteration grows (SCNI, support 2; quadratic triangles)");
+    for integration in [Integration::Scni, Integration::FemT6] {
+        let spacings: &[f64] = match integration {
+            Integration::Scni => &[0.1, 0.05, 0.025, 0.0125, 0.00625, 0.003_125],
+            _ => &[0.1, 0.05, 0.025, 0.0125, 0.00625],
+        };
+        let points: Vec<(f64, f64)> = spacings
+            .iter()
+            .map(|&h| {
+                let (nodes, time) = newton(integration, h);
+                println!("{integration:?} {nodes:>8} nodes {time:>10.2} ms");
+                ((nodes as f64).ln(), time.ln())
+            })
+            .collect();
+        println!("{integration:?}: time grows as nodes^{:.2}", slope(&points));
+    }
+}
+
+/// Least-squares slope.
+fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>() / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
+}
