@@ -52,10 +52,15 @@ pub enum Command {
         recording: PathBuf,
     },
     /// Makes the report of a finished run again
-    #[command(after_help = "Example: host-sim report stillpoint-report")]
+    #[command(
+        after_help = "Examples:\n  host-sim report stillpoint-report\n  host-sim report stillpoint-report --svg-dir figures"
+    )]
     Report {
         /// Directory of the run
         directory: PathBuf,
+        /// Also write the charts here, as SVG files
+        #[arg(long, value_name = "DIR")]
+        svg_dir: Option<PathBuf>,
     },
 }
 
@@ -78,9 +83,12 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
             );
             Ok(())
         }
-        Some(Command::Report { directory }) => {
+        Some(Command::Report { directory, svg_dir }) => {
             output::rebuild_report(&directory)?;
             println!("{}", directory.join("report.html").display());
+            for path in svg_dir.map_or_else(|| Ok(Vec::new()), |into| output::write_pictures(&directory, &into))? {
+                println!("{}", path.display());
+            }
             Ok(())
         }
     }

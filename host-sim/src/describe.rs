@@ -55,6 +55,17 @@ pub fn geometry(scene: &Scene, model: &TissueModel) -> Geometry {
     }
 }
 
+/// The command line of this process, without the directory of the program.
+pub fn command_line() -> Vec<String> {
+    let mut arguments: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = arguments.first_mut() {
+        *program = std::path::Path::new(program.as_str())
+            .file_name()
+            .map_or_else(|| env!("CARGO_PKG_NAME").to_owned(), |name| name.to_string_lossy().into_owned());
+    }
+    arguments
+}
+
 /// A placement study.
 pub fn placement(tissue: &str, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
     let integration = serde_json::to_value(model.scene().discretization.integration);

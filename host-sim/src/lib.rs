@@ -27,6 +27,7 @@ pub mod interrupt;
 pub mod link;
 pub mod lockstep;
 pub mod output;
+pub mod paper;
 pub mod peer;
 pub mod plant;
 pub mod recorder;

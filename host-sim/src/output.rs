@@ -1,6 +1,6 @@
 //! Files of a run: the directory appears whole, or not at all.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use model_offline::output::{OutputError, write_whole};
 use serde::Serialize;
@@ -120,4 +120,15 @@ pub fn rebuild_report(directory: &Path) -> Result<(), SimError> {
     let result = read_run(directory)?;
     let path = directory.join(REPORT_FILE);
     whole(&path, report::render(&result).as_bytes())
+}
+
+/// Writes the charts of a finished run as pictures of their own; returns their paths.
+///
+/// # Errors
+/// As [`read_run`], [`SimError::Write`].
+pub fn write_pictures(directory: &Path, into: &Path) -> Result<Vec<PathBuf>, SimError> {
+    let result = read_run(directory)?;
+    std::fs::create_dir_all(into).map_err(write_error(into))?;
+    let pictures = report::pictures(&result).into_iter().map(|(name, svg)| (into.join(name), svg));
+    pictures.map(|(path, svg)| whole(&path, svg.as_bytes()).map(|()| path)).collect()
 }

@@ -35,6 +35,12 @@ pub struct RunResult {
     pub cases: Vec<CaseResult>,
     /// Duration of the whole command, s.
     pub wall_s: f64,
+    /// The command line, from the program's name on.
+    #[serde(default)]
+    pub command: Vec<String>,
+    /// Architecture and operating system.
+    #[serde(default)]
+    pub platform: String,
 }
 
 /// Settings of the simulation.
@@ -231,8 +237,20 @@ pub struct StrategyResult {
     pub series: Vec<SeriesPoint>,
     /// Nodes at the end.
     pub deformed_nodes: Vec<[f64; 2]>,
+    /// The body along the way, for drawings; results of older versions have none.
+    #[serde(default)]
+    pub frames: Vec<Frame>,
     /// Mean duration of a plant step, µs; not part of what is reproducible.
     pub plant_step_us: f64,
+}
+
+/// The body at one moment of the insertion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Frame {
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Nodes there.
+    pub nodes: Vec<[f64; 2]>,
 }
 
 /// A recording file.

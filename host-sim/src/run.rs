@@ -225,6 +225,8 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
         placements: studies.placement_results(),
         cases: results,
         wall_s: started.elapsed().as_secs_f64(),
+        command: describe::command_line(),
+        platform: format!("{} {}", std::env::consts::ARCH, std::env::consts::OS),
     };
     interrupt::check()?;
     output::write_run(&args.out, &result, artifacts)?;

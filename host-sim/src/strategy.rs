@@ -15,8 +15,9 @@ use crate::handover::Handover;
 use crate::interrupt;
 use crate::link::{Departure, PlantPorts, Space};
 use crate::peer::{Patience, Peer};
+use crate::plant::Plant;
 use crate::recorder::{Exchange, Header, Record, Recording, RunMode, Truth};
-use crate::result::{LedgerResult, LoopTiming, RecordingResult, SeriesPoint, StrategyResult};
+use crate::result::{Frame, LedgerResult, LoopTiming, RecordingResult, SeriesPoint, StrategyResult};
 use crate::world::{Simulation, World, published, waiting_command};
 use crate::{free_run, lockstep};
 
@@ -25,6 +26,10 @@ pub const PEER_TIMEOUT: Duration = Duration::from_secs(30);
 
 /// Points of a time series in the result.
 const SERIES_POINTS: usize = 500;
+
+/// Pictures of the body along an insertion, and how many node positions all of them may have together.
+const FRAMES: usize = 10;
+const FRAME_NUMBERS: usize = 20_000;
 
 /// A file of the report.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -261,8 +266,36 @@ fn measure(model: &TissueModel, world: &World<'_>, mode: RunMode, paddle: Option
         csv: None,
         series,
         deformed_nodes: world.deformed_nodes(),
+        frames: frames(model, paddle, truths),
         plant_step_us: world.mean_step_us(),
     }
+}
+
+/// The body along the insertion, solved once more after the run at some of its ticks: nothing is added to a loop on
+/// the machine's clock. Ends early where the tissue has no equilibrium with such large steps.
+fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Frame> {
+    let position = paddle.and_then(|index| model.paddle_position(index));
+    let (Ok(mut plant), Some(last)) = (Plant::new(model, position), truths.last()) else {
+        return Vec::new();
+    };
+    let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
+    // A millionth of the depth is beyond any drawing.
+    let places = 10f64.powi(6 - last.depth.abs().max(1e-9).log10().floor() as i32);
+    let rounded = |coordinate: f64| (coordinate * places).round() / places;
+    let mut frames = Vec::new();
+    for i in 0..=count {
+        let depth = last.depth * i as f64 / count as f64;
+        // The last one is the end, with what the controller removed after the needle had arrived.
+        let truth = if i == count { last } else { &truths[truths.partition_point(|truth| truth.depth < depth)] };
+        if plant.step(truth.depth, Vector2::from(truth.paddle)).is_err() {
+            break;
+        }
+        frames.push(Frame {
+            depth: truth.depth,
+            nodes: plant.deformed_nodes().into_iter().map(|node| node.map(rounded)).collect(),
+        });
+    }
+    frames
 }
 
 /// Time since the start of the needle, s; negative before.

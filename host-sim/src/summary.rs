@@ -3,19 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use crate::paper::paper_optima;
 use crate::result::{CaseResult, RunResult, StrategyResult};
-
-/// Scenes that reproduce the paper, and what the paper found: tissue, static and dynamic optimum.
-const PAPER_SCENES: [&str; 2] = ["paper", "paper-hull"];
-const PAPER_OPTIMA: [(&str, u32, u32); 2] = [("homogeneous", 4, 3), ("inclusion", 2, 3)];
-
-/// What the paper found for a tissue of this scene.
-pub fn paper_optima(scene: &str, tissue: &str) -> Option<(u32, u32)> {
-    if !PAPER_SCENES.contains(&scene) {
-        return None;
-    }
-    PAPER_OPTIMA.iter().find(|(known, ..)| *known == tissue).map(|(_, fixture, dynamic)| (*fixture, *dynamic))
-}
 
 /// The summary of a run that is at `directory`.
 pub fn summary(run: &RunResult, directory: &Path) -> String {

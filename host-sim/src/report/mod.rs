@@ -1,54 +1,281 @@
-//! The report: one HTML file, made from a [`RunResult`] alone.
+//! The report: one HTML file and pictures, made from a [`RunResult`] alone.
+//!
+//! The page needs no network and no script to be read: the script only moves the bodies along the insertion. Charts are
+//! drawn here, by a small module of axes and marks (`chart`), and styled by the page, so that they follow light, dark
+//! and print.
 
-use std::fmt::Write as _;
+mod axis;
+mod chart;
+mod insertion;
+mod ledger;
+mod number;
+mod placement;
+mod scene;
+mod settings;
+mod slider;
+mod style;
+mod svg;
+mod timing;
+mod view;
 
-use crate::result::{RunResult, StrategyResult};
+#[cfg(test)]
+mod tests;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+
+use self::insertion::{CaseCharts, case_charts, case_name, strategies};
+use self::number::{in_unit, number, plain};
+use self::svg::{Drawing, sheet};
+use crate::paper::{is_paper, paper_optima};
+use crate::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+
+const SCRIPT: &str = include_str!("page.js");
+/// Whatever a string in the result says, the page loads nothing.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
+
+/// Identifiers and titles of the parts.
+const PARTS: [(&str, &str); 7] = [
+    ("scene", "The scene"),
+    ("static", "Static paddle: error against position"),
+    ("controllability", "Dynamic paddle: controllability"),
+    ("insertion", "Error along the insertion"),
+    ("timing", "Timing of the loop"),
+    ("ledger", "Ledger"),
+    ("repeat", "To repeat it"),
+];
+
+fn charts(drawings: &[Drawing]) -> Markup {
+    html! { div.charts { @for drawing in drawings { figure { (drawing.inline()) } } } }
+}
+
+/// The dynamic strategy of a case: lockstep, or free-run where that is all.
+fn dynamic(case: &CaseResult) -> Option<&StrategyResult> {
+    case.strategies.dynamic.as_ref().or(case.strategies.dynamic_free_run.as_ref())
+}
+
+/// The result in one sentence.
+fn sentence(run: &RunResult) -> String {
+    let best = |placement: &PlacementResult| (placement.best_static, placement.best_dynamic);
+    let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, &p.tissue)).collect();
+    let all_agree = paper.iter().zip(&run.placements).all(|(paper, placement)| *paper == Some(best(placement)));
+    let placements: Vec<String> = run
+        .placements
+        .iter()
+        .zip(&paper)
+        .map(|(placement, paper)| {
+            let (fixture, dynamic) = best(placement);
+            let found = match paper {
+                Some((fixture, dynamic)) if !all_agree => format!(" (the paper: {fixture} and {dynamic})"),
+                _ => String::new(),
+            };
+            format!("tissue {}: best static paddle {fixture}, best dynamic paddle {dynamic}{found}", placement.tissue)
+        })
+        .collect();
+    let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
+    let factors: Vec<f64> =
+        run.cases.iter().filter_map(|case| case.improvement).filter(|factor| factor.is_finite()).collect();
+    let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = factors.iter().copied().fold(0.0, f64::max);
+    let range = if plain(low.round()) == plain(high.round()) {
+        plain(low.round())
+    } else {
+        format!("{} to {}", plain(low.round()), plain(high.round()))
+    };
+    let reduction = if factors.is_empty() {
+        String::new()
+    } else {
+        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's")
+    };
+    let text = format!("{}{agreement}{reduction}.", placements.join("; "));
+    text.replacen("tissue", "Tissue", 1)
+}
+
+fn head(run: &RunResult) -> Markup {
+    let unit = &run.units[0];
+    html! {
+        p.quiet { "Stillpoint report" }
+        h1 { "Scene " (run.scene) }
+        p.lead { (sentence(run)) }
+        div.scroll { table {
+            caption { span {
+                (in_unit("Largest target displacement orthogonal to the needle", unit)) " over an insertion of "
+                (plain(run.settings.depth)) " in " (plain(run.settings.insertion_s)) " s; paddle in brackets"
+            } }
+            thead { tr {
+                th { "tissue" } th { "no paddle" } th { "static" } th { "dynamic" } th { "static / dynamic" }
+                th.left { "table made from" }
+            } }
+            tbody { @for case in &run.cases { tr {
+                td { (case.tissue) }
+                td { (largest(case.strategies.none.as_ref())) }
+                td { (largest(case.strategies.fixture.as_ref())) }
+                td.best { (largest(dynamic(case))) }
+                td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
+                td.left { (case.table_tissue) }
+            } } }
+        } }
+        p.quiet {
+            "Strategies compared in " (run.mode) ", seed " (run.seed) ". Lengths are in the scene's own unit"
+            @if unit == "1" { ", which has no name" } @else { ", " (unit) } "."
+        }
+        @if is_paper(&run.scene) {
+            p.notice {
+                b { "The geometry is inferred." } " The paper's Figure 1 survives only as its caption. Outline, immobile \
+                edge and needle contact of this scene were chosen so that all four optima that the paper reports come out; \
+                paddles and material are from its Tables I and II. Agreement of the optima is therefore no independent \
+                confirmation, and single values are not expected to match."
+            }
+        }
+        nav { ol { @for (id, title) in PARTS { li { a href=(format!("#{id}")) { (title) } } } } }
+    }
+}
+
+fn largest(strategy: Option<&StrategyResult>) -> String {
+    strategy.map_or_else(
+        || "–".to_owned(),
+        |strategy| {
+            let paddle = strategy.paddle.map_or_else(String::new, |index| format!(" ({index})"));
+            format!("{}{paddle}", number(strategy.max_orthogonal_error, 3))
+        },
+    )
+}
+
+fn part(number: usize, content: &Markup) -> Markup {
+    let (id, title) = PARTS[number];
+    html! { section id=(id) { h2 { (number + 1) ". " (title) } (content) } }
+}
+
+fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
+    let frames = strategies_of(run).map(|strategy| strategy.frames.len()).max().unwrap_or(0);
+    html! {
+        figure.scene { (scene::at_rest(run).inline()) figcaption {
+            "At rest: outline, nodes (dots), immobile boundary (hatched), needle with its contact and direction, paddle \
+             positions with their numbers (the best dynamic one blue, with a star)"
+            @if !run.geometry.inclusions.is_empty() { ", inclusion of the tissue “inclusion”" }
+            ", target (ring with cross). Equal scales on both axes."
+        } }
+        h3 { "The body under each strategy" }
+        p { "At the end of the insertion, or wherever the slider is. Colour is the size of the displacement from rest; \
+             dashed is the outline at rest. Displacements are drawn as they are, not enlarged." }
+        fieldset.needs-script.on-screen {
+            legend { "Along the insertion" }
+            @for (i, case) in run.cases.iter().enumerate() {
+                label { input type="radio" name="case" value=(i) checked[i == 0]; " " (case_name(case)) } " "
+            }
+            div.slide {
+                label for="depth-slider" { (in_unit("needle depth", &run.units[0])) }
+                input #depth-slider type="range" min="0" max="200" value="200";
+                output #depth-reading for="depth-slider" {}
+            }
+        }
+        @for (i, case) in run.cases.iter().enumerate() {
+            div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
+        }
+        figure.colours { (surface.colour_bar(run).inline()) }
+        p.quiet {
+            @if frames > 1 { "Between " (frames) " solved states per strategy the slider interpolates. " }
+            "A strategy that would repeat another case is left out."
+        }
+    }
+}
+
+fn strategies_of(run: &RunResult) -> impl Iterator<Item = &StrategyResult> {
+    run.cases.iter().flat_map(strategies).map(|(.., strategy)| strategy)
+}
+
+fn static_part(run: &RunResult) -> Markup {
+    html! {
+        p { "The paddle is attached and held while the needle goes in. The best place is where the target's largest \
+             displacement orthogonal to the needle is smallest." }
+        (charts(&placement::static_charts(run)))
+        @if is_paper(&run.scene) {
+            p.quiet { "The values of the paper's Figures 2 and 3 are not available, only the optima that its text names: \
+                       4 in homogeneous tissue, 2 with the inclusion. These are marked." }
+        }
+        (placement::static_table(run))
+    }
+}
+
+fn controllability_part(run: &RunResult) -> Markup {
+    html! {
+        p { "How far the paddle has to move to move the target by one unit orthogonal to the needle: ‖J⁻¹n‖, where J is \
+             d(target)/d(paddle) at rest with the needle held. Less is better." }
+        (charts(&placement::controllability_charts(run)))
+        (placement::controllability_table(run))
+    }
+}
+
+fn insertion_part(run: &RunResult, cases: &[CaseCharts]) -> Markup {
+    html! {
+        p { "Signed displacement of the true target orthogonal to the needle. The dynamic error is far smaller than the \
+             others, so it is also drawn alone, on its own scale." }
+        @for (case, drawn) in run.cases.iter().zip(cases) {
+            h3 { "Tissue: " (case_name(case)) }
+            (charts(&drawn.drawings))
+        }
+        (insertion::table(run))
+    }
+}
 
 /// The page.
 pub fn render(run: &RunResult) -> String {
-    let mut page = format!(
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Stillpoint: {0}</title>\n\
-         <style>body{{font:16px/1.5 sans-serif;max-width:60rem;margin:2rem auto;padding:0 1rem}}\
-         table{{border-collapse:collapse}}td,th{{padding:.2rem .8rem;text-align:right;border-bottom:1px solid #ddd}}\
-         </style></head>\n<body><h1>Stillpoint: scene {0}</h1>\n<p>{1}, seed {2}.</p>\n",
-        escape(&run.scene),
-        run.mode,
-        run.seed
-    );
-    page.push_str(
-        "<table><tr><th>tissue</th><th>table</th><th>strategy</th><th>paddle</th>\
-         <th>largest orthogonal error</th><th>rms</th><th>final state</th></tr>\n",
-    );
-    for case in &run.cases {
-        let strategies = &case.strategies;
-        for (name, strategy) in [
-            ("none", &strategies.none),
-            ("static", &strategies.fixture),
-            ("dynamic", &strategies.dynamic),
-            ("dynamic, free-run", &strategies.dynamic_free_run),
-        ] {
-            if let Some(strategy) = strategy {
-                row(&mut page, [&case.tissue, &case.table_tissue], name, strategy);
+    let surface = scene::Surface::new(run);
+    let cases: Vec<CaseCharts> = run.cases.iter().enumerate().map(|(i, case)| case_charts(run, i, case)).collect();
+    let parts = [
+        scene_part(run, &surface),
+        static_part(run),
+        controllability_part(run),
+        insertion_part(run, &cases),
+        timing::section(run),
+        ledger::section(run),
+        settings::section(run),
+    ];
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                link rel="icon" href="data:,";
+                title { "Stillpoint: " (run.scene) }
+                style { (PreEscaped(style::page())) }
+            }
+            body {
+                main {
+                    (head(run))
+                    @for (i, content) in parts.iter().enumerate() { (part(i, content)) }
+                }
+                script type="application/json" #insertion-data { (PreEscaped(slider::data(run, &surface, &cases))) }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
+    };
+    page.into_string()
+}
+
+/// Pictures for use elsewhere: file name and SVG, on a white ground.
+pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
+    let surface = scene::Surface::new(run);
+    let mut scene = vec![scene::at_rest(run)];
+    if let Some((i, case)) = run.cases.iter().enumerate().find(|(_, case)| dynamic(case).is_some()) {
+        let strategy = dynamic(case).into_iter();
+        scene
+            .extend(strategy.map(|strategy| surface.body(run, String::new(), &format!("dynamic, case {i}"), strategy)));
     }
-    page.push_str("</table>\n</body></html>\n");
-    page
-}
-
-fn row(page: &mut String, tissues: [&String; 2], name: &str, strategy: &StrategyResult) {
-    let paddle = strategy.paddle.map_or_else(|| "–".to_owned(), |index| index.to_string());
-    let _ = writeln!(
-        page,
-        "<tr><td>{}</td><td>{}</td><td>{name}</td><td>{paddle}</td><td>{:.6}</td><td>{:.6}</td><td>{}</td></tr>",
-        escape(tissues[0]),
-        escape(tissues[1]),
-        strategy.max_orthogonal_error,
-        strategy.rms_orthogonal_error,
-        escape(&strategy.final_state),
-    );
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    let insertion: Vec<Drawing> =
+        run.cases.iter().enumerate().flat_map(|(i, case)| case_charts(run, i, case).drawings).collect();
+    let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
+    let mut timing = timing::charts(run);
+    timing.truncate(3);
+    let mut pictures = vec![
+        ("scene.svg", sheet(&scene, 2)),
+        ("static-error.svg", sheet(&placement::static_charts(run), 2)),
+        ("controllability.svg", sheet(&placement::controllability_charts(run), 2)),
+        ("error-along-insertion.svg", sheet(&insertion, columns)),
+    ];
+    if !timing.is_empty() {
+        pictures.push(("timing-histogram.svg", sheet(&timing, 3)));
+    }
+    pictures
 }
