@@ -14,7 +14,7 @@ impl Scatter {
     }
 
     /// The next number, uniform in [-1, 1).
-    pub fn next(&mut self) -> f64 {
+    pub fn sample(&mut self) -> f64 {
         let state = self.0;
         self.0 = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let bits = ((((state >> 18) ^ state) >> 27) as u32).rotate_right((state >> 59) as u32);
@@ -52,7 +52,7 @@ pub fn jittered_rectangle(
         .flat_map(|j| (0..=columns).map(move |i| (i, j)))
         .map(|(i, j)| {
             let interior = i > 0 && i < columns && j > 0 && j < rows;
-            let (sx, sy) = (scatter.next(), scatter.next());
+            let (sx, sy) = (scatter.sample(), scatter.sample());
             let shift = if interior { Point::<2>::new(sx * dx, sy * dy) * jitter } else { Point::<2>::zeros() };
             Point::<2>::new(i as f64 * dx, j as f64 * dy) + shift
         })

@@ -186,7 +186,7 @@ fn cook_tip(integration: Integration, material: &Material, n: usize, steps: u32)
     let planar = Planar::new(&outline, &[], nodes, None, method(integration, Basis::Linear, 2.0, true)).unwrap();
     let (mut body, prescribed) = hold(&planar, material, 1.0, |x| (x.x.abs() < 1e-9).then(Point2::zeros));
     let load =
-        planar.boundary_force(|x, n| if n.x > 0.99 { Point2::new(0.0, 1.0 / 16.0) } else { Point2::zeros() }).unwrap();
+        planar.boundary_force(|_, n| if n.x > 0.99 { Point2::new(0.0, 1.0 / 16.0) } else { Point2::zeros() }).unwrap();
     for step in 1..=steps {
         let part: Vec<f64> = load.iter().map(|f| f * f64::from(step) / f64::from(steps)).collect();
         body.drive_loaded(&prescribed, &part).unwrap();

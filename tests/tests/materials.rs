@@ -43,7 +43,7 @@ fn laws() -> Vec<(&'static str, Material)> {
 }
 
 fn gradient(scatter: &mut Scatter, size: f64) -> Matrix<2> {
-    Matrix2::from_fn(|_, _| size * scatter.next())
+    Matrix2::from_fn(|_, _| size * scatter.sample())
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn stress_is_the_slope_of_energy_and_tangent_the_slope_of_stress() {
 fn the_same_holds_in_three_dimensions() {
     let mut scatter = Scatter::new(3);
     for law in [paper_law(10.0), Material::neo_hookean(383.0, 318.5).unwrap().with_barrier(20.0).unwrap()] {
-        let h = Matrix3::from_fn(|_, _| 0.2 * scatter.next());
+        let h = Matrix3::from_fn(|_, _| 0.2 * scatter.sample());
         let tangent = law.tangent(&h);
         for k in 0..3 {
             for l in 0..3 {
@@ -167,7 +167,7 @@ fn energy_does_not_depend_on_the_frame_and_stress_turns_with_it() {
     for (name, law) in laws().into_iter().filter(|(name, _)| *name != "linear") {
         for _ in 0..20 {
             let f = Matrix2::identity() + gradient(&mut scatter, 0.25);
-            let angle = 3.0 * scatter.next();
+            let angle = 3.0 * scatter.sample();
             let q = Matrix2::new(angle.cos(), -angle.sin(), angle.sin(), angle.cos());
             let here = law.respond(&(f - Matrix2::identity()));
             let turned = law.respond(&(q * f - Matrix2::identity()));
