@@ -86,8 +86,15 @@ fn both_modes_account_for_everything() {
         assert!(ledger.ticks.due >= 500);
         assert_eq!(mode == "free-run", dynamic.timing.is_some());
         std::fs::remove_file(out.join("report.html")).unwrap();
-        succeeded(&host_sim().arg("report").arg(&out).output().unwrap());
+        let pictures = out.join("figures");
+        succeeded(&host_sim().arg("report").arg(&out).arg("--svg-dir").arg(&pictures).output().unwrap());
         assert!(out.join("report.html").is_file());
+        assert!(pictures.join("scene.svg").is_file());
+        assert_eq!(mode == "free-run", pictures.join("timing-histogram.svg").is_file());
+        assert!(dynamic.frames.len() > 2, "the report's slider needs the body along the way");
+        // The pictures' states are solved once more: the last one is the run's own end.
+        let end = dynamic.frames.last().unwrap().nodes.iter().zip(&dynamic.deformed_nodes);
+        assert!(end.into_iter().all(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-6));
     }
 }
 

@@ -33,7 +33,7 @@ pub(super) fn number(value: f64, digits: i32) -> String {
     } else {
         let decimals = usize::try_from(digits - 1).unwrap_or(0);
         let mantissa = minus(format!("{:.decimals$}", value / 10f64.powi(exponent)));
-        format!("{mantissa} × {}", power_of_ten(exponent))
+        format!("{mantissa}\u{a0}×\u{a0}{}", power_of_ten(exponent))
     }
 }
 
@@ -84,11 +84,11 @@ mod tests {
     #[test]
     fn numbers_are_short_and_never_infinite() {
         assert_eq!(number(0.000_366_123, 3), "0.000366");
-        assert_eq!(number(-1.043e-5, 3), "−1.04 × 10⁻⁵");
+        assert_eq!(number(-1.043e-5, 3), "−1.04\u{a0}×\u{a0}10⁻⁵");
         assert_eq!(number(5.0875, 5), "5.0875");
         assert_eq!(number(f64::NAN, 3), "–");
         assert_eq!(number(f64::INFINITY, 3), "–");
-        assert_eq!([plain(0.1), plain(5.0), plain(20.0), plain(1.04e-5)], ["0.1", "5", "20", "1.04 × 10⁻⁵"]);
+        assert_eq!([plain(0.1), plain(5.0), plain(20.0), plain(1.04e-5)], ["0.1", "5", "20", "1.04\u{a0}×\u{a0}10⁻⁵"]);
         assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(count(5520), "5520");
         assert_eq!(in_unit("depth", "1"), "depth");

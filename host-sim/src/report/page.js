@@ -13,7 +13,7 @@
     if (value === null || !Number.isFinite(value)) return "–";
     if (value === 0) return "0";
     const power = Math.floor(Math.log10(Math.abs(value)));
-    const text = power < -4 || power > 5 ? (value / 10 ** power).toFixed(2) + " × 10" + superscript(power)
+    const text = power < -4 || power > 5 ? (value / 10 ** power).toFixed(2) + "\u00a0×\u00a010" + superscript(power)
       : value.toFixed(Math.max(0, 2 - power));
     return text.replace("-", "−");
   };
