@@ -17,7 +17,7 @@ const MAX_LEVEL: u32 = 9;
 /// More nodes than this are not tried.
 const MAX_NODES: usize = 40_000;
 /// Share of the tolerance that the reference may leave open.
-const REFERENCE_SHARE: f64 = 0.25;
+const REFERENCE_SHARE: f64 = 0.12;
 
 /// What a refinement found out about its own error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
