@@ -1,8 +1,8 @@
 //! `cargo bench -p model-offline --bench table`: the speed goals as a table, ours beside a recorded table of a peer
 //! (DOLFINx 0.5 with MUMPS, one thread, on a machine of the same kind), and how cost grows with nodes.
 //!
-//! To run the peer on your machine: install Debian's `python3-dolfinx` and solve the same scene with linear or quadratic
-//! triangles and a direct solver, form compilation not counted; the numbers to compare are those in `PEER`.
+//! To measure the peer in the same run: `apt-get install python3-dolfinx`, then
+//! `STILLPOINT_PEER=1 cargo bench -p model-offline --bench table`; it runs `benches/peer_dolfinx.py` on one thread.
 
 use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
 use model_offline::discretization::{Method, Planar};
@@ -124,6 +124,10 @@ fn main() {
         println!("{degree:>7} {dofs:>8} {:>15.1} ms {error:>10.1} % {newton:>13.1} ms", 1e3 * seconds);
     }
 
+    if std::env::var_os("STILLPOINT_PEER").is_some() {
+        measure_peer();
+    }
+
     println!("\nhow the cost of a Newton iteration grows (SCNI, support 2; quadratic triangles)");
     for integration in [Integration::Scni, Integration::FemT6] {
         let spacings: &[f64] = match integration {
@@ -139,6 +143,23 @@ fn main() {
             })
             .collect();
         println!("{integration:?}: time grows as nodes^{:.2}", slope(&points));
+    }
+}
+
+/// Runs the peer on this machine and prints its own lines.
+fn measure_peer() {
+    println!("\npeer, measured in this run");
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peer_dolfinx.py");
+    for (refinement, degree) in [("1", "1"), ("4", "1"), ("1", "2"), ("2", "2"), ("4", "2"), ("8", "2")] {
+        let output = std::process::Command::new("/usr/bin/python3")
+            .env("OMP_NUM_THREADS", "1")
+            .args([script, refinement, degree])
+            .output();
+        match output {
+            Ok(o) if o.status.success() => print!("{}", String::from_utf8_lossy(&o.stdout)),
+            Ok(o) => println!("the peer failed: {}", String::from_utf8_lossy(&o.stderr).lines().last().unwrap_or("")),
+            Err(error) => println!("the peer cannot be started: {error}"),
+        }
     }
 }
 
