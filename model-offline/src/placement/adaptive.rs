@@ -1,8 +1,9 @@
 //! Refinement to a tolerance: no node more than the controllability measures need.
 //!
 //! Nodes are graded towards the singular points, level by level. The error of a level is estimated against an
-//! *independent* method, quadratic triangles on graded nodes, refined until two levels agree well within the tolerance
-//! (their error halves from level to level, see [`Grading::level`]); what those two leave open is added to the estimate.
+//! *independent* method, quadratic triangles on graded nodes, extrapolated from two levels (their error halves from level
+//! to level, see [`Grading::level`]); what the extrapolation leaves open is added to the estimate. Quadratic triangles
+//! themselves are judged by the distance to their own coarser level.
 
 use super::model::{ModelError, TissueModel};
 use super::rest::{RestResponse, rest_responses};
@@ -93,6 +94,9 @@ const KERNEL_LEVELS: u32 = 2;
 fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
     let spec = scene.discretization;
     let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
+    if spec.integration == Integration::FemT6 {
+        return refine_elements(scene, method, tolerance);
+    }
     let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
     for level in 0..=MAX_LEVEL {
@@ -113,6 +117,36 @@ fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate),
     Err(ModelError::ToleranceNotReached { tolerance, reached })
 }
 
+/// Refines quadratic triangles until two levels agree within the tolerance. Their error halves from level to level, so
+/// the distance to the coarser level is the error of the finer one, and no other reference is needed.
+fn refine_elements(scene: &Scene, method: Method, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
+    let coarsest = graded_model(scene, method, 0)?;
+    let (mut coarse, mut coarse_nodes) = (rest_responses(&coarsest)?, coarsest.nodes());
+    let mut reached = f64::INFINITY;
+    for level in 1..=MAX_LEVEL {
+        let model = match graded_model(scene, method, level) {
+            Ok(model) => model,
+            Err(ModelError::TooManyNodes { .. }) => break,
+            Err(error) => return Err(error),
+        };
+        let fine = rest_responses(&model)?;
+        let (controllability, target_displacement) = distance(&coarse, &fine);
+        let estimate = ErrorEstimate {
+            controllability,
+            target_displacement,
+            reference: 0.0,
+            reference_nodes: coarse_nodes,
+            level,
+        };
+        if estimate.worst() <= tolerance {
+            return Ok((model, estimate));
+        }
+        reached = reached.min(estimate.worst());
+        (coarse, coarse_nodes) = (fine, model.nodes());
+    }
+    Err(ModelError::ToleranceNotReached { tolerance, reached })
+}
+
 /// A solution on quadratic triangles, fine enough to judge others by.
 struct Reference {
     responses: Vec<RestResponse>,
@@ -127,19 +161,13 @@ impl Reference {
         for level in 1..=MAX_LEVEL {
             let model = graded_model(scene, method, level)?;
             let fine = rest_responses(&model)?;
-            let largest = largest_displacement(&fine);
-            // Errors halve from level to level, so the distance to the coarser level bounds the error of the finer one
-            // with room to spare. Extrapolating would not: with inclusions, errors of either sign mix.
-            let open = fine
-                .iter()
-                .zip(&coarse)
-                .map(|(f, c)| {
-                    let measure = (f.controllability_measure / c.controllability_measure - 1.0).abs();
-                    measure.max((f.target_per_depth - c.target_per_depth).norm() / largest)
-                })
-                .fold(0.0, f64::max);
+            // Errors halve from level to level, so extrapolation removes most of what the finer level leaves; half the
+            // distance between the levels is what is taken to remain.
+            let apart = distance(&fine, &coarse);
+            let open = 0.5 * apart.0.max(apart.1);
             if open <= share || level == MAX_LEVEL {
-                return Ok(Self { responses: fine, open, nodes: model.nodes() });
+                let responses = fine.iter().zip(&coarse).map(|(f, c)| extrapolated(f, c)).collect();
+                return Ok(Self { responses, open, nodes: model.nodes() });
             }
             coarse = fine;
         }
@@ -147,13 +175,10 @@ impl Reference {
     }
 
     fn estimate(&self, responses: &[RestResponse], level: u32) -> ErrorEstimate {
-        let largest = largest_displacement(&self.responses);
-        let worst = |error: &dyn Fn(&RestResponse, &RestResponse) -> f64| {
-            responses.iter().zip(&self.responses).map(|(r, s)| error(r, s)).fold(0.0, f64::max) + self.open
-        };
+        let (controllability, target_displacement) = distance(responses, &self.responses);
         ErrorEstimate {
-            controllability: worst(&|r, s| (r.controllability_measure / s.controllability_measure - 1.0).abs()),
-            target_displacement: worst(&|r, s| (r.target_per_depth - s.target_per_depth).norm() / largest),
+            controllability: controllability + self.open,
+            target_displacement: target_displacement + self.open,
             reference: self.open,
             reference_nodes: self.nodes,
             level,
@@ -161,6 +186,21 @@ impl Reference {
     }
 }
 
-fn largest_displacement(responses: &[RestResponse]) -> f64 {
-    responses.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max)
+/// Worst relative distance of the measures, and of the displacements over the largest one.
+fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
+    let largest = b.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    a.iter().zip(b).fold((0.0, 0.0), |(measure, displacement): (f64, f64), (a, b)| {
+        (
+            measure.max((a.controllability_measure / b.controllability_measure - 1.0).abs()),
+            displacement.max((a.target_per_depth - b.target_per_depth).norm() / largest),
+        )
+    })
+}
+
+fn extrapolated(fine: &RestResponse, coarse: &RestResponse) -> RestResponse {
+    RestResponse {
+        controllability_measure: 2.0 * fine.controllability_measure - coarse.controllability_measure,
+        target_per_depth: fine.target_per_depth * 2.0 - coarse.target_per_depth,
+        ..*fine
+    }
 }
