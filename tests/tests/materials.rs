@@ -181,7 +181,7 @@ fn energy_does_not_depend_on_the_frame_and_stress_turns_with_it() {
 }
 
 #[test]
-fn reading_table_i_as_a_voigt_law_would_not_be_frame_invariant() {
+fn the_energy_of_a_strain_does_not_depend_on_its_direction() {
     // The trap: shear modulus 254 instead of 318.5 makes the tangent anisotropic, so that a rotated uniaxial strain
     // costs another energy. The symmetrised law has no such direction.
     let law = paper_law(0.0);
