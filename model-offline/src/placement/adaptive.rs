@@ -18,7 +18,7 @@ const MAX_LEVEL: u32 = 9;
 /// More nodes than this are not tried.
 const MAX_NODES: usize = 40_000;
 /// Share of the tolerance that the reference may leave open.
-const REFERENCE_SHARE: f64 = 0.12;
+const REFERENCE_SHARE: f64 = 0.25;
 
 /// What a refinement found out about its own error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -99,7 +99,8 @@ fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate),
     }
     let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
-    for level in 0..=MAX_LEVEL {
+    let mut level = 0;
+    while level <= MAX_LEVEL {
         let model = match graded_model(scene, method, level) {
             Ok(model) => model,
             Err(ModelError::TooManyNodes { .. }) => break,
@@ -109,6 +110,8 @@ fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate),
         if estimate.worst() <= tolerance {
             return Ok((model, estimate));
         }
+        // A level halves the error at best, so those that could not reach the tolerance are not tried.
+        level += ((estimate.worst() / tolerance).log2().floor() as u32).max(1);
         if best.is_none_or(|b| estimate.worst() < b.worst()) {
             best = Some(estimate);
         }
@@ -161,10 +164,11 @@ impl Reference {
         for level in 1..=MAX_LEVEL {
             let model = graded_model(scene, method, level)?;
             let fine = rest_responses(&model)?;
-            // Errors halve from level to level, so extrapolation removes most of what the finer level leaves; half the
-            // distance between the levels is what is taken to remain.
+            // Errors halve from level to level, so extrapolation removes most of what the finer level leaves. The whole
+            // distance between the levels is taken to remain: around inclusions, where the order is not quite one, half
+            // of it was too little (0.17 % against 0.12 % on `paper-hull`).
             let apart = distance(&fine, &coarse);
-            let open = 0.5 * apart.0.max(apart.1);
+            let open = apart.0.max(apart.1);
             if open <= share || level == MAX_LEVEL {
                 let responses = fine.iter().zip(&coarse).map(|(f, c)| extrapolated(f, c)).collect();
                 return Ok(Self { responses, open, nodes: model.nodes() });

@@ -43,24 +43,24 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
     tangent(rule, model.tissue(), &state, &pattern, &scatter, &mut at_rest);
 
     let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), HeldRows::default());
-    let zero = vec![0.0; 2 * nodes];
-    let mut response = vec![0.0; 2 * nodes];
+    // Paddle along x, paddle along y, needle along its axis: three right-hand sides pass through each factor together.
+    const RATES: usize = 3;
+    let zero = vec![0.0; RATES * 2 * nodes];
+    let mut response = vec![0.0; RATES * 2 * nodes];
     let mut responses = Vec::with_capacity(all.len());
     for (paddle, held) in all.into_iter().enumerate() {
-        let rows = 2 * held.len();
+        let mut multipliers = vec![0.0; RATES * 2 * held.len()];
         solver.hold(held);
         solver.load(&at_rest);
         solver.factorise().map_err(|_| singular("the tangent at rest is not positive definite"))?;
-        let mut respond = |rates: &[f64]| {
-            solver.solve(&zero, rates, 1e-12, &mut response, &mut vec![0.0; rows]);
-            model.target_row().interpolate(&response)
-        };
-        let mut jacobian = Matrix2::zeros();
-        for axis in 0..2 {
-            jacobian.set_column(axis, &respond(&model.held_values(Some(paddle), 0.0, Vector2::ith(axis, 1.0))));
-        }
-        let target_per_depth = respond(&model.held_values(Some(paddle), 1.0, Vector2::zeros()));
-        responses.push(response_of(model, paddle, jacobian, target_per_depth)?);
+        let rates = [
+            model.held_values(Some(paddle), 0.0, Vector2::x()),
+            model.held_values(Some(paddle), 0.0, Vector2::y()),
+            model.held_values(Some(paddle), 1.0, Vector2::zeros()),
+        ];
+        solver.solve(&zero, &rates.concat(), 1e-12, &mut response, &mut multipliers);
+        let target = |rate: usize| model.target_row().interpolate(&response[rate * 2 * nodes..]);
+        responses.push(response_of(model, paddle, Matrix2::from_columns(&[target(0), target(1)]), target(2))?);
     }
     Ok(responses)
 }

@@ -116,7 +116,6 @@ impl<const D: usize> ConstrainedSolver<D> {
     /// When the pattern misses a pair of a held stencil.
     pub fn new(pattern: Pattern, positions: &[Point<D>], held: HeldRows) -> Self {
         let cholesky = SparseCholesky::analyse(&pattern, positions);
-        let work = Work { solution: vec![0.0; pattern.unknowns()], ..Work::default() };
         let mut solver = Self {
             matrix: vec![0.0; pattern.entries()],
             pattern,
@@ -124,7 +123,7 @@ impl<const D: usize> ConstrainedSolver<D> {
             held: HeldRows::default(),
             penalty: 0.0,
             positions: Vec::new(),
-            work,
+            work: Work::default(),
         };
         solver.hold(held);
         solver
@@ -143,8 +142,6 @@ impl<const D: usize> ConstrainedSolver<D> {
                 self.positions.extend(nodes[column..].iter().map(find));
             }
         }
-        self.work.weighted = vec![0.0; held.len() * D];
-        self.work.violation = vec![0.0; held.len() * D];
         self.held = held;
     }
 
@@ -223,21 +220,38 @@ impl<const D: usize> ConstrainedSolver<D> {
         self.cholesky.factorise(&self.pattern, &self.matrix)
     }
 
-    /// Solves `K x + Λᵀ μ = rhs`, `Λ x = gap` with the last factor. `mu` comes in as a first guess (zeros will do) and
+    /// Solves `K x + Λᵀ μ = rhs`, `Λ x = gap` with the last factor, for as many right-hand sides as `rhs` holds one after
+    /// the other (several at once pass through the factor together). `mu` comes in as a first guess (zeros will do) and
     /// leaves as the multipliers; the constraint is met to `tolerance` (length units) or to rounding error.
+    ///
+    /// # Panics
+    /// When the lengths do not belong to the same number of right-hand sides.
     pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, x: &mut [f64], mu: &mut [f64]) {
+        let (unknowns, rows) = (self.pattern.unknowns(), self.held.len() * D);
+        let columns = rhs.len() / unknowns;
+        assert!(x.len() == rhs.len() && gap.len() == columns * rows && mu.len() == gap.len(), "one shape");
         let Work { solution, weighted, violation } = &mut self.work;
+        solution.resize(rhs.len(), 0.0);
+        weighted.resize(gap.len(), 0.0);
+        violation.resize(gap.len(), 0.0);
+        // Where nothing is held there are no rows to walk through.
+        let by_column = |c: usize| (c * unknowns..(c + 1) * unknowns, c * rows..(c + 1) * rows);
+
         // First round: K_ρ x = rhs + Λᵀ (ρ gap − μ).
         solution.copy_from_slice(rhs);
         for ((w, g), m) in weighted.iter_mut().zip(gap).zip(mu.iter()) {
             *w = self.penalty * g - m;
         }
-        self.held.add_transpose::<D>(weighted, solution);
-        self.cholesky.solve(solution, 1);
+        for (free, held) in (0..columns).map(by_column) {
+            self.held.add_transpose::<D>(&weighted[held], &mut solution[free]);
+        }
+        self.cholesky.solve(solution, columns);
         x.copy_from_slice(solution);
         let mut previous = f64::INFINITY;
         for _ in 0..MAX_ROUNDS {
-            self.held.apply::<D>(x, violation);
+            for (free, held) in (0..columns).map(by_column) {
+                self.held.apply::<D>(&x[free], &mut violation[held]);
+            }
             let mut largest = 0.0_f64;
             for ((v, g), m) in violation.iter_mut().zip(gap).zip(mu.iter_mut()) {
                 *v -= g;
@@ -253,8 +267,10 @@ impl<const D: usize> ConstrainedSolver<D> {
                 *w = -self.penalty * v;
             }
             solution.fill(0.0);
-            self.held.add_transpose::<D>(weighted, solution);
-            self.cholesky.solve(solution, 1);
+            for (free, held) in (0..columns).map(by_column) {
+                self.held.add_transpose::<D>(&weighted[held], &mut solution[free]);
+            }
+            self.cholesky.solve(solution, columns);
             for (x, s) in x.iter_mut().zip(solution.iter()) {
                 *x += s;
             }
