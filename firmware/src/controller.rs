@@ -13,7 +13,7 @@ mod state;
 mod tests;
 
 pub use state::{MAX_SUCCESSIVE_OVERRUNS, State};
-use state::{from_frame, start_tick, to_frame};
+use state::{Underway, from_frame, start_tick, to_frame};
 
 /// Planar tissue: displacements have two components.
 const D: usize = 2;
@@ -49,6 +49,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
         let mut faults = Faults::NONE;
         let fresh_target =
             if start_tick(state, inputs, &mut faults) { self.read_inputs(state, inputs, &mut faults) } else { None };
+        self.forget_the_dead(state);
         self.check_ages(state, &mut faults);
         let mut mode = state.supervisor.decide(faults);
         if mode == Mode::Run {
@@ -112,8 +113,10 @@ impl<'t, T: Scalar> Controller<'t, T> {
     fn read_paddle(&self, state: &mut State<T>, now_ns: u64, sample: &PaddleSample, faults: &mut Faults) {
         let index = self.table.paddle.index;
         let ledger = &mut state.ledger.paddle;
+        let commanded = state.displacement.as_ref().map(to_frame);
         let accepted = state.paddle.offer(*sample, sample.sequence, ledger, faults, |previous| {
-            check_paddle(&self.runtime, now_ns, index, sample, previous)
+            let frozen = &mut state.paddle_frozen;
+            check_paddle(&self.runtime, now_ns, index, sample, previous, commanded.as_ref(), frozen)
         });
         let Some(sample) = accepted else { return };
         match &state.displacement {
@@ -128,6 +131,26 @@ impl<'t, T: Scalar> Controller<'t, T> {
                 let measured = from_frame(&sample.displacement);
                 state.displacement = Some(self.runtime.limits.clamp_position(&measured));
             }
+        }
+    }
+
+    /// Before RUN, nothing accepted long ago may stand in the way of what arrives now: a first sample that was wrong
+    /// would have every right one after it refused as a jump. Once armed, the age leads to SAFE instead.
+    fn forget_the_dead(&self, state: &mut State<T>) {
+        let Some((_, now_ns)) = state.last_tick.filter(|_| !state.armed) else {
+            return;
+        };
+        let dead = |time_ns: Option<u64>, limits: AgeLimits| {
+            time_ns.is_some_and(|time_ns| now_ns.saturating_sub(time_ns) > limits.safe_ns)
+        };
+        if dead(state.needle.accepted.map(|sample| sample.time_ns), self.runtime.needle_age) {
+            state.needle.accepted = None;
+        }
+        if dead(state.target.accepted.map(|sample| sample.time_ns), self.runtime.target_age) {
+            state.target.accepted = None;
+        }
+        if dead(state.paddle.accepted.map(|sample| sample.time_ns), self.runtime.paddle_age) {
+            state.paddle.accepted = None;
         }
     }
 
@@ -186,7 +209,13 @@ impl<'t, T: Scalar> Controller<'t, T> {
             let error = n.dot(&from_frame(&sample.displacement));
             let direction = runtime.direction.solve(&location.jacobian(), n);
             let correction = direction * (-runtime.gain * error);
-            let corrected = runtime.limits.integrate(&integral, &correction, &feed_forward, &previous);
+            // Measured while the paddle was on its way at full rate: what is asked for once more may be there already.
+            let repeats = state.underway.is_some_and(|underway| underway.explains(sample.time_ns, &correction));
+            let corrected = if repeats {
+                integral
+            } else {
+                runtime.limits.integrate(&integral, &correction, &feed_forward, &previous)
+            };
             // A correction that saturation swallows proves nothing about the sign of the plant.
             let taken = (corrected - integral).dot(&correction);
             let acted = taken > correction.norm_squared() * T::of(0.5);
@@ -204,6 +233,16 @@ impl<'t, T: Scalar> Controller<'t, T> {
         }
         faults.set_if(Faults::POSITION_LIMITED, limited.position_limited);
         faults.set_if(Faults::RATE_LIMITED, limited.rate_limited);
+        if limited.rate_limited {
+            let there_ns =
+                inputs.time_ns.saturating_add(runtime.loop_period_ns).saturating_add(runtime.actuator_delay_ns);
+            // One motion as long as no tick is without it.
+            let since_ns = match state.underway {
+                Some(before) if before.until_ns >= inputs.time_ns => before.since_ns,
+                _ => inputs.time_ns,
+            };
+            state.underway = Some(Underway { since_ns, until_ns: there_ns, step: limited.displacement - previous });
+        }
         state.gate.travel.paddle += (limited.displacement - previous).norm().to_f64();
         state.integral = Some(integral);
         state.displacement = Some(limited.displacement);

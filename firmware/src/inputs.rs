@@ -2,7 +2,7 @@
 
 use crate::contract::{NeedleSample, PaddleSample, TargetSample};
 use crate::ledger::{Discard, StreamLedger};
-use crate::monitor::{FrozenMonitor, InnovationGate};
+use crate::monitor::{FrozenMonitor, FrozenPaddle, InnovationGate};
 use crate::runtime::Runtime;
 use crate::scalar::Scalar;
 use crate::sequence::{Arrival, SequenceTracker};
@@ -82,9 +82,9 @@ const fn fault_of(reason: Discard) -> Faults {
 }
 
 /// How much faster than the table's limit the needle may seem between two samples: jitter of their times.
-const NEEDLE_JUMP_MARGIN: f64 = 2.0;
+pub const NEEDLE_JUMP_MARGIN: f64 = 2.0;
 /// Depth jump that is always plausible, part of the table's depth range: sensor resolution.
-const NEEDLE_JUMP_FLOOR: f64 = 0.01;
+pub const NEEDLE_JUMP_FLOOR: f64 = 0.01;
 
 /// Checks a needle sample against the one before it.
 pub(crate) fn check_needle<T: Scalar>(
@@ -106,8 +106,11 @@ pub(crate) fn check_needle<T: Scalar>(
     let elapsed = seconds(sample.time_ns - previous.time_ns);
     let (start, end) = runtime.table_depth;
     let range = end - start;
-    let speed = runtime.needle_speed.max(sample.velocity.abs());
-    let plausible = NEEDLE_JUMP_MARGIN * speed * elapsed + NEEDLE_JUMP_FLOOR * range;
+    // What the needle says about its speed holds for the whole gap; what it might have done besides only for as long
+    // as a gap is no fault: a wrong unit must not become plausible by being refused long enough.
+    let speed = previous.velocity.abs().max(sample.velocity.abs());
+    let unseen = elapsed.min(seconds(runtime.needle_age.hold_ns));
+    let plausible = NEEDLE_JUMP_MARGIN * (speed * elapsed + runtime.needle_speed * unseen) + NEEDLE_JUMP_FLOOR * range;
     if (sample.depth - previous.depth).abs() > plausible {
         return Err(Discard::Innovation);
     }
@@ -144,13 +147,15 @@ pub(crate) fn check_target<T: Scalar>(
     frozen.check(sample.displacement == previous.displacement, needle_travel, end - start)
 }
 
-/// Checks a paddle sample.
+/// Checks a paddle sample; `commanded` is the last command, if there is one.
 pub(crate) fn check_paddle<T: Scalar>(
     runtime: &Runtime<T>,
     now_ns: u64,
     expected_index: u32,
     sample: &PaddleSample,
     previous: Option<&PaddleSample>,
+    commanded: Option<&[f64; 2]>,
+    frozen: &mut FrozenPaddle,
 ) -> Result<(), Discard> {
     if sample.paddle_index != expected_index {
         return Err(Discard::Identity);
@@ -160,7 +165,12 @@ pub(crate) fn check_paddle<T: Scalar>(
     if x * x + y * y > runtime.paddle_range * runtime.paddle_range {
         return Err(Discard::OutOfRange);
     }
-    check_time(runtime, now_ns, sample.time_ns, previous.map(|p| p.time_ns))
+    check_time(runtime, now_ns, sample.time_ns, previous.map(|p| p.time_ns))?;
+    let (Some(previous), Some(commanded)) = (previous, commanded) else {
+        return Ok(());
+    };
+    let age = seconds(now_ns.saturating_sub(sample.time_ns));
+    frozen.check(runtime, sample.displacement == previous.displacement, commanded, age)
 }
 
 /// Zero or a normal number. Subnormals are no measurement: they come from garbage read as a float, and slow some

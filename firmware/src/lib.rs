@@ -72,6 +72,7 @@ extern crate std;
 
 pub mod contract;
 pub mod controller;
+pub mod detection;
 pub mod inputs;
 pub mod io;
 pub mod law;

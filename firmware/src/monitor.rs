@@ -6,9 +6,9 @@ use crate::runtime::Runtime;
 use crate::scalar::Scalar;
 
 /// Identical samples that are still a coincidence.
-const FROZEN_SAMPLES: u32 = 5;
-/// Needle travel that must change a value, part of the depth range: well above any sensor's resolution.
-const FROZEN_TRAVEL: f64 = 0.005;
+pub const FROZEN_SAMPLES: u32 = 5;
+/// Travel that must change a value, part of the range of the depth or the paddle: well above any sensor's resolution.
+pub const FROZEN_TRAVEL: f64 = 0.005;
 
 /// Detects a value that stays bit-identical while the sequence advances and the needle moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -34,6 +34,37 @@ impl FrozenMonitor {
     }
 }
 
+/// Detects a measured paddle position that stays bit-identical while the command goes away from where it was.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct FrozenPaddle {
+    identical: u32,
+    /// Command when the position was last seen to change, length.
+    commanded: [f64; 2],
+}
+
+impl FrozenPaddle {
+    /// Enters whether the position is bit-identical, the last command, and the sample's age, s.
+    pub(crate) fn check<T: Scalar>(
+        &mut self,
+        runtime: &Runtime<T>,
+        identical: bool,
+        commanded: &[f64; 2],
+        age: f64,
+    ) -> Result<(), Discard> {
+        if !identical || self.identical == 0 {
+            *self = Self { identical: u32::from(identical), commanded: *commanded };
+            return Ok(());
+        }
+        self.identical = self.identical.saturating_add(1);
+        // What is on its way through the actuator cannot show yet.
+        let range = runtime.limits.max_displacement.to_f64();
+        let admitted = FROZEN_TRAVEL * range + runtime.unseen_motion(age);
+        let (dx, dy) = (commanded[0] - self.commanded[0], commanded[1] - self.commanded[1]);
+        let moved = dx * dx + dy * dy > admitted * admitted;
+        if self.identical >= FROZEN_SAMPLES && moved { Err(Discard::Frozen) } else { Ok(()) }
+    }
+}
+
 /// Cumulated motion of needle and paddle, length.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Travel {
@@ -42,11 +73,13 @@ pub(crate) struct Travel {
 }
 
 /// Standard deviations of noise that one innovation may show: one false alarm in 10¹⁴ samples.
-const GATE_SIGMAS: f64 = 8.0;
+pub const GATE_SIGMAS: f64 = 8.0;
 /// Motion that real tissue may add to what the table says.
-const GATE_MOTION: f64 = 3.0;
+pub const GATE_MOTION: f64 = 3.0;
 /// Always admitted, part of the plausible range of the target: what a sensor without stated noise resolves.
-const GATE_FLOOR: f64 = 0.01;
+pub const GATE_FLOOR: f64 = 0.01;
+/// The same for a sensor whose noise is stated: only what the table may be wrong by between two samples.
+pub const GATE_FLOOR_STATED: f64 = 0.002;
 /// Accepted samples that are remembered; the motion since the oldest one may show in the newest measurement.
 const GATE_HISTORY: usize = 8;
 
@@ -84,14 +117,15 @@ impl InnovationGate {
         let motion = runtime.target_slope * (self.travel.needle - oldest.needle)
             + runtime.jacobian_norm * (self.travel.paddle - oldest.paddle);
         let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;
-        let gate = noise + GATE_MOTION * motion + GATE_FLOOR * runtime.target_range;
+        let floor = if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR };
+        let gate = noise + GATE_MOTION * motion + floor * runtime.target_range;
         let (dx, dy) = (current[0] - previous[0], current[1] - previous[1]);
         if dx * dx + dy * dy > gate * gate { Err(Discard::Innovation) } else { Ok(()) }
     }
 }
 
 /// Successive paddle samples off the command that are a fault: longer than any hiccup of a servo.
-const FOLLOWING_SAMPLES: u32 = 20;
+pub const FOLLOWING_SAMPLES: u32 = 20;
 
 /// Trips when the paddle stays away from its command.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -108,9 +142,7 @@ impl FollowingMonitor {
         commanded: &[f64; 2],
         age: f64,
     ) -> bool {
-        // What the command may have moved since the measured position was asked for.
-        let delay = runtime.actuator_delay_ns.saturating_add(runtime.loop_period_ns) as f64 * 1e-9;
-        let admitted = runtime.following_error + runtime.paddle_rate * (age + delay);
+        let admitted = runtime.following_error + runtime.unseen_motion(age);
         let (dx, dy) = (measured[0] - commanded[0], measured[1] - commanded[1]);
         let off = dx * dx + dy * dy > admitted * admitted;
         self.successive = if off { self.successive.saturating_add(1) } else { 0 };
@@ -119,13 +151,13 @@ impl FollowingMonitor {
 }
 
 /// A window ends after this many time constants 1/g of the loop: enough for e³ of growth, too short for drift.
-const DIVERGENCE_WINDOW: f64 = 3.0;
+pub const DIVERGENCE_WINDOW: f64 = 3.0;
 /// Growth of the error that is no transient. The lag behind a ramp approaches its end value from below.
-const DIVERGENCE_GROWTH: f64 = 2.0;
+pub const DIVERGENCE_GROWTH: f64 = 2.0;
 /// Noise below which growth says nothing, standard deviations.
-const DIVERGENCE_SIGMAS: f64 = 8.0;
+pub const DIVERGENCE_SIGMAS: f64 = 8.0;
 /// Errors below this part of the plausible target range are left to the feedback.
-const DIVERGENCE_FLOOR: f64 = 0.01;
+pub const DIVERGENCE_FLOOR: f64 = 0.01;
 
 /// Detects a loop with the wrong sign: the error grows while the feedback acts against it.
 ///

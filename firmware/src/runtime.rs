@@ -8,21 +8,21 @@ use crate::settings::{Settings, SettingsError, check, check_periods};
 use crate::stability;
 
 /// Lost target samples that do not interrupt RUN: two in a row happen to every camera, three are an outage.
-const TARGET_SAMPLES_TO_HOLD: u64 = 3;
+pub const TARGET_SAMPLES_TO_HOLD: u64 = 3;
 /// Missing target samples after which the situation must be looked at.
-const TARGET_SAMPLES_TO_SAFE: u64 = 15;
+pub const TARGET_SAMPLES_TO_SAFE: u64 = 15;
 /// Loop-rate inputs older than this many ticks lead to HOLD: scheduling hiccups of a few ticks are normal.
-const TICKS_TO_HOLD: u64 = 5;
+pub const TICKS_TO_HOLD: u64 = 5;
 /// Nothing goes to SAFE by age sooner: a peer stopped for 100 ms must be able to come back.
-const SAFE_AGE_FLOOR_NS: u64 = 250_000_000;
+pub const SAFE_AGE_FLOOR_NS: u64 = 250_000_000;
 /// Depths this far outside the table, as a part of its range, are plausible (clamped); further ones are wrong units.
-const DEPTH_MARGIN: f64 = 1.0;
+pub const DEPTH_MARGIN: f64 = 1.0;
 /// Target displacements up to this multiple of the table's largest are plausible.
-const TARGET_MARGIN: f64 = 3.0;
+pub const TARGET_MARGIN: f64 = 3.0;
 /// Measured paddle positions this far outside the limit are still noise.
-const PADDLE_MARGIN: f64 = 1.1;
+pub const PADDLE_MARGIN: f64 = 1.1;
 /// Following error at rest, part of the paddle's range: ten times the resolution of ordinary actuators.
-const FOLLOWING_FRACTION: f64 = 0.02;
+pub const FOLLOWING_FRACTION: f64 = 0.02;
 
 /// Limits of the age of an input, ns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,6 +122,14 @@ impl<T: Scalar> Runtime<T> {
             following_error,
             paddle_rate: table.paddle.max_rate.to_f64(),
         })
+    }
+}
+
+impl<T: Scalar> Runtime<T> {
+    /// What the command may have moved since a measured position of this age (s) was asked for, length.
+    pub(crate) fn unseen_motion(&self, age: f64) -> f64 {
+        let delay = self.actuator_delay_ns.saturating_add(self.loop_period_ns) as f64 * 1e-9;
+        self.paddle_rate * (age + delay)
     }
 }
 

@@ -14,7 +14,7 @@ pub enum Arrival {
     Late,
     /// Has arrived before.
     Duplicate,
-    /// Older than the window: cannot be told.
+    /// Older than the window, or than the first one ever seen: cannot be told.
     Stray,
 }
 
@@ -24,6 +24,8 @@ pub struct SequenceTracker {
     newest: Option<u32>,
     /// Bit i: the sample `newest − i` has arrived.
     arrived: u64,
+    /// Sequence numbers from the first one seen to the newest, at most the window: older ones are in no account.
+    known: u32,
 }
 
 impl SequenceTracker {
@@ -35,7 +37,7 @@ impl SequenceTracker {
     /// Classifies a delivery and enters everything but its fate if it is new into the ledger.
     pub(crate) fn register(&mut self, sequence: u32, ledger: &mut StreamLedger) -> Arrival {
         let Some(newest) = self.newest else {
-            *self = Self { newest: Some(sequence), arrived: 1 };
+            *self = Self { newest: Some(sequence), arrived: 1, known: 1 };
             ledger.published += 1;
             return Arrival::New;
         };
@@ -44,12 +46,13 @@ impl SequenceTracker {
         if ahead != 0 && ahead <= u32::MAX / 2 {
             self.newest = Some(sequence);
             self.arrived = self.arrived.checked_shl(ahead).unwrap_or(0) | 1;
+            self.known = self.known.saturating_add(ahead).min(WINDOW);
             ledger.published += u64::from(ahead);
             ledger.missed += u64::from(ahead - 1);
             return Arrival::New;
         }
         let behind = newest.wrapping_sub(sequence);
-        if behind >= WINDOW {
+        if behind >= self.known {
             ledger.strays += 1;
             return Arrival::Stray;
         }

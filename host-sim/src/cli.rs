@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 use crate::by_hand::{PlantArgs, plant};
 use crate::controller::{ControllerArgs, serve};
 use crate::error::SimError;
+use crate::faults::command::{FaultsArgs, faults};
 use crate::run::{RunArgs, run};
 use crate::timing::{TimingArgs, timing};
 use crate::{output, replay};
@@ -45,6 +46,11 @@ pub enum Command {
     /// Checks the fixed-rate loop against an empty one
     #[command(after_help = "Example: host-sim timing --rate 1000 --seconds 10 --json timing.json")]
     Timing(TimingArgs),
+    /// Injects every fault of the catalogue and accounts for everything
+    #[command(
+        after_help = "Examples:\n  host-sim faults --out faults\n  host-sim faults --only 16,23 --seed 7\n  nice host-sim faults --only 1 --seeds 4000"
+    )]
+    Faults(FaultsArgs),
     /// Runs the controller again on recorded inputs and compares bit by bit
     #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
     Replay {
@@ -75,6 +81,7 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
         Some(Command::Controller(args)) => serve(&args),
         Some(Command::Plant(args)) => plant(&args),
         Some(Command::Timing(args)) => timing(&args).map(drop),
+        Some(Command::Faults(args)) => faults(&args).map(drop),
         Some(Command::Replay { recording }) => {
             let replayed = replay::replay_file(&recording)?;
             println!(

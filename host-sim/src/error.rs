@@ -30,6 +30,19 @@ pub enum SimError {
         /// Why.
         source: TableError,
     },
+    /// A table was computed in other units than the scene's.
+    #[error(
+        "the table {} is in {}, the scene in {}: compute it from this scene", path.display(), found.join(" and "),
+        expected.join(" and ")
+    )]
+    TableUnits {
+        /// File.
+        path: PathBuf,
+        /// Units of length and stress in the table.
+        found: [String; 2],
+        /// Those of the scene.
+        expected: [String; 2],
+    },
     /// The controller refuses its settings.
     #[error("the controller refuses its settings")]
     Settings(#[from] SettingsError),
@@ -125,6 +138,16 @@ pub enum SimError {
         /// What kept it.
         faults: Faults,
     },
+    /// Some rows of the catalogue of faults do not hold.
+    #[error("{failed} of {rows} rows of the catalogue and {schedules} random schedules failed; see above")]
+    Faults {
+        /// Rows that failed.
+        failed: usize,
+        /// Rows that were tried.
+        rows: usize,
+        /// Random schedules that failed.
+        schedules: usize,
+    },
     /// A replayed command is not the recorded one.
     #[error("{}: {differences} of {ticks} commands differ, the first at tick {tick}: {detail}", path.display())]
     ReplayDiffers {
@@ -148,6 +171,7 @@ impl SimError {
             Self::Scene(_)
             | Self::Usage(_)
             | Self::Table { .. }
+            | Self::TableUnits { .. }
             | Self::Settings(_)
             | Self::Recording { .. }
             | Self::Read { .. }

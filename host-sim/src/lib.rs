@@ -21,6 +21,7 @@ pub mod control;
 pub mod controller;
 pub mod describe;
 pub mod error;
+pub mod faults;
 pub mod free_run;
 pub mod handover;
 pub mod interrupt;

@@ -61,6 +61,14 @@ fn json(value: &impl Serialize) -> Vec<u8> {
     bytes
 }
 
+/// Writes a text file.
+///
+/// # Errors
+/// [`SimError::Write`].
+pub fn write_text(path: &Path, text: &str) -> Result<(), SimError> {
+    whole(path, text.as_bytes())
+}
+
 /// Writes the result as JSON.
 ///
 /// # Errors

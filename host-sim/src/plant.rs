@@ -84,6 +84,16 @@ impl Paddle {
         Self { model, waiting: VecDeque::new(), goal: Vector2::zeros(), position: Vector2::zeros() }
     }
 
+    /// A paddle at rest in this place (displacement, length).
+    pub fn at(model: ActuatorModel, position: Vector2<f64>) -> Self {
+        Self { goal: position, position, ..Self::new(model) }
+    }
+
+    /// Changes the part of the command that is reached.
+    pub fn set_gain(&mut self, gain: f64) {
+        self.model.gain = gain;
+    }
+
     /// Displacement now, length.
     pub fn position(&self) -> Vector2<f64> {
         self.position

@@ -165,6 +165,9 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
     let simulation = args.world.simulation(&scene)?;
     output::check_directory(&args.out)?;
     let given_table = args.table.as_deref().map(read_table).transpose()?;
+    if let (Some(path), Some((table, _))) = (&args.table, &given_table) {
+        check_units(table, path, &[scene.length_unit.clone(), scene.stress_unit.clone()])?;
+    }
     let cases = cases(args, &scene, given_table.as_ref().map(|table| &table.0))?;
     let studies = Studies::new(&scene, &cases, args, &simulation)?;
     let program = std::env::current_exe().map_err(SimError::Spawn)?;
@@ -237,6 +240,18 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
         print!("{}", crate::summary::summary(&result, &args.out));
     }
     Ok(result)
+}
+
+/// Refuses a table in other units of length and stress than `expected`.
+///
+/// # Errors
+/// [`SimError::TableUnits`].
+pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -> Result<(), SimError> {
+    let found = [table.units.length.as_str().to_owned(), table.units.stress.as_str().to_owned()];
+    if found == *expected {
+        return Ok(());
+    }
+    Err(SimError::TableUnits { path: path.to_owned(), found, expected: expected.clone() })
 }
 
 /// What is to be simulated.

@@ -78,6 +78,11 @@ pub struct Encoders {
 }
 
 impl Encoders {
+    /// Encoders whose first samples carry this sequence number.
+    pub fn starting_at(sequence: u32) -> Self {
+        Self { sequence }
+    }
+
     /// Samples of one tick.
     pub fn sample(
         &mut self,

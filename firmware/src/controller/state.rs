@@ -6,7 +6,7 @@ use super::D;
 use crate::contract::{NeedleSample, PaddleSample, TargetSample};
 use crate::inputs::{Inputs, Stream};
 use crate::ledger::Ledger;
-use crate::monitor::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, InnovationGate};
+use crate::monitor::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, FrozenPaddle, InnovationGate};
 use crate::scalar::Scalar;
 use crate::supervisor::{Faults, Mode, Supervisor};
 
@@ -31,12 +31,15 @@ pub struct State<T: Scalar> {
     pub(super) displacement: Option<SVector<T, D>>,
     /// Integral of the feedback; `None` until the first tick in RUN makes it continue from the adopted position.
     pub(super) integral: Option<SVector<T, D>>,
+    /// The last motion at full rate.
+    pub(super) underway: Option<Underway<T>>,
     pub(super) needle: Stream<NeedleSample>,
     pub(super) target: Stream<TargetSample>,
     pub(super) paddle: Stream<PaddleSample>,
     pub(super) target_lost: bool,
     pub(super) needle_frozen: FrozenMonitor,
     pub(super) target_frozen: FrozenMonitor,
+    pub(super) paddle_frozen: FrozenPaddle,
     pub(super) gate: InnovationGate,
     pub(super) following: FollowingMonitor,
     pub(super) divergence: DivergenceMonitor,
@@ -80,6 +83,25 @@ impl<T: Scalar> State<T> {
     }
 }
 
+/// A motion at full rate: longer than the delay that the gain was chosen for knows of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Underway<T: Scalar> {
+    /// First tick of it, ns.
+    pub(super) since_ns: u64,
+    /// When its last step shows, ns.
+    pub(super) until_ns: u64,
+    /// Its last step, length.
+    pub(super) step: SVector<T, D>,
+}
+
+impl<T: Scalar> Underway<T> {
+    /// Whether what was measured at `time_ns` shows a part of this motion only, and `correction` asks for the rest of it
+    /// once more.
+    pub(super) fn explains(&self, time_ns: u64, correction: &SVector<T, D>) -> bool {
+        self.since_ns < time_ns && time_ns < self.until_ns && self.step.dot(correction) > T::zero()
+    }
+}
+
 /// Enters the tick into the accounts and checks that time goes on. A tick from the past is rejected: nothing of it
 /// is read.
 pub(super) fn start_tick<T: Scalar>(state: &mut State<T>, inputs: &Inputs, faults: &mut Faults) -> bool {
@@ -88,13 +110,14 @@ pub(super) fn start_tick<T: Scalar>(state: &mut State<T>, inputs: &Inputs, fault
         state.last_tick = Some((inputs.tick, inputs.time_ns));
         return true;
     };
+    let skipped = inputs.tick.saturating_sub(tick).saturating_sub(1);
+    state.ledger.ticks.start(skipped);
     if inputs.tick <= tick || inputs.time_ns < time_ns {
-        state.ledger.ticks.start(0);
+        // A number that went on is used up all the same: the next tick must not count it as skipped.
+        state.last_tick = Some((inputs.tick.max(tick), time_ns));
         *faults |= Faults::CLOCK_REVERSED;
         return false;
     }
-    let skipped = inputs.tick - tick - 1;
-    state.ledger.ticks.start(skipped);
     state.last_tick = Some((inputs.tick, inputs.time_ns));
     state.successive_overruns = if skipped > 0 { state.successive_overruns.saturating_add(1) } else { 0 };
     faults.set_if(Faults::TICKS_SKIPPED, skipped > 0);

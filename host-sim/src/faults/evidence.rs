@@ -1,0 +1,120 @@
+//! What a row of the catalogue is judged by.
+
+use firmware::contract::PaddleCommand;
+use firmware::{Faults, Mode};
+
+use super::bench::Bench;
+
+/// Failures that are kept in words, per row.
+const KEPT: usize = 5;
+
+/// Whether a row holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Everything that it demands was seen.
+    Passed,
+    /// Something was not.
+    Failed,
+    /// It could not be tried here. Never the same as passed.
+    NotRun,
+}
+
+impl std::fmt::Display for Verdict {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Passed => "passed",
+            Self::Failed => "FAILED",
+            Self::NotRun => "not run",
+        })
+    }
+}
+
+/// What was seen while a row was tried.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Evidence {
+    /// Times that the fault was injected.
+    pub injected: u64,
+    /// Times that it was answered by what the row asks for.
+    pub detected: u64,
+    /// Longest time from the injection to that answer, ticks.
+    pub ticks_to_detect: Option<u64>,
+    /// Largest orthogonal error, length.
+    pub max_error: Option<f64>,
+    /// State at the end of the last trial.
+    pub final_state: Option<Mode>,
+    /// Samples and ticks that are in one account and not in another.
+    pub unaccounted: u64,
+    /// What the row demands and was not seen; the first few.
+    pub failures: Vec<String>,
+    /// Failures altogether.
+    pub failed: u64,
+    /// Why it could not be tried.
+    pub not_run: Option<String>,
+    /// What is worth knowing besides.
+    pub notes: Vec<String>,
+}
+
+impl Evidence {
+    /// A demand of the row.
+    pub fn require(&mut self, holds: bool, what: impl FnOnce() -> String) {
+        if !holds {
+            self.failed += 1;
+            if self.failures.len() < KEPT {
+                self.failures.push(what());
+            }
+        }
+    }
+
+    /// One injection, answered after `ticks` (counted from 1, or not at all); later than `limit` is a failure.
+    pub fn detect(&mut self, ticks: Option<u64>, limit: u64, what: impl Fn() -> String) {
+        self.injected += 1;
+        if let Some(ticks) = ticks {
+            self.detected += 1;
+            self.ticks_to_detect = Some(self.ticks_to_detect.map_or(ticks, |longest| longest.max(ticks)));
+        }
+        self.require(ticks.is_some_and(|ticks| ticks <= limit), || match ticks {
+            Some(ticks) => format!("{}: detected after {ticks} ticks, the limit is {limit}", what()),
+            None => format!("{}: not detected", what()),
+        });
+    }
+
+    /// Takes over accounts, invariants, error and final state of a finished trial.
+    pub fn close(&mut self, bench: &Bench<'_>, what: impl Fn() -> String) {
+        self.max_error = Some(self.max_error.unwrap_or(0.0).max(bench.max_error));
+        self.final_state = Some(bench.mode());
+        let unaccounted = bench.unaccounted();
+        self.unaccounted += unaccounted;
+        self.require(unaccounted == 0, || format!("{}: {unaccounted} unaccounted", what()));
+        for violation in bench.invariants.violations() {
+            self.require(false, || format!("{}: {violation}", what()));
+        }
+    }
+
+    /// The trial must end in this state.
+    pub fn expect_mode(&mut self, bench: &Bench<'_>, mode: Mode, what: impl Fn() -> String) {
+        self.require(bench.mode() == mode, || {
+            format!("{}: ended in {:?} instead of {mode:?}: {}", what(), bench.mode(), bench.state.faults())
+        });
+    }
+
+    /// Whether the row holds.
+    pub fn verdict(&self) -> Verdict {
+        if self.failed > 0 || self.unaccounted > 0 {
+            Verdict::Failed
+        } else if self.not_run.is_some() {
+            Verdict::NotRun
+        } else {
+            Verdict::Passed
+        }
+    }
+}
+
+/// Whether a command carries all of these codes.
+pub fn carries(codes: Faults) -> impl Fn(&PaddleCommand) -> bool {
+    move |command| Faults::from_bits(command.faults).contains(codes)
+}
+
+/// Whether a command was given in this mode.
+pub fn is_in(mode: Mode) -> impl Fn(&PaddleCommand) -> bool {
+    move |command| command.state == mode as u32
+}

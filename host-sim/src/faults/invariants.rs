@@ -1,0 +1,154 @@
+//! What must hold on every tick, whatever is injected.
+
+use firmware::contract::{PaddleCommand, Table};
+use firmware::{Faults, Inputs, Mode, Settings, State};
+use nalgebra::Vector2;
+
+/// Rounding of one addition, relative.
+const ROUNDING: f64 = 1e-9;
+/// Violations that are kept in words.
+const KEPT: usize = 5;
+
+/// Checks from outside of the controller.
+#[derive(Clone, Debug)]
+pub struct Invariants {
+    max_displacement: f64,
+    max_step: f64,
+    last: Option<PaddleCommand>,
+    /// Number and time of the last tick that went forward.
+    forward: Option<(u64, u64)>,
+    /// SAFE has been seen and nobody has re-armed since.
+    latched: bool,
+    violations: Vec<String>,
+    count: u64,
+}
+
+impl Invariants {
+    /// Limits of this table and these settings.
+    pub fn new(table: &Table<f64, 2>, settings: &Settings) -> Self {
+        Self {
+            max_displacement: table.paddle.max_displacement,
+            max_step: table.paddle.max_rate * settings.loop_period_ns as f64 * 1e-9,
+            last: None,
+            forward: None,
+            latched: false,
+            violations: Vec::new(),
+            count: 0,
+        }
+    }
+
+    /// What did not hold, in words; the first few.
+    pub fn violations(&self) -> &[String] {
+        &self.violations
+    }
+
+    /// How often something did not hold.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The next command starts from the measured position.
+    pub fn rearm(&mut self) {
+        self.latched = false;
+        // The measured position may be anywhere: the step to it is not a motion.
+        self.last = self.last.map(|last| PaddleCommand { flags: 0, ..last });
+    }
+
+    /// Whether the tick's number or time does not go on from the last one that did.
+    pub fn is_backwards(&self, inputs: &Inputs) -> bool {
+        self.forward.is_some_and(|(tick, time_ns)| inputs.tick <= tick || inputs.time_ns < time_ns)
+    }
+
+    /// The schedule agrees with arithmetic of its own: next whole period after the end of the step.
+    pub fn check_release(&mut self, scheduled_ns: u64, expected_ns: u64) {
+        if scheduled_ns != expected_ns {
+            self.fail(|| format!("next release at {scheduled_ns} ns instead of {expected_ns} ns"));
+        }
+    }
+
+    fn fail(&mut self, what: impl FnOnce() -> String) {
+        self.count += 1;
+        if self.violations.len() < KEPT {
+            self.violations.push(what());
+        }
+    }
+
+    fn require(&mut self, holds: bool, inputs: &Inputs, what: &str) {
+        if !holds {
+            self.fail(|| format!("tick {}: {what}", inputs.tick));
+        }
+    }
+
+    /// Checks one tick of the controller.
+    pub fn check(&mut self, before: &State<f64>, after: &State<f64>, inputs: &Inputs, command: &PaddleCommand) {
+        let faults = Faults::from_bits(command.faults);
+        let displacement = Vector2::from(command.displacement);
+        let backwards = self.is_backwards(inputs);
+        self.forward = Some(match self.forward {
+            Some((tick, time_ns)) if backwards => (tick.max(inputs.tick), time_ns),
+            _ => (inputs.tick, inputs.time_ns),
+        });
+        self.require(displacement.iter().all(|component| component.is_finite()), inputs, "command not finite");
+        self.require(
+            displacement.norm() <= self.max_displacement * (1.0 + ROUNDING),
+            inputs,
+            "command beyond the position limit",
+        );
+        self.check_transition(inputs, command, &displacement);
+        let mode = Mode::from_wire(command.state);
+        let has = |codes: Faults| !faults.intersection(codes).is_empty();
+        let expected = if has(Faults::LATCHING) {
+            Mode::Safe
+        } else if has(Faults::HOLDING) {
+            Mode::Hold
+        } else {
+            Mode::Run
+        };
+        self.require(mode == Some(expected), inputs, "mode does not follow from the fault codes");
+        self.require(!self.latched || mode == Some(Mode::Safe), inputs, "SAFE left without re-arming");
+        self.latched = mode == Some(Mode::Safe);
+        let reversed = faults.contains(Faults::CLOCK_REVERSED);
+        self.require(reversed || !backwards, inputs, "a tick from the past was accepted");
+        self.require(
+            backwards || !reversed || was_reversed(before),
+            inputs,
+            "a good tick was taken for one of the past",
+        );
+        self.check_integral(before, after, inputs, command);
+        self.last = Some(*command);
+    }
+
+    /// Against the command before.
+    fn check_transition(&mut self, inputs: &Inputs, command: &PaddleCommand, displacement: &Vector2<f64>) {
+        let Some(last) = self.last else { return };
+        let consecutive = command.sequence == last.sequence.wrapping_add(1);
+        self.require(consecutive, inputs, "not exactly one command per tick");
+        if !last.is_valid() {
+            return;
+        }
+        let step = (displacement - Vector2::from(last.displacement)).norm();
+        self.require(step <= self.max_step * (1.0 + ROUNDING), inputs, "command beyond the rate limit");
+        self.require(command.is_valid(), inputs, "a valid command was followed by an invalid one");
+        // The tick that finds a reason in the law itself has moved already.
+        let law = Faults::from_bits(command.faults).intersection(Faults::DIVERGENCE);
+        if command.state != Mode::Run as u32 && law.is_empty() {
+            let same = command.displacement.map(f64::to_bits) == last.displacement.map(f64::to_bits);
+            self.require(same, inputs, "the paddle was moved in HOLD or SAFE");
+        }
+    }
+
+    /// Without a sample of the target that was accepted in RUN, the integral keeps its bits.
+    fn check_integral(&mut self, before: &State<f64>, after: &State<f64>, inputs: &Inputs, command: &PaddleCommand) {
+        let consumed = after.ledger().target.consumed > before.ledger().target.consumed;
+        let bits = |state: &State<f64>| state.integral().map(|integral| integral.map(f64::to_bits));
+        if let Some(old) = bits(before)
+            && (!consumed || command.state == Mode::Hold as u32)
+        {
+            self.require(bits(after) == Some(old), inputs, "the integral changed without an accepted sample");
+        }
+    }
+}
+
+fn was_reversed(state: &State<f64>) -> bool {
+    state.faults().contains(Faults::CLOCK_REVERSED)
+}
