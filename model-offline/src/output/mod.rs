@@ -1,5 +1,6 @@
 //! What the model writes: JSON, VTU, figures. Every file is written whole or not at all.
 
+pub mod chart;
 pub mod svg;
 pub mod table_text;
 pub mod vtu;
