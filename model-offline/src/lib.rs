@@ -33,5 +33,6 @@ pub mod discretization;
 pub mod mechanics;
 pub mod output;
 pub mod placement;
+pub mod reduction;
 pub mod scene;
 pub mod solver;

@@ -249,6 +249,19 @@ impl TissueModel {
         }
     }
 
+    /// The same with the target's displacement held as well.
+    pub(crate) fn held_rows_with_target(&self, paddle: Option<usize>) -> Option<HeldRows> {
+        match &self.held {
+            Held::Nodes(groups) => Some(HeldRows::new(groups.with_paddle(paddle).chain([&self.target]))),
+            Held::Boundary(_) => None,
+        }
+    }
+
+    /// Spacing of the nodes, the finest where it varies, length units.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
     fn weakly_held(&self, paddle: Option<usize>) -> Option<Arc<dyn WeaklyHeld>> {
         match &self.held {
             Held::Nodes(_) => None,

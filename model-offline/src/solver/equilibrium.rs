@@ -410,7 +410,7 @@ impl<const D: usize> Equilibrium<D> {
             for (r, f) in rhs.iter_mut().zip(&self.at.force) {
                 *r = -f;
             }
-            self.solver.solve(&rhs, &gap, 0.5e-10 * self.spacing, &mut step, &mut mu);
+            self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, &mut step, &mut mu);
             self.effort.iterations += 1;
             let slope: f64 = step.iter().zip(&self.at.force).map(|(x, f)| x * f).sum();
             match self.search(&step, feasible.then_some(slope)) {

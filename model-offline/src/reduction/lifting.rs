@@ -1,0 +1,57 @@
+//! The body's response at rest to each thing that moves it.
+
+use crate::mechanics::Tissue;
+use crate::placement::{ModelError, TissueModel};
+use crate::solver::equilibrium::NewtonSettings;
+use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
+
+/// What moves the body: needle depth, and paddle displacement x and y where one is attached.
+pub(super) fn controls(paddle: Option<usize>) -> usize {
+    if paddle.is_some() { 3 } else { 1 }
+}
+
+/// Depth and paddle displacement as control values.
+pub(super) fn control_values(depth: f64, paddle: Vector2<f64>) -> [f64; 3] {
+    [depth, paddle.x, paddle.y]
+}
+
+/// Coefficients of the response at rest to unit rates of every control: they meet the held values exactly, so that
+/// whatever is added to them may vanish there.
+///
+/// # Errors
+/// [`ModelError::Unsupported`] where Nitsche's method holds the body (its held values are met only weakly);
+/// [`ModelError::Solve`] when the body is not held.
+pub(super) fn lifting(model: &TissueModel, paddle: Option<usize>) -> Result<Vec<Vec<f64>>, ModelError> {
+    if model.held_rows(paddle).is_none() {
+        return Err(held_weakly());
+    }
+    let mut body = model.body(paddle, NewtonSettings::default())?;
+    (0..controls(paddle))
+        .map(|control| {
+            let mut unit = [0.0; 3];
+            unit[control] = 1.0;
+            let rates = model.held_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
+            Ok(body.equilibrium_mut().sensitivity(&rates)?)
+        })
+        .collect()
+}
+
+/// The refusal of bodies that Nitsche's method holds.
+pub(super) fn held_weakly() -> ModelError {
+    ModelError::Unsupported(
+        "reduced models need nodal values that are held exactly: use essential = \"transformation\"".into(),
+    )
+}
+
+/// A displacement gradient with its components in a row: xx, xy, yx, yy.
+pub(super) fn flat(h: &Matrix2<f64>) -> Vector4<f64> {
+    Vector4::new(h[(0, 0)], h[(0, 1)], h[(1, 0)], h[(1, 1)])
+}
+
+/// Tangent of a cell's tissue at rest, times `weight`, between flat displacement gradients.
+pub(super) fn tangent_at_rest(tissue: &Tissue, cell: u32, weight: f64) -> Matrix4<f64> {
+    tissue.parts(cell).fold(Matrix4::zeros(), |sum, (material, factor)| {
+        let a = material.tangent(&Matrix2::zeros());
+        sum + Matrix4::from_fn(|k, l| a[k / 2][k % 2][l / 2][l % 2]) * (factor * weight)
+    })
+}
