@@ -92,6 +92,10 @@ pub enum SimError {
         /// Why.
         source: Failure,
     },
+    /// The reduced or condensed model that was asked for cannot be made.
+    #[error("no reduced model of the tissue: {0}")]
+    #[diagnostic(help("use --plant full, or --plant auto to have the full model where no reduced one can be made"))]
+    Reduction(String),
     /// Shared memory failed.
     #[error(transparent)]
     Link(#[from] LinkError),

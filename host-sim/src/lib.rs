@@ -41,4 +41,5 @@ pub mod statistics;
 pub mod strategy;
 pub mod summary;
 pub mod timing;
+pub mod tissue_solver;
 pub mod world;

@@ -1,27 +1,11 @@
-//! What is out there: tissue, needle and paddle, solved anew at every step with the full nonlinear model.
+//! What moves out there: the needle's drive and the paddle's actuator.
 
 use std::collections::VecDeque;
 
-use model_offline::placement::{Body, TissueModel};
-use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
-
-use crate::error::SimError;
 
 /// Start and stop of the needle take this long, s: no needle drive starts with a jump in speed.
 const RAMP_S: f64 = 0.1;
-
-/// Newton's method for small steps from a converged state: the last factor nearly always does. What the plant's error
-/// is compared with is 1e-5 of the target's motion; a residual of 1e-7 is far below it.
-const STEP_SETTINGS: NewtonSettings = NewtonSettings {
-    residual_tolerance: 1e-7,
-    step_tolerance: 1e-6,
-    max_iterations: 25,
-    max_cutbacks: 8,
-    line_search: true,
-    require_stability: false,
-    reuse_tangent: true,
-};
 
 /// The needle's way in: constant speed between two short ramps.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,46 +98,6 @@ impl Paddle {
         let longest = self.model.max_rate * elapsed_s;
         // A command that keeps to the same limit arrives, whatever the rounding of its length.
         self.position += if step.norm() > longest * (1.0 + 1e-9) { step * (longest / step.norm()) } else { step };
-    }
-}
-
-/// Tissue with needle and perhaps a paddle.
-#[derive(Debug)]
-pub struct Plant<'m> {
-    model: &'m TissueModel,
-    body: Body<'m>,
-}
-
-impl<'m> Plant<'m> {
-    /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
-    ///
-    /// # Errors
-    /// [`SimError::Tissue`] when the body is not held.
-    pub fn new(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, SimError> {
-        let body = model.body(paddle, STEP_SETTINGS).map_err(|source| SimError::Tissue { depth: 0.0, source })?;
-        Ok(Self { model, body })
-    }
-
-    /// Takes needle and paddle to where they are now; returns the target displacement.
-    ///
-    /// # Errors
-    /// [`SimError::Tissue`] when there is no equilibrium.
-    pub fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, SimError> {
-        if depth != self.body.depth() || paddle != self.body.paddle() {
-            self.body.drive(depth, paddle).map_err(|source| SimError::Tissue { depth, source })?;
-        }
-        Ok(self.body.target_displacement())
-    }
-
-    /// Where the nodes are now.
-    pub fn deformed_nodes(&self) -> Vec<[f64; 2]> {
-        let displacements = self.model.nodal_displacements(self.body.equilibrium().coefficients()).unwrap_or_default();
-        self.model
-            .positions()
-            .iter()
-            .zip(displacements)
-            .map(|(rest, displacement)| [rest.x + displacement.x, rest.y + displacement.y])
-            .collect()
     }
 }
 

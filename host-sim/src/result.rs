@@ -242,6 +242,9 @@ pub struct StrategyResult {
     pub frames: Vec<Frame>,
     /// Mean duration of a plant step, µs; not part of what is reproducible.
     pub plant_step_us: f64,
+    /// Which model answered for the tissue, and how well; results of older versions do not say.
+    #[serde(default)]
+    pub plant: crate::tissue_solver::PlantAccount,
 }
 
 /// The body at one moment of the insertion.

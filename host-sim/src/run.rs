@@ -22,6 +22,7 @@ use crate::plant::ActuatorModel;
 use crate::recorder::RunMode;
 use crate::result::{CaseResult, RunResult, Strategies, TableResult};
 use crate::strategy::{Active, Label, Measured, active, hex, passive};
+use crate::tissue_solver::PlantChoice;
 use crate::world::Simulation;
 use crate::{describe, output};
 
@@ -71,6 +72,9 @@ pub struct WorldArgs {
     /// Ticks that a command waits before the paddle acts
     #[arg(long, default_value_t = 0, value_name = "TICKS")]
     pub paddle_delay: u32,
+    /// What answers for the tissue at every tick
+    #[arg(long, value_enum, default_value_t)]
+    pub plant: PlantChoice,
     /// Part of its command that the paddle reaches
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub paddle_gain: f64,
@@ -110,6 +114,7 @@ impl WorldArgs {
                 gain: self.paddle_gain,
             },
             seed: self.seed,
+            plant: self.plant,
         })
     }
 }

@@ -15,9 +15,9 @@ use crate::handover::Handover;
 use crate::interrupt;
 use crate::link::{Departure, PlantPorts, Space};
 use crate::peer::{Patience, Peer};
-use crate::plant::Plant;
 use crate::recorder::{Exchange, Header, Record, Recording, RunMode, Truth};
 use crate::result::{Frame, LedgerResult, LoopTiming, RecordingResult, SeriesPoint, StrategyResult};
+use crate::tissue_solver::{PlantChoice, TissueSolver};
 use crate::world::{Simulation, World, published, waiting_command};
 use crate::{free_run, lockstep};
 
@@ -88,7 +88,7 @@ pub fn passive(
         world.solve(tick, time_ns)?;
         progress();
     }
-    let mut result = measure(model, &world, RunMode::Lockstep, paddle, simulation.seed);
+    let mut result = measure(model, &mut world, RunMode::Lockstep, paddle, simulation.seed);
     let csv = Artifact { name: label.file("csv"), bytes: csv(model, &world, &[]) };
     result.csv = Some(csv.name.clone());
     Ok((result, vec![csv]))
@@ -121,10 +121,10 @@ pub fn active(
     let space = Space::unique()?;
     let outcome = in_space(model, controller, simulation, &space, progress);
     space.leave::<ipc::Service>(Departure::Last);
-    let run = outcome?;
+    let mut run = outcome?;
 
     let paddle = controller.table.paddle.index;
-    let mut result = measure(model, &run.world, controller.mode, Some(paddle), simulation.seed);
+    let mut result = measure(model, &mut run.world, controller.mode, Some(paddle), simulation.seed);
     let records = merge(&run.exchanges, run.world.truths());
     let csv = Artifact { name: label.file("csv"), bytes: csv(model, &run.world, &records) };
     let recording = Recording {
@@ -223,7 +223,14 @@ fn merge(exchanges: &[Exchange], truths: &[Truth]) -> Vec<Record> {
 }
 
 /// What the true motion of the target amounts to.
-fn measure(model: &TissueModel, world: &World<'_>, mode: RunMode, paddle: Option<u32>, seed: u64) -> StrategyResult {
+fn measure(
+    model: &TissueModel,
+    world: &mut World<'_>,
+    mode: RunMode,
+    paddle: Option<u32>,
+    seed: u64,
+) -> StrategyResult {
+    let plant = world.plant_account();
     let needle = &model.scene().needle;
     let (normal, axis) = (needle.orthogonal(), needle.axis);
     let truths = world.truths();
@@ -268,6 +275,7 @@ fn measure(model: &TissueModel, world: &World<'_>, mode: RunMode, paddle: Option
         deformed_nodes: world.deformed_nodes(),
         frames: frames(model, paddle, truths),
         plant_step_us: world.mean_step_us(),
+        plant,
     }
 }
 
@@ -275,7 +283,7 @@ fn measure(model: &TissueModel, world: &World<'_>, mode: RunMode, paddle: Option
 /// the machine's clock. Ends early where the tissue has no equilibrium with such large steps.
 fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Frame> {
     let position = paddle.and_then(|index| model.paddle_position(index));
-    let (Ok(mut plant), Some(last)) = (Plant::new(model, position), truths.last()) else {
+    let (Ok(mut plant), Some(last)) = (TissueSolver::new(model, position, PlantChoice::Full), truths.last()) else {
         return Vec::new();
     };
     let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);

@@ -39,6 +39,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     for case in &run.cases {
         write_case(text, case)?;
     }
+    write_plant(text, run)?;
     write_loop(text, run)?;
     writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
 }
@@ -69,6 +70,35 @@ fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
         }
         _ => writeln!(text),
     }
+}
+
+/// What answered for the tissue, where it was not the full model: how far off it was, and how often it could not.
+fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
+    for case in &run.cases {
+        let strategies = &case.strategies;
+        for strategy in [&strategies.dynamic, &strategies.dynamic_free_run].into_iter().flatten() {
+            let plant = &strategy.plant;
+            if plant.fallbacks == 0 && plant.first_fallback.is_none() && matches!(plant.model.as_str(), "full" | "") {
+                continue;
+            }
+            write!(text, "  {}, {}: tissue {}", case.tissue, strategy.mode, plant.model)?;
+            if let (Some(modes), Some([points, all])) = (plant.modes, plant.points) {
+                write!(text, " ({modes} modes, {points} of {all} points)")?;
+            }
+            write!(text, ", {:.1} µs a step", strategy.plant_step_us)?;
+            if let Some(error) = plant.error_at_end {
+                write!(text, ", {error:.1e} from the full model at the end")?;
+            }
+            if plant.fallbacks > 0 {
+                write!(text, "; the full model answered {} steps", plant.fallbacks)?;
+            }
+            match &plant.first_fallback {
+                Some(why) => writeln!(text, ": {why}")?,
+                None => writeln!(text)?,
+            }
+        }
+    }
+    Ok(())
 }
 
 fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {

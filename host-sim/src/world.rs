@@ -11,9 +11,10 @@ use nalgebra::Vector2;
 use crate::control::LoopArgs;
 use crate::error::SimError;
 use crate::link::{LinkError, PlantPorts};
-use crate::plant::{ActuatorModel, Paddle, Plant, Trajectory};
+use crate::plant::{ActuatorModel, Paddle, Trajectory};
 use crate::recorder::Truth;
 use crate::sensors::{Encoders, TargetSensor};
+use crate::tissue_solver::{PlantAccount, PlantChoice, TissueSolver};
 
 /// The controller needs one target sample to arrive; everything longer is a fault of the set-up.
 const LONGEST_WAIT_FOR_RUN_NS: u64 = 2_000_000_000;
@@ -33,6 +34,8 @@ pub struct Simulation {
     pub actuator: ActuatorModel,
     /// Seed of the sensors' noise.
     pub seed: u64,
+    /// What answers for the tissue.
+    pub plant: PlantChoice,
 }
 
 impl Simulation {
@@ -50,7 +53,7 @@ impl Simulation {
 /// The simulated world.
 #[derive(Debug)]
 pub struct World<'m> {
-    plant: Plant<'m>,
+    tissue: TissueSolver<'m>,
     paddle: Paddle,
     /// Index of the attached paddle; 0 without one.
     paddle_index: u32,
@@ -81,7 +84,7 @@ impl<'m> World<'m> {
         let depth = simulation.depth;
         let settings = simulation.loop_args.settings(depth);
         Ok(Self {
-            plant: Plant::new(model, position)?,
+            tissue: TissueSolver::new(model, position, simulation.plant)?,
             paddle: Paddle::new(simulation.actuator),
             paddle_index: paddle_index.unwrap_or(0),
             trajectory: Trajectory::new(depth, simulation.insertion_s),
@@ -120,7 +123,7 @@ impl<'m> World<'m> {
             self.needle_started_ns.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9);
         let (depth, velocity) = self.trajectory.at(since_start_s);
         let before = Instant::now();
-        let target = self.plant.step(depth, self.paddle.position())?;
+        let target = self.tissue.step(depth, self.paddle.position())?;
         self.solving += before.elapsed();
         self.truths.push(Truth { tick, time_ns, depth, target: target.into(), paddle: self.paddle.position().into() });
         Ok((depth, velocity))
@@ -178,7 +181,12 @@ impl<'m> World<'m> {
 
     /// Where the nodes are now.
     pub fn deformed_nodes(&self) -> Vec<[f64; 2]> {
-        self.plant.deformed_nodes()
+        self.tissue.deformed_nodes()
+    }
+
+    /// Which model answered for the tissue, and how well.
+    pub fn plant_account(&mut self) -> PlantAccount {
+        self.tissue.account()
     }
 
     /// Mean duration of a solve, µs.

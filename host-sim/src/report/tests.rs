@@ -46,6 +46,7 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         deformed_nodes: nodes.clone(),
         frames: vec![Frame { depth: 0.05, nodes: rest() }, Frame { depth: 0.1, nodes }],
         plant_step_us: 1.0,
+        plant: crate::tissue_solver::PlantAccount::default(),
     }
 }
 

@@ -14,7 +14,7 @@ use crate::scene::{Resolution, Scene};
 use serde::Serialize;
 
 /// Levels tried before giving up; nodes grow about 1.7-fold per level.
-const MAX_LEVEL: u32 = 9;
+pub(crate) const MAX_LEVEL: u32 = 9;
 /// More nodes than this are not tried.
 const MAX_NODES: usize = 40_000;
 /// Share of the tolerance that the reference may leave open.
@@ -52,6 +52,7 @@ pub fn discretise(scene: &Scene) -> Result<(TissueModel, Option<ErrorEstimate>),
             let (model, estimate) = refine(scene, tolerance)?;
             Ok((model, Some(estimate)))
         }
+        Resolution::Level(level) => Ok((graded_model(scene, method_of(scene), level)?, None)),
     }
 }
 
@@ -91,10 +92,15 @@ pub fn graded_model(scene: &Scene, method: Method, level: u32) -> Result<TissueM
 /// Kernels and linear triangles start this many levels finer than quadratic triangles, whose nodes carry more.
 const KERNEL_LEVELS: u32 = 2;
 
-fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
+/// The method that a scene asks for.
+pub fn method_of(scene: &Scene) -> Method {
     let spec = scene.discretization;
-    let method = Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
-    if spec.integration == Integration::FemT6 {
+    Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true }
+}
+
+fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
+    let method = method_of(scene);
+    if method.integration == Integration::FemT6 {
         return refine_elements(scene, method, tolerance);
     }
     let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;

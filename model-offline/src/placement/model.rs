@@ -2,7 +2,7 @@
 
 use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::lattice::lattice_nodes;
-use crate::discretization::{DiscretizationError, Method, NodalCell, Planar, Quadrature, ShapeError, Stencil};
+use crate::discretization::{DiscretizationError, NodalCell, Planar, Quadrature, ShapeError, Stencil};
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{Material, Tissue};
 use crate::scene::geometry::{Point2, distance_to_polyline, overlap_area};
@@ -133,8 +133,7 @@ impl TissueModel {
             return Ok(super::adaptive::discretise(scene)?.0);
         };
         let nodes = lattice_nodes(scene, spacing);
-        let method =
-            Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true };
+        let method = super::adaptive::method_of(scene);
         let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)
     }

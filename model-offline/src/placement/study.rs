@@ -140,7 +140,7 @@ pub fn place_on(
 pub fn settings_for(scene: &crate::scene::Scene) -> NewtonSettings {
     match scene.discretization.resolution {
         crate::scene::Resolution::Spacing(_) => NewtonSettings::default(),
-        crate::scene::Resolution::Tolerance(_) => {
+        crate::scene::Resolution::Tolerance(_) | crate::scene::Resolution::Level(_) => {
             NewtonSettings { max_cutbacks: 3, max_iterations: 8, ..NewtonSettings::default() }
         }
     }

@@ -11,6 +11,7 @@
 
 use crate::mechanics::assembly::Tissue;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
+use std::sync::Arc;
 
 /// Newton iterations before a step is given up.
 const MAX_ITERATIONS: u32 = 20;
@@ -127,9 +128,9 @@ impl ReducedModel {
     }
 
     /// A body at rest.
-    pub fn body(&self) -> ReducedBody<'_> {
+    pub fn body(self: &Arc<Self>) -> ReducedBody {
         ReducedBody {
-            model: self,
+            model: Arc::clone(self),
             amplitudes: vec![0.0; self.controls + self.modes],
             residual: vec![0.0; self.modes + self.guards],
             factor: None,
@@ -199,8 +200,8 @@ impl ReducedModel {
 
 /// The reduced model in equilibrium with the needle at some depth and the paddle somewhere.
 #[derive(Debug, Clone)]
-pub struct ReducedBody<'m> {
-    model: &'m ReducedModel,
+pub struct ReducedBody {
+    model: Arc<ReducedModel>,
     /// Controls, then modes.
     amplitudes: Vec<f64>,
     residual: Vec<f64>,
@@ -208,13 +209,13 @@ pub struct ReducedBody<'m> {
     estimate: f64,
 }
 
-impl ReducedBody<'_> {
+impl ReducedBody {
     /// Takes needle and paddle there.
     ///
     /// # Errors
     /// [`Invalid`]; the body is then where it was before.
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Invalid> {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         if !model.domain.contains(depth, paddle) {
             let Domain { depth: max_depth, paddle: max_paddle } = model.domain;
             return Err(Invalid::OutsideDomain { depth, x: paddle.x, y: paddle.y, max_depth, max_paddle });
@@ -232,7 +233,7 @@ impl ReducedBody<'_> {
 
     /// Newton's method on the modes, with the last tangent as long as it serves.
     fn converge(&mut self) -> bool {
-        let model = self.model;
+        let model = Arc::clone(&self.model);
         let mut last = f64::INFINITY;
         for _ in 0..MAX_ITERATIONS {
             let renewed = self.factor.is_none();
@@ -266,7 +267,7 @@ impl ReducedBody<'_> {
     }
 
     fn check(&mut self) -> Result<(), Invalid> {
-        let model = self.model;
+        let model = &self.model;
         let mut correction = Vector2::zeros();
         for (column, residual) in model.guard_response.column_iter().zip(&self.residual[model.modes..]) {
             correction += Vector2::new(column[0], column[1]) * *residual;

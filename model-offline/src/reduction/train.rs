@@ -10,6 +10,7 @@ use crate::placement::{ModelError, TissueModel};
 use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Depths of the snapshots over the trained depth. Denser towards the end, where the response bends most.
 const DEPTHS: [f64; 5] = [0.0, 0.3, 0.6, 0.8, 1.0];
@@ -21,9 +22,9 @@ const MODES: [usize; 6] = [4, 6, 8, 12, 16, 20];
 const GUARDS: usize = 4;
 /// Modes below this singular value, over the largest, are rounding.
 const NEGLIGIBLE: f64 = 1e-7;
-/// Misfit of the sampled forces that the weights may leave. Forces on the modes cause a correction to the response at
-/// rest that is a fraction of it, so a hundredth of that is well below a thousandth of the target's motion.
-const SAMPLING_TOLERANCE: f64 = 3e-3;
+/// Misfits of the sampled forces that the weights may leave, tried in this order: forces on the modes cause a correction
+/// to the response at rest that is a fraction of it, so that a few hundredths can be enough.
+const SAMPLING_TOLERANCES: [f64; 3] = [3e-2, 1e-2, 3e-3];
 /// Numbers in the matrix that the sample is chosen by, at most: what a few hundred megabytes hold.
 const LARGEST_FIT: usize = 30_000_000;
 /// The paddle's range over what it takes to hold the target.
@@ -111,7 +112,7 @@ pub fn train(
     model: &TissueModel,
     paddle: Option<usize>,
     options: &TrainingOptions,
-) -> Result<(ReducedModel, TrainingReport), TrainingError> {
+) -> Result<(Arc<ReducedModel>, TrainingReport), TrainingError> {
     let lifts = lifting(model, paddle)?;
     let asked = Domain {
         depth: options.depth.unwrap_or(model.scene().needle.depth),
@@ -127,10 +128,11 @@ pub fn train(
     let scale = snapshots.iter().map(|s| s.target.norm()).fold(f64::MIN_POSITIVE, f64::max);
     let mut best = f64::INFINITY;
     let available = space.modes.len();
-    for modes in MODES.into_iter().filter(|m| *m <= available.max(MODES[0])) {
+    let tries = MODES.iter().flat_map(|modes| SAMPLING_TOLERANCES.map(|misfit| (*modes, misfit)));
+    for (modes, misfit) in tries.filter(|(modes, _)| *modes <= available.max(MODES[0])) {
         let modes = modes.min(available);
         let guards = GUARDS.min(available - modes);
-        let mut reduced = space.reduce(model, modes, guards, domain);
+        let mut reduced = space.reduce(model, modes, guards, misfit, domain);
         // Half the tolerance for the states tried, so that those between them keep to the whole.
         let (worst_error, worst_estimate) = trial(&mut reduced, &trials);
         reduced.tolerance = options.tolerance * scale;
@@ -146,7 +148,7 @@ pub fn train(
                 worst_estimate: worst_estimate / scale,
                 domain,
             };
-            return Ok((reduced, report));
+            return Ok((Arc::new(reduced), report));
         }
     }
     Err(TrainingError::TooInaccurate { worst_error: best, tolerance: options.tolerance })
@@ -229,10 +231,11 @@ fn radical_inverse(mut k: u32, base: u32) -> f64 {
 
 /// Worst error and worst estimate on the trial states; sets what the estimate missed.
 fn trial(reduced: &mut ReducedModel, trials: &[Snapshot]) -> (f64, f64) {
+    let untried = Arc::new(reduced.clone());
     let outcomes: Vec<Result<(f64, f64), Invalid>> = trials
         .iter()
         .map(|state| {
-            let mut body = reduced.body();
+            let mut body = untried.body();
             body.drive(state.controls[0], Vector2::new(state.controls[1], state.controls[2]))?;
             Ok(((body.target_displacement() - state.target).norm(), body.error_estimate()))
         })
@@ -302,11 +305,11 @@ impl Space {
     }
 
     /// The reduced model on the first `modes` modes, with guards behind them.
-    fn reduce(&self, model: &TissueModel, modes: usize, guards: usize, domain: Domain) -> ReducedModel {
+    fn reduce(&self, model: &TissueModel, modes: usize, guards: usize, misfit: f64, domain: Domain) -> ReducedModel {
         let controls = self.lifts.len();
         let width = controls + modes + guards;
         let tangent_at_rest = self.tangent_at_rest(model, modes + guards);
-        let sample = self.sample(model, modes, guards);
+        let sample = self.sample(model, modes, guards, misfit);
         let rule = model.rule();
         let points: Vec<SampledPoint> = sample
             .iter()
@@ -359,7 +362,7 @@ impl Space {
     /// Points and weights that give the forces on the modes, on the way from the response at rest to equilibrium at
     /// every snapshot, as all points together do; and the mode stiffness at rest. (At equilibrium alone these forces
     /// vanish, and any sample would do.)
-    fn sample(&self, model: &TissueModel, modes: usize, guards: usize) -> Vec<(usize, f64)> {
+    fn sample(&self, model: &TissueModel, modes: usize, guards: usize, misfit: f64) -> Vec<(usize, f64)> {
         let rule = model.rule();
         let seen = modes + guards;
         let all = 2 * self.states.len() * seen;
@@ -385,7 +388,7 @@ impl Space {
         }
         let a = DMatrix::from_fn(rows.len(), rule.len(), |i, q| rows[i][q]);
         let b = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.sum()));
-        non_negative_fit(&a, &b, SAMPLING_TOLERANCE)
+        non_negative_fit(&a, &b, misfit)
     }
 
     /// Every point's part of the force on each of the first `seen` modes.

@@ -7,7 +7,7 @@ mod validate;
 
 pub use error::SceneError;
 pub use geometry::{Point2, Polygon};
-pub use schema::{Basis, Essential, Integration};
+pub use schema::{Basis, Essential, FitSection, Integration, PlantModel, TableScalar};
 
 use crate::mechanics::Material;
 use serde::Serialize;
@@ -45,6 +45,8 @@ pub struct Scene {
     pub actuator: Actuator,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Discretization,
+    /// What else a fit to a tolerance has chosen; not part of the tissue.
+    pub fit: Option<FitSection>,
 }
 
 /// A region of another stiffness or material.
@@ -109,6 +111,8 @@ pub enum Resolution {
     Spacing(f64),
     /// Refine until the controllability measures are within this relative error.
     Tolerance(f64),
+    /// Graded nodes at this refinement level.
+    Level(u32),
 }
 
 /// How fine and by which method the tissue is modelled.
@@ -134,6 +138,7 @@ pub fn check_override(scene: &Scene) -> Result<(), (String, String)> {
     match scene.discretization.resolution {
         Resolution::Spacing(h) => validate::check_spacing(h, &scene.outline)?,
         Resolution::Tolerance(t) => validate::check_tolerance(t)?,
+        Resolution::Level(level) => validate::check_level(level)?,
     }
     validate::check_support(scene.discretization.support)
 }

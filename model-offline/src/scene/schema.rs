@@ -72,6 +72,8 @@ pub struct SceneFile {
     pub actuator: ActuatorSection,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Located<DiscretizationSection>,
+    /// What else a fit to a tolerance has chosen.
+    pub fit: Option<FitSection>,
 }
 
 /// Name, dimension and unit labels.
@@ -283,6 +285,8 @@ pub struct DiscretizationSection {
     pub spacing: Option<Located<f64>>,
     /// Relative error of the controllability measures to refine down to. Either this or `spacing`.
     pub tolerance: Option<Located<f64>>,
+    /// Refinement level of graded nodes, in place of both: what a fit to a tolerance has found.
+    pub level: Option<Located<u32>>,
     /// Kernel support over local spacing (default 2).
     pub support: Option<Located<f64>>,
     /// Integration rule (default scni).
@@ -293,6 +297,40 @@ pub struct DiscretizationSection {
     /// How essential boundary conditions are imposed (default transformation).
     #[serde(default)]
     pub essential: Essential,
+}
+
+/// What stands in for the tissue in a simulation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum PlantModel {
+    /// The full nonlinear model, solved anew at every step.
+    Full,
+    /// The reduced nonlinear model, with the full one where it does not hold.
+    Reduced,
+    /// The linear model, statically condensed.
+    Condensed,
+}
+
+/// Number type of a table's payload.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum TableScalar {
+    /// Single precision.
+    F32,
+    /// Double precision.
+    F64,
+}
+
+/// What a fit to a tolerance has chosen besides the discretization.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FitSection {
+    /// What the simulator solves.
+    pub plant: PlantModel,
+    /// Depth knots of the controller's table.
+    pub table_knots: u32,
+    /// Number type that the controller needs.
+    pub table_scalar: TableScalar,
 }
 
 /// The JSON Schema of the scene file.

@@ -68,6 +68,7 @@ impl Validator<'_> {
             paddles,
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, &outline)?,
+            fit: file.fit,
             needle,
             outline,
         })
@@ -368,32 +369,41 @@ impl Validator<'_> {
         })
     }
 
+    fn two_resolutions(&self, second: std::ops::Range<usize>) -> SceneError {
+        self.error(
+            second,
+            "both spacing and tolerance are given",
+            "give the spacing, the tolerance to reach, or the level of a fit, never two of them",
+        )
+    }
+
     fn discretization(&self, located: &Located<DiscretizationSection>, outline: &Polygon) -> Checked<Discretization> {
         let section = located.get();
-        let resolution = match (&section.spacing, &section.tolerance) {
-            (Some(_), Some(tolerance)) => {
-                return Err(self.error(
-                    tolerance.span(),
-                    "both spacing and tolerance are given",
-                    "give the spacing, or the tolerance to reach, never both",
-                ));
+        let resolution = match (&section.spacing, &section.tolerance, &section.level) {
+            (Some(_), Some(second), _) => return Err(self.two_resolutions(second.span())),
+            (Some(_), None, Some(second)) | (None, Some(_), Some(second)) => {
+                return Err(self.two_resolutions(second.span()));
             }
-            (None, None) => {
+            (None, None, None) => {
                 return Err(self.error(
                     located.span(),
                     "neither spacing nor tolerance is given",
                     "add spacing = (node spacing) or tolerance = (relative error) to [discretization]",
                 ));
             }
-            (Some(spacing), None) => {
+            (Some(spacing), None, None) => {
                 let h = self.positive(spacing, "spacing")?;
                 check_spacing(h, outline).map_err(|(message, help)| self.error(spacing.span(), message, help))?;
                 Resolution::Spacing(h)
             }
-            (None, Some(tolerance)) => {
+            (None, Some(tolerance), None) => {
                 let t = self.positive(tolerance, "tolerance")?;
                 check_tolerance(t).map_err(|(message, help)| self.error(tolerance.span(), message, help))?;
                 Resolution::Tolerance(t)
+            }
+            (None, None, Some(level)) => {
+                check_level(*level.get()).map_err(|(message, help)| self.error(level.span(), message, help))?;
+                Resolution::Level(*level.get())
             }
         };
         let support = match &section.support {
@@ -443,6 +453,16 @@ pub(crate) fn check_tolerance(t: f64) -> Rule {
         Ok(())
     } else {
         Err((format!("tolerance is {t}"), "give a relative error between 0.0001 and 0.5".to_owned()))
+    }
+}
+
+/// Whether a refinement level can be asked for.
+pub(crate) fn check_level(level: u32) -> Rule {
+    if level <= crate::placement::adaptive::MAX_LEVEL {
+        Ok(())
+    } else {
+        let most = crate::placement::adaptive::MAX_LEVEL;
+        Err((format!("level is {level}"), format!("give a refinement level between 0 and {most}")))
     }
 }
 

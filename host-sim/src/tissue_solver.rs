@@ -1,0 +1,256 @@
+//! What answers for the tissue at every tick: the full model, a reduced one with the full one behind it, or the
+//! condensed linear one.
+
+use clap::ValueEnum;
+use model_offline::placement::{Body, TissueModel};
+use model_offline::reduction::online::ReducedBody;
+use model_offline::reduction::{Condensed, TrainingOptions, train};
+use model_offline::scene::PlantModel;
+use model_offline::solver::equilibrium::NewtonSettings;
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+
+use crate::error::SimError;
+
+/// Newton's method for small steps from a converged state: the last factor nearly always does. What the plant's error
+/// is compared with is 1e-5 of the target's motion; a residual of 1e-7 is far below it.
+const STEP_SETTINGS: NewtonSettings = NewtonSettings {
+    residual_tolerance: 1e-7,
+    step_tolerance: 1e-6,
+    max_iterations: 25,
+    max_cutbacks: 8,
+    line_search: true,
+    require_stability: false,
+    reuse_tangent: true,
+};
+
+/// Which model is asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PlantChoice {
+    /// The full nonlinear model at every tick
+    #[default]
+    Full,
+    /// A reduced nonlinear model, trained before the run; the full one where it does not hold
+    Reduced,
+    /// The linear model, statically condensed: exact for small depths only
+    Condensed,
+    /// What `model-offline fit` wrote into the scene, else the reduced model if it can be trained
+    Auto,
+}
+
+/// Which model answered, how often it could not, and how far off it was in the end.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantAccount {
+    /// `full`, `reduced`, or `condensed`.
+    pub model: String,
+    /// Modes of the reduced model.
+    #[serde(default)]
+    pub modes: Option<usize>,
+    /// Integration points left of the full model's.
+    #[serde(default)]
+    pub points: Option<[usize; 2]>,
+    /// Steps that the full model answered because the reduced one could not.
+    #[serde(default)]
+    pub fallbacks: u64,
+    /// Why, the first time; or why there is no reduced model.
+    #[serde(default)]
+    pub first_fallback: Option<String>,
+    /// Largest error of the target displacement that the reduced model estimated of itself, length.
+    #[serde(default)]
+    pub largest_estimate: Option<f64>,
+    /// Distance from the full model's target displacement at the end of the run, length; computed after it.
+    #[serde(default)]
+    pub error_at_end: Option<f64>,
+}
+
+/// The tissue's answer to needle and paddle.
+#[derive(Debug)]
+pub struct TissueSolver<'m> {
+    model: &'m TissueModel,
+    paddle: Option<usize>,
+    kind: Kind<'m>,
+    at: (f64, Vector2<f64>),
+    account: PlantAccount,
+}
+
+#[derive(Debug)]
+enum Kind<'m> {
+    Full(Box<Body<'m>>),
+    Reduced {
+        body: Box<ReducedBody>,
+        /// Made when it is first needed.
+        full: Option<Box<Body<'m>>>,
+        /// Whether the full one has the present state.
+        full_answers: bool,
+    },
+    Condensed(Condensed),
+}
+
+impl<'m> TissueSolver<'m> {
+    /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
+    ///
+    /// # Errors
+    /// [`SimError::Tissue`] when the body is not held; [`SimError::Reduction`] when the reduced model that was asked for
+    /// cannot be made (with [`PlantChoice::Auto`] the full one answers, and the account says why).
+    pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: PlantChoice) -> Result<Self, SimError> {
+        let mut account = PlantAccount::default();
+        let wanted = match (choice, model.scene().fit) {
+            (PlantChoice::Full, _) => PlantModel::Full,
+            (PlantChoice::Condensed, _) => PlantModel::Condensed,
+            (PlantChoice::Reduced, _) | (PlantChoice::Auto, None) => PlantModel::Reduced,
+            (PlantChoice::Auto, Some(fit)) => fit.plant,
+        };
+        let kind = match wanted {
+            PlantModel::Full => Kind::Full(full(model, paddle)?),
+            PlantModel::Condensed => {
+                account.model = "condensed".into();
+                let condensed = Condensed::new(model, paddle).map_err(|e| SimError::Reduction(e.to_string()))?;
+                Kind::Condensed(condensed)
+            }
+            PlantModel::Reduced => match train(model, paddle, &TrainingOptions::default()) {
+                Ok((reduced, report)) => {
+                    account.model = "reduced".into();
+                    account.modes = Some(report.modes);
+                    account.points = Some([report.points, report.full_points]);
+                    Kind::Reduced { body: Box::new(reduced.body()), full: None, full_answers: false }
+                }
+                Err(error) if choice == PlantChoice::Auto => {
+                    account.first_fallback = Some(error.to_string());
+                    Kind::Full(full(model, paddle)?)
+                }
+                Err(error) => return Err(SimError::Reduction(error.to_string())),
+            },
+        };
+        if let Kind::Full(_) = kind {
+            account.model = "full".into();
+        }
+        Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account })
+    }
+
+    /// Takes needle and paddle to where they are now; returns the target displacement.
+    ///
+    /// # Errors
+    /// [`SimError::Tissue`] when there is no equilibrium.
+    pub fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, SimError> {
+        self.at = (depth, paddle);
+        match &mut self.kind {
+            Kind::Full(body) => drive(body, depth, paddle),
+            Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
+            Kind::Reduced { body, full: behind, full_answers } => match body.drive(depth, paddle) {
+                Ok(()) => {
+                    *full_answers = false;
+                    let largest = self.account.largest_estimate.get_or_insert(0.0);
+                    *largest = largest.max(body.error_estimate());
+                    Ok(body.target_displacement())
+                }
+                Err(invalid) => {
+                    self.account.fallbacks += 1;
+                    self.account.first_fallback.get_or_insert_with(|| invalid.to_string());
+                    *full_answers = true;
+                    let body = match behind {
+                        Some(body) => body,
+                        None => behind.insert(full(self.model, self.paddle)?),
+                    };
+                    drive(body, depth, paddle)
+                }
+            },
+        }
+    }
+
+    /// Where the nodes are now.
+    pub fn deformed_nodes(&self) -> Vec<[f64; 2]> {
+        let coefficients = match &self.kind {
+            Kind::Full(body) => body.equilibrium().coefficients().to_vec(),
+            Kind::Reduced { full: Some(body), full_answers: true, .. } => body.equilibrium().coefficients().to_vec(),
+            Kind::Reduced { body, .. } => body.coefficients(),
+            // The linear model has condensed the nodes out; the picture is the full model's.
+            Kind::Condensed(_) => match self.solved_in_full() {
+                Ok(body) => body.equilibrium().coefficients().to_vec(),
+                Err(_) => return Vec::new(),
+            },
+        };
+        let displacements = self.model.nodal_displacements(&coefficients).unwrap_or_default();
+        self.model
+            .positions()
+            .iter()
+            .zip(displacements)
+            .map(|(rest, displacement)| [rest.x + displacement.x, rest.y + displacement.y])
+            .collect()
+    }
+
+    /// The account, with the distance from the full model at the present state.
+    pub fn account(&mut self) -> PlantAccount {
+        let mut account = self.account.clone();
+        if !matches!(self.kind, Kind::Full(_)) {
+            let (depth, paddle) = self.at;
+            let full = self.solved_in_full().map(|body| body.target_displacement());
+            if let (Ok(full), Ok(own)) = (full, self.step(depth, paddle)) {
+                account.error_at_end = Some((own - full).norm());
+            }
+        }
+        account
+    }
+
+    fn solved_in_full(&self) -> Result<Box<Body<'m>>, SimError> {
+        let mut body = full(self.model, self.paddle)?;
+        drive(&mut body, self.at.0, self.at.1)?;
+        Ok(body)
+    }
+}
+
+fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, SimError> {
+    model.body(paddle, STEP_SETTINGS).map(Box::new).map_err(|source| SimError::Tissue { depth: 0.0, source })
+}
+
+fn drive(body: &mut Body<'_>, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, SimError> {
+    if depth != body.depth() || paddle != body.paddle() {
+        body.drive(depth, paddle).map_err(|source| SimError::Tissue { depth, source })?;
+    }
+    Ok(body.target_displacement())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_offline::scene::Scene;
+
+    #[test]
+    fn where_the_reduced_model_does_not_hold_the_full_one_answers_and_it_is_counted() {
+        let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+        let mut reduced = TissueSolver::new(&model, Some(2), PlantChoice::Reduced).unwrap();
+        let mut exact = TissueSolver::new(&model, Some(2), PlantChoice::Full).unwrap();
+        let inside = (0.05, Vector2::new(0.001, -0.002));
+        let far = (0.05, Vector2::new(0.04, 0.0));
+        for (depth, paddle) in [inside, far, inside] {
+            let (r, e) = (reduced.step(depth, paddle).unwrap(), exact.step(depth, paddle).unwrap());
+            assert!((r - e).norm() < 0.01 * e.norm(), "{r} {e}");
+        }
+        let account = reduced.account();
+        assert_eq!((account.model.as_str(), account.fallbacks), ("reduced", 1));
+        assert!(account.first_fallback.unwrap().contains("outside the trained range"));
+        assert!(account.error_at_end.unwrap() < 0.01 * exact.step(inside.0, inside.1).unwrap().norm());
+        assert_eq!(reduced.deformed_nodes().len(), model.nodes());
+    }
+
+    #[test]
+    fn the_condensed_model_says_how_far_off_it_is() {
+        let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+        let mut condensed = TissueSolver::new(&model, Some(2), PlantChoice::Condensed).unwrap();
+        let shallow = condensed.step(1e-4, Vector2::zeros()).unwrap();
+        assert!(condensed.account().error_at_end.unwrap() < 1e-3 * shallow.norm());
+        let deep = condensed.step(0.1, Vector2::zeros()).unwrap();
+        assert!(condensed.account().error_at_end.unwrap() > 1e-2 * deep.norm());
+    }
+
+    #[test]
+    fn auto_does_what_the_scene_says() {
+        let mut scene = Scene::bundled("paper").unwrap();
+        let model = TissueModel::new(&scene).unwrap();
+        let name = |model: &TissueModel| TissueSolver::new(model, None, PlantChoice::Auto).unwrap().account().model;
+        assert_eq!(name(&model), "reduced");
+        let section = "[fit]\nplant = \"condensed\"\ntable_knots = 9\ntable_scalar = \"f32\"\n";
+        let text = format!("{}\n{section}", model_offline::scene::BUNDLED[0].1);
+        scene.fit = Scene::parse(&text, "fitted.toml").unwrap().fit;
+        assert_eq!(name(&model.with_tissue_of(&scene)), "condensed");
+    }
+}
