@@ -42,8 +42,8 @@ const COINCIDENT: f64 = 1e-9;
 impl Grading {
     /// Refinement level of a scene: the finest spacing and the interface spacing halve from level to level, the coarsest
     /// falls by √2 and the slope by 2^¼, so that all sources of error shrink together.
-    pub fn level(scene: &Scene, level: u32, fit: InterfaceFit) -> Self {
-        let halved = 0.5_f64.powi(level as i32);
+    pub fn level(scene: &Scene, level: i32, fit: InterfaceFit) -> Self {
+        let halved = 0.5_f64.powi(level);
         let paddle = scene.paddles.iter().map(|p| (p.segment[1] - p.segment[0]).norm()).fold(f64::INFINITY, f64::min);
         let contact: f64 = scene.needle.contact.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
         let edge = scene

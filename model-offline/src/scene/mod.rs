@@ -112,7 +112,7 @@ pub enum Resolution {
     /// Refine until the controllability measures are within this relative error.
     Tolerance(f64),
     /// Graded nodes at this refinement level.
-    Level(u32),
+    Level(i32),
 }
 
 /// How fine and by which method the tissue is modelled.

@@ -286,7 +286,7 @@ pub struct DiscretizationSection {
     /// Relative error of the controllability measures to refine down to. Either this or `spacing`.
     pub tolerance: Option<Located<f64>>,
     /// Refinement level of graded nodes, in place of both: what a fit to a tolerance has found.
-    pub level: Option<Located<u32>>,
+    pub level: Option<Located<i32>>,
     /// Kernel support over local spacing (default 2).
     pub support: Option<Located<f64>>,
     /// Integration rule (default scni).

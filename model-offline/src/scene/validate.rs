@@ -457,12 +457,12 @@ pub(crate) fn check_tolerance(t: f64) -> Rule {
 }
 
 /// Whether a refinement level can be asked for.
-pub(crate) fn check_level(level: u32) -> Rule {
-    if level <= crate::placement::adaptive::MAX_LEVEL {
+pub(crate) fn check_level(level: i32) -> Rule {
+    use crate::placement::adaptive::{MAX_LEVEL, MIN_LEVEL};
+    if (MIN_LEVEL..=MAX_LEVEL).contains(&level) {
         Ok(())
     } else {
-        let most = crate::placement::adaptive::MAX_LEVEL;
-        Err((format!("level is {level}"), format!("give a refinement level between 0 and {most}")))
+        Err((format!("level is {level}"), format!("give a refinement level between {MIN_LEVEL} and {MAX_LEVEL}")))
     }
 }
 
