@@ -36,3 +36,4 @@ pub mod placement;
 pub mod reduction;
 pub mod scene;
 pub mod solver;
+pub mod study;
