@@ -6,8 +6,9 @@ use crate::placement::adaptive::{self, ErrorEstimate};
 use crate::placement::table::{self, TableBuildError, TableOptions};
 use crate::placement::{ModelError, Placement, TissueModel, study};
 use crate::scene::schema::{self, Basis, Essential, Integration};
-use crate::scene::{Resolution, Scene, SceneError, check_override};
+use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
+use crate::study::{fit, pareto};
 use clap::{Args, Parser, Subcommand};
 use nalgebra::Vector2;
 use std::io::IsTerminal as _;
@@ -100,6 +101,49 @@ enum Command {
         /// Write the contents as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
+    },
+    /// Error against time for every method there is: pareto.csv and pareto.svg.
+    #[command(
+        after_help = "Example:\n  model-offline pareto paper --out charts --quick\n\nTimes are those of one thread; leave the machine alone meanwhile. About five minutes without --quick."
+    )]
+    Pareto {
+        /// Scene file, or the name of a bundled scene.
+        scene: PathBuf,
+        /// Folder for the charts, made if need be.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Fewer settings.
+        #[arg(long)]
+        quick: bool,
+        /// Leave the inclusions out: homogeneous tissue.
+        #[arg(long)]
+        without_inclusion: bool,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// The smallest model that keeps a tolerance, chosen from the cheapest up; what was rejected, and by which number.
+    #[command(after_help = "Example:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json")]
+    Fit {
+        /// Scene file, or the name of a bundled scene.
+        scene: PathBuf,
+        /// Relative error of controllability and target displacement to keep.
+        #[arg(long, value_name = "T")]
+        tolerance: f64,
+        /// Write the scene with the choice in it.
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+        /// Write the choice and what was rejected as JSON.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// Leave the inclusions out: homogeneous tissue.
+        #[arg(long)]
+        without_inclusion: bool,
+        /// Threads to use for training (default: all). Times are those of one thread.
+        #[arg(long)]
+        threads: Option<usize>,
+        /// No summary.
+        #[arg(long)]
+        quiet: bool,
     },
     /// JSON Schema of the scene file.
     #[command(after_help = "Example:\n  model-offline schema > scene.schema.json")]
@@ -221,14 +265,14 @@ impl Common {
     }
 
     fn threads(&self) -> usize {
-        self.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).max(1)
+        threads_or_all(self.threads)
     }
 
     fn progress(&self, steps: u64) -> indicatif::ProgressBar {
         if self.quiet || !std::io::stderr().is_terminal() {
             return indicatif::ProgressBar::hidden();
         }
-        let style = indicatif::ProgressStyle::with_template("{wide_bar} {pos}/{len} increments, {eta} left");
+        let style = indicatif::ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left");
         let bar = indicatif::ProgressBar::new(steps);
         if let Ok(style) = style { bar.with_style(style) } else { bar }
     }
@@ -302,11 +346,66 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             println!("{}", crate::output::table_text::summary(&contents));
             Ok(())
         }
+        Command::Pareto { scene, out, quick, without_inclusion, common } => {
+            let scene = common.scene(&scene, without_inclusion)?;
+            pareto(&scene, &out, quick, &common)
+        }
+        Command::Fit { scene: path, tolerance, output, json, without_inclusion, threads, quiet } => {
+            let mut scene = Scene::read(&path)?;
+            if without_inclusion {
+                scene = scene.without_inclusions();
+            }
+            scene.discretization.resolution = match scene.discretization.resolution {
+                Resolution::Spacing(h) => Resolution::Spacing(h),
+                _ => Resolution::Tolerance(tolerance),
+            };
+            check_tolerance(tolerance).map_err(|(message, help)| CliError::Usage(message, help))?;
+            let threads = threads_or_all(threads);
+            let outcome = fit::fit(&scene, tolerance, threads)
+                .map_err(CliError::from)
+                .and_then(|fit| Ok((scene_with(&fit, &path)?, fit)));
+            let (text, fit) = outcome.map_err(|error| report_failure(error, json.as_deref(), &scene))?;
+            if let Some(file) = output {
+                output::write_whole(&file, text.as_bytes())?;
+            }
+            if let Some(file) = json {
+                output::write_whole(&file, pretty(&fit).as_bytes())?;
+            }
+            if !quiet {
+                print!("{}", fit.summary());
+            }
+            Ok(())
+        }
         Command::Schema => {
             println!("{}", pretty(&schema::json_schema()));
             Ok(())
         }
     }
+}
+
+fn threads_or_all(threads: Option<usize>) -> usize {
+    threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).max(1)
+}
+
+/// The text of the scene with a fit written into it.
+fn scene_with(fit: &fit::Fit, path: &Path) -> Result<String, CliError> {
+    let text = Scene::text(path)?;
+    fit.written_into(&text).map_err(|error| CliError::Usage(error.to_string(), "the scene changed meanwhile".into()))
+}
+
+fn pareto(scene: &Scene, out: &Path, quick: bool, common: &Common) -> Result<(), CliError> {
+    output::make_folder(out)?;
+    let bar = common.progress(1000);
+    let comparison = pareto::compare(scene, quick, &|share| bar.set_position((1000.0 * share) as u64))?;
+    bar.finish_and_clear();
+    let (csv, svg) = (out.join("pareto.csv"), out.join("pareto.svg"));
+    output::write_whole(&csv, comparison.csv().as_bytes())?;
+    output::write_whole(&svg, comparison.svg(&scene.name, scene.tissue()).as_bytes())?;
+    if !common.quiet {
+        print!("{}", comparison.table());
+        println!("{}\n{}", csv.display(), svg.display());
+    }
+    Ok(())
 }
 
 fn pretty(value: &impl serde::Serialize) -> String {

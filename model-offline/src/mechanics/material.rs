@@ -187,6 +187,12 @@ impl Material {
         matches!(self.law, Law::Linear { .. }) && self.barrier == 0.0
     }
 
+    /// Whether equilibria at finite depth have a limit when the nodes are refined. Laws that soften in compression
+    /// without end (Fung's, St. Venant–Kirchhoff's) have none under a needle's edge.
+    pub fn has_mesh_limit(&self) -> bool {
+        self.barrier > 0.0 || matches!(self.law, Law::NeoHookean { .. } | Law::Linear { .. })
+    }
+
     /// The law of small strains with the same tangent at rest: what a linear model of this tissue would use.
     ///
     /// # Errors

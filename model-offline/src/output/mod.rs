@@ -41,3 +41,11 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     file.persist(path).map_err(|e| fail(e.error))?;
     Ok(())
 }
+
+/// Makes a folder for results, with those above it.
+///
+/// # Errors
+/// [`OutputError`] names the folder.
+pub fn make_folder(path: &Path) -> Result<(), OutputError> {
+    std::fs::create_dir_all(path).map_err(|source| OutputError { path: path.to_owned(), source })
+}

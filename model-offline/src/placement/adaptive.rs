@@ -231,7 +231,7 @@ impl Reference {
 }
 
 /// Worst relative distance of the measures, and of the displacements over the largest one.
-fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
+pub fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
     let largest = b.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
     a.iter().zip(b).fold((0.0, 0.0), |(measure, displacement): (f64, f64), (a, b)| {
         (

@@ -143,18 +143,40 @@ pub fn check_override(scene: &Scene) -> Result<(), (String, String)> {
     validate::check_support(scene.discretization.support)
 }
 
+/// Whether a tolerance can be asked for.
+///
+/// # Errors
+/// What is wrong, and what to do.
+pub fn check_tolerance(tolerance: f64) -> Result<(), (String, String)> {
+    validate::check_tolerance(tolerance)
+}
+
 impl Scene {
     /// Reads and validates a scene file; a bundled scene's name stands for the bundled text.
     ///
     /// # Errors
     /// [`SceneError`] says what is wrong, where, and what to do.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let file = path.display().to_string();
-        if !path.exists()
-            && let Some((name, text)) = BUNDLED.iter().find(|(name, _)| Path::new(name) == path)
-        {
-            return Self::parse(text, &format!("<bundled {name}.toml>"));
+        let file = match Self::bundled_at(path) {
+            Some((name, _)) => format!("<bundled {name}.toml>"),
+            None => path.display().to_string(),
+        };
+        Self::parse(&Self::text(path)?, &file)
+    }
+
+    fn bundled_at(path: &Path) -> Option<&'static (&'static str, &'static str)> {
+        if path.exists() { None } else { BUNDLED.iter().find(|(name, _)| Path::new(name) == path) }
+    }
+
+    /// The text of a scene file, or of a bundled scene, not yet parsed.
+    ///
+    /// # Errors
+    /// [`SceneError`] when there is no such file, or it is no text.
+    pub fn text(path: &Path) -> Result<String, SceneError> {
+        if let Some((_, text)) = Self::bundled_at(path) {
+            return Ok((*text).to_owned());
         }
+        let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| {
             let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
             error::Source { file: &file, text: "" }.error(
@@ -163,18 +185,15 @@ impl Scene {
                 format!("give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
             )
         })?;
-        match String::from_utf8(bytes) {
-            Ok(text) => Self::parse(&text, &file),
-            Err(error) => {
-                let valid = error.utf8_error().valid_up_to();
-                let text = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
-                Err(error::Source { file: &file, text: &text }.error(
-                    valid..valid,
-                    "this is not a text file: the next byte is not valid UTF-8",
-                    "a scene is a TOML text file; see `model-offline schema` and the bundled scenes",
-                ))
-            }
-        }
+        String::from_utf8(bytes).map_err(|error| {
+            let valid = error.utf8_error().valid_up_to();
+            let text = String::from_utf8_lossy(&error.as_bytes()[..valid]).into_owned();
+            error::Source { file: &file, text: &text }.error(
+                valid..valid,
+                "this is not a text file: the next byte is not valid UTF-8",
+                "a scene is a TOML text file; see `model-offline schema` and the bundled scenes",
+            )
+        })
     }
 
     /// Parses and validates the text of a scene; `file` is the name that errors show.

@@ -1,1 +1,6 @@
 //! Studies of the methods themselves: which is fast, which is accurate, and where each stops working.
+pub mod candidates;
+pub mod fit;
+pub mod insertion;
+pub mod pareto;
+mod pareto_chart;

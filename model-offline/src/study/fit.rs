@@ -1,0 +1,446 @@
+//! The smallest model that a scene needs: chosen from the cheapest up, each rejection with its number.
+//!
+//! 1. **Discretization**: every family of candidates from coarse to fine until one keeps the tolerance (worst error of
+//!    controllability and small-depth displacement against an extrapolated reference, plus what the reference leaves
+//!    open); the fastest of those wins, if the next finer model confirms it.
+//! 2. **Law and plant**: the linear law, condensed, if its displacement over the whole insertion keeps the tolerance;
+//!    else a reduced model, if one can be trained to it; else the full one.
+//! 3. **Table**: the fewest knots that interpolate the densest table within the tolerance, and single precision if its
+//!    rounding does.
+
+use super::candidates::{Candidate, Nodes, Outcome, families, rule_name};
+use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
+use crate::placement::adaptive::{Reference, graded_model};
+use crate::placement::study::best_dynamic;
+use crate::placement::table::{TableBuildError, TableOptions, build as build_table};
+use crate::placement::{ModelError, TissueModel};
+use crate::reduction::{Condensed, TrainingOptions, train};
+use crate::scene::Scene;
+use crate::scene::schema::{FitSection, Integration, PlantModel, TableScalar};
+use firmware::contract::Table;
+use nalgebra::Vector2;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Part of the tolerance that the reference may leave open.
+const REFERENCE_SHARE: f64 = 0.2;
+/// Runs per candidate; the best counts.
+const REPEATS: u32 = 5;
+/// A family that is this many times slower than the best so far is not refined further: it cannot win.
+const HOPELESS: f64 = 1.5;
+/// Knots of the table that the others are held against, and the numbers tried.
+const DENSE_KNOTS: usize = 65;
+const KNOTS: [usize; 6] = [2, 3, 5, 9, 17, 33];
+/// Ticks over which a plant's step is timed.
+const TICKS: u32 = 500;
+
+/// What was chosen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Chosen {
+    /// Integration rule.
+    pub integration: &'static str,
+    /// Basis of the shape functions (for elements: their order).
+    pub basis: &'static str,
+    /// Kernel support over local spacing; none for elements.
+    pub support: Option<f64>,
+    /// Whether nodes are graded.
+    pub graded: bool,
+    /// Refinement level, where they are.
+    pub level: Option<i32>,
+    /// Node spacing, the finest where it varies, length units.
+    pub spacing: f64,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// `linear` or `nonlinear`.
+    pub law: &'static str,
+    /// What a simulator should solve.
+    pub plant: PlantModel,
+    /// Depth up to which that plant holds, length units.
+    pub plant_depth: f64,
+    /// Depth knots of the controller's table.
+    pub table_knots: u32,
+    /// Number type of the table.
+    pub table_scalar: TableScalar,
+}
+
+/// Something cheaper that is not good enough, or something good enough that is dearer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rejected {
+    /// What it is.
+    pub candidate: String,
+    /// What it decides: `discretization`, `law`, `plant` or `table`.
+    pub decision: &'static str,
+    /// The number that rejected it.
+    pub number: f64,
+    /// What the number is, or why there is none.
+    pub reason: String,
+}
+
+/// The answer.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fit {
+    /// Scene name.
+    pub scene: String,
+    /// Tissue.
+    pub tissue: &'static str,
+    /// Relative error asked for.
+    pub tolerance: f64,
+    /// What was chosen.
+    pub chosen: Chosen,
+    /// What was not, and why.
+    pub rejected: Vec<Rejected>,
+    /// Worst error of controllability and small-depth displacement: distance from the reference, and what that leaves open.
+    pub error_estimate: f64,
+    /// Distance from the next finer model.
+    pub verified_error: f64,
+    /// Time of the chosen model for all Jacobians, one thread, s.
+    pub wall_s: f64,
+    /// Time of one step of the chosen plant, µs.
+    pub step_us: f64,
+    /// Time of the fit itself, s.
+    pub fit_wall_s: f64,
+}
+
+/// Fits the smallest model to the tolerance.
+///
+/// # Errors
+/// [`ModelError::ToleranceNotReached`] when no candidate keeps it, others when the scene cannot be modelled at all.
+pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelError> {
+    let start = Instant::now();
+    let mut rejected = Vec::new();
+    let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
+    let (candidate, outcome, verified_error) = discretization(scene, tolerance, &reference, &mut rejected)?;
+    let error_estimate = worst(&outcome, &reference);
+    let model = candidate.build(scene)?;
+    let (law, plant, plant_depth, step_us) =
+        law_and_plant(scene, &candidate, &model, tolerance, threads, &mut rejected)?;
+    let (table_knots, table_scalar) = table(&model, tolerance, &mut rejected)?;
+    let chosen = Chosen {
+        integration: rule_name(candidate.integration),
+        basis: match (candidate.integration, candidate.basis) {
+            (Integration::FemT6, _) | (_, crate::scene::Basis::Quadratic) => "quadratic",
+            _ => "linear",
+        },
+        support: (!candidate.is_element()).then_some(candidate.support),
+        graded: matches!(candidate.nodes, Nodes::Graded(_)),
+        level: if let Nodes::Graded(level) = candidate.nodes { Some(level) } else { None },
+        spacing: outcome.spacing,
+        nodes: outcome.nodes,
+        law,
+        plant,
+        plant_depth,
+        table_knots,
+        table_scalar,
+    };
+    Ok(Fit {
+        scene: scene.name.clone(),
+        tissue: scene.tissue(),
+        tolerance,
+        chosen,
+        rejected,
+        error_estimate,
+        verified_error,
+        wall_s: outcome.wall_s,
+        step_us,
+        fit_wall_s: start.elapsed().as_secs_f64(),
+    })
+}
+
+fn worst(outcome: &Outcome, reference: &Reference) -> f64 {
+    outcome.errors.0.max(outcome.errors.1) + reference.open
+}
+
+/// The fastest candidate within the tolerance that the next finer one confirms.
+fn discretization(
+    scene: &Scene,
+    tolerance: f64,
+    reference: &Reference,
+    rejected: &mut Vec<Rejected>,
+) -> Result<(Candidate, Outcome, f64), ModelError> {
+    let mut measured: Vec<(Candidate, Outcome)> = Vec::new();
+    let mut best_wall = f64::INFINITY;
+    let mut best_error = f64::INFINITY;
+    // Elements first: they are cheapest, so that dearer families are given up early.
+    let mut families = families(scene, false);
+    families.sort_by_key(|family| !family.first().is_some_and(Candidate::is_element));
+    for family in families {
+        for candidate in family {
+            let outcome = match candidate.measure(scene, reference, REPEATS) {
+                Ok(outcome) => outcome,
+                Err(error) => {
+                    let reason = format!("does not work: {error}");
+                    rejected.push(rejection("discretization", describe(&candidate), f64::NAN, reason));
+                    continue;
+                }
+            };
+            let (wall_s, error) = (outcome.wall_s, worst(&outcome, reference));
+            best_error = best_error.min(error);
+            if error <= tolerance {
+                best_wall = best_wall.min(wall_s);
+            }
+            measured.push((candidate, outcome));
+            if error <= tolerance || wall_s > HOPELESS * best_wall {
+                break;
+            }
+        }
+    }
+    measured.sort_by(|a, b| a.1.wall_s.total_cmp(&b.1.wall_s));
+    let mut chosen: Option<(Candidate, Outcome, f64)> = None;
+    for (candidate, outcome) in measured {
+        let error = worst(&outcome, reference);
+        let name = describe(&candidate);
+        match &chosen {
+            Some(best) if error <= tolerance => {
+                let times = outcome.wall_s / best.1.wall_s;
+                rejected.push(rejection("discretization", name, times, "times the time of the chosen one".into()));
+            }
+            // Dearer and worse: nothing to say about it.
+            Some(_) => {}
+            None if error > tolerance => {
+                rejected.push(rejection("discretization", name, error, "estimated error".into()));
+            }
+            None => {
+                let finer = finer(&candidate).build(scene).and_then(|m| crate::placement::rest::rest_responses(&m));
+                let apart = finer.map(|finer| crate::placement::adaptive::distance(&outcome.responses, &finer));
+                match apart {
+                    Ok((measure, displacement)) if measure.max(displacement) <= tolerance => {
+                        chosen = Some((candidate, outcome, measure.max(displacement)));
+                    }
+                    Ok((measure, displacement)) => rejected.push(rejection(
+                        "discretization",
+                        name,
+                        measure.max(displacement),
+                        "distance from the next finer model".into(),
+                    )),
+                    Err(error) => {
+                        let reason = format!("the next finer model does not work: {error}");
+                        rejected.push(rejection("discretization", name, f64::NAN, reason));
+                    }
+                }
+            }
+        }
+    }
+    chosen.ok_or(ModelError::ToleranceNotReached { tolerance, reached: best_error })
+}
+
+fn finer(candidate: &Candidate) -> Candidate {
+    let nodes = match candidate.nodes {
+        Nodes::Uniform(h) => Nodes::Uniform(0.5 * h),
+        Nodes::Graded(level) => Nodes::Graded(level + 1),
+    };
+    Candidate { nodes, ..*candidate }
+}
+
+fn describe(candidate: &Candidate) -> String {
+    format!("{}, {}", rule_name(candidate.integration), candidate.settings())
+}
+
+fn rejection(decision: &'static str, candidate: String, number: f64, reason: String) -> Rejected {
+    Rejected { candidate, decision, number, reason }
+}
+
+/// Largest model on which the finite-depth profiles of both laws are compared: the law's error hardly depends on nodes.
+const LAW_NODES: usize = 1500;
+
+fn law_and_plant(
+    scene: &Scene,
+    candidate: &Candidate,
+    model: &TissueModel,
+    tolerance: f64,
+    threads: usize,
+    rejected: &mut Vec<Rejected>,
+) -> Result<(&'static str, PlantModel, f64, f64), ModelError> {
+    let (limited, _) = with_mesh_limit(scene)?;
+    let compared = if model.nodes() <= LAW_NODES {
+        candidate.build(&limited)?
+    } else {
+        graded_model(&limited, crate::placement::adaptive::method_of(&candidate.scene(&limited)), -2)?
+    };
+    let nonlinear = profile(&compared)?;
+    let law_error = profile_distance(&linear_profile(&compared)?, &nonlinear);
+    let paddle = model.paddle_position(best_dynamic(model)?);
+    if law_error <= tolerance {
+        let condensed = Condensed::new(model, paddle)?;
+        let step_us = step_us(scene, scene.needle.depth, |depth| {
+            Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
+        });
+        return Ok(("linear", PlantModel::Condensed, scene.needle.depth, step_us));
+    }
+    let reason = "error of the target displacement along the insertion by the linear law".to_owned();
+    rejected.push(rejection("law", "linear law, condensed plant".into(), law_error, reason));
+    let options = TrainingOptions { tolerance, threads, ..TrainingOptions::default() };
+    match train(model, paddle, &options) {
+        Ok((reduced, report)) => {
+            let mut body = reduced.body();
+            let step_us = step_us(scene, report.domain.depth, |depth| {
+                body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
+                Ok(body.target_displacement())
+            });
+            Ok(("nonlinear", PlantModel::Reduced, report.domain.depth, step_us))
+        }
+        Err(error) => {
+            rejected.push(rejection("plant", "reduced plant".into(), f64::NAN, error.to_string()));
+            let mut body = model.body(paddle, TICK_SETTINGS)?;
+            // As far as the tissue goes.
+            let _ = body.drive(scene.needle.depth, Vector2::zeros());
+            let reached = body.depth();
+            let mut body = model.body(paddle, TICK_SETTINGS)?;
+            let step_us = step_us(scene, reached, |depth| {
+                body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
+                Ok(body.target_displacement())
+            });
+            Ok(("nonlinear", PlantModel::Full, reached, step_us))
+        }
+    }
+}
+
+/// Time of a step over the insertion to `depth`, µs; NaN where it fails.
+fn step_us(scene: &Scene, depth: f64, step: impl FnMut(f64) -> Result<Vector2<f64>, String>) -> f64 {
+    let mut shallow = scene.clone();
+    shallow.needle.depth = depth;
+    time_ticks(&shallow, TICKS, step).map_or(f64::NAN, |(seconds, _)| 1e6 * seconds)
+}
+
+/// The fewest knots, and the number type.
+fn table(model: &TissueModel, tolerance: f64, rejected: &mut Vec<Rejected>) -> Result<(u32, TableScalar), ModelError> {
+    // Interpolation errors come from the law, not from the nodes.
+    let small = if model.nodes() <= LAW_NODES {
+        model.clone()
+    } else {
+        graded_model(model.scene(), model.planar().method(), -2)?
+    };
+    let paddle = best_dynamic(&small)?;
+    let table = |knots: usize, depth: Option<f64>| {
+        let mut model = small.clone();
+        if let Some(depth) = depth {
+            let mut scene = small.scene().clone();
+            scene.needle.depth = depth;
+            model = model.with_tissue_of(&scene);
+        }
+        build_table(&model, paddle, &TableOptions { knots, ..TableOptions::default() }).map_err(table_error)
+    };
+    let dense = table(DENSE_KNOTS, None)?;
+    let depth = dense.validity.depth_end;
+    let mut knots = DENSE_KNOTS;
+    for count in KNOTS {
+        let error = table_distance(&table(count, Some(depth))?, &dense);
+        if error <= tolerance {
+            knots = count;
+            break;
+        }
+        let reason = "error of Jacobian or paddle path between its knots".to_owned();
+        rejected.push(rejection("table", format!("{count} knots"), error, reason));
+    }
+    let rounding = table_distance(&dense.cast::<f32>().cast::<f64>(), &dense);
+    // Rounding must disappear in the tolerance, not use it up.
+    if rounding <= 0.01 * tolerance {
+        return Ok((knots as u32, TableScalar::F32));
+    }
+    rejected.push(rejection("table", "f32".into(), rounding, "relative error of rounding".into()));
+    Ok((knots as u32, TableScalar::F64))
+}
+
+fn table_error(error: TableBuildError) -> ModelError {
+    match error {
+        TableBuildError::Model(error) => error,
+        other => ModelError::Unsupported(other.to_string()),
+    }
+}
+
+/// Worst relative difference of Jacobian, and of the paddle's path over its largest value.
+fn table_distance(a: &Table<f64, 2>, b: &Table<f64, 2>) -> f64 {
+    let end = b.validity.depth_end;
+    let farthest = b.knots.iter().map(|k| k.paddle_path.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    (0..=200)
+        .filter_map(|k| {
+            let depth = end * f64::from(k) / 200.0;
+            let (a, b) = (a.locate(depth)?, b.locate(depth)?);
+            let jacobian = (a.jacobian() - b.jacobian()).norm() / b.jacobian().norm();
+            Some(jacobian.max((a.paddle_path() - b.paddle_path()).norm() / farthest))
+        })
+        .fold(0.0, f64::max)
+}
+
+impl Fit {
+    /// The text of the scene with the choice written into it; everything else, comments included, stays.
+    ///
+    /// # Errors
+    /// What the text does not parse as; a scene that was read before always does.
+    pub fn written_into(&self, text: &str) -> Result<String, toml_edit::TomlError> {
+        let mut document: toml_edit::DocumentMut = text.parse()?;
+        let section = &mut document["discretization"];
+        if let Some(table) = section.as_table_like_mut() {
+            for key in ["spacing", "tolerance", "level", "support", "basis"] {
+                table.remove(key);
+            }
+        }
+        match self.chosen.level {
+            Some(level) => section["level"] = toml_edit::value(i64::from(level)),
+            None => section["spacing"] = toml_edit::value(self.chosen.spacing),
+        }
+        section["integration"] = toml_edit::value(self.chosen.integration);
+        if let Some(support) = self.chosen.support {
+            section["support"] = toml_edit::value(support);
+            section["basis"] = toml_edit::value(self.chosen.basis);
+        }
+        let FitSection { plant, table_knots, table_scalar } = self.section();
+        let word = |value: serde_json::Value| value.as_str().unwrap_or_default().to_owned();
+        let mut fit = toml_edit::Table::new();
+        fit["plant"] = toml_edit::value(word(serde_json::json!(plant)));
+        fit["table_knots"] = toml_edit::value(i64::from(table_knots));
+        fit["table_scalar"] = toml_edit::value(word(serde_json::json!(table_scalar)));
+        document["fit"] = toml_edit::Item::Table(fit);
+        Ok(document.to_string())
+    }
+
+    /// The part of the choice that the scene's `[fit]` carries.
+    pub fn section(&self) -> FitSection {
+        FitSection {
+            plant: self.chosen.plant,
+            table_knots: self.chosen.table_knots,
+            table_scalar: self.chosen.table_scalar,
+        }
+    }
+
+    /// The answer on one screen.
+    pub fn summary(&self) -> String {
+        use std::fmt::Write as _;
+        let c = &self.chosen;
+        let nodes = match c.level {
+            Some(level) => format!("graded nodes, level {level}"),
+            None => format!("nodes {:.4} apart", c.spacing),
+        };
+        let support = c.support.map_or(String::new(), |s| format!(", {} basis, support {s}", c.basis));
+        let mut out = format!(
+            "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {} plant to depth {:.4}; {} table knots, {}\n\
+             estimated error {:.3} %, distance from the next finer model {:.3} %\n\
+             all Jacobians in {:.2} ms, one step of the plant in {:.2} µs (fitted in {:.1} s)\n\nrejected:\n",
+            self.scene,
+            self.tissue,
+            self.tolerance,
+            c.integration,
+            c.nodes,
+            c.law,
+            serde_json::json!(c.plant).as_str().unwrap_or_default(),
+            c.plant_depth,
+            c.table_knots,
+            serde_json::json!(c.table_scalar).as_str().unwrap_or_default(),
+            100.0 * self.error_estimate,
+            100.0 * self.verified_error,
+            1e3 * self.wall_s,
+            self.step_us,
+            self.fit_wall_s,
+        );
+        for r in &self.rejected {
+            let number = if !r.number.is_finite() {
+                "–".to_owned()
+            } else if r.reason.starts_with("times") {
+                format!("{:.1}", r.number)
+            } else {
+                format!("{:.3} %", 100.0 * r.number)
+            };
+            let _ = writeln!(out, "  {:<56} {number:>10}  {}", r.candidate, r.reason);
+        }
+        out
+    }
+}

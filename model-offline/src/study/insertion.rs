@@ -1,0 +1,237 @@
+//! Finite depth: the insertion by every method and law, and what one tick of it costs a simulator.
+
+use super::candidates::{Candidate, Nodes};
+use super::pareto::{Job, Point};
+use crate::mechanics::Material;
+use crate::placement::rest::rest_responses;
+use crate::placement::{ModelError, TissueModel};
+use crate::reduction::{Condensed, TrainingOptions, train};
+use crate::scene::schema::{Basis, Integration};
+use crate::scene::{Resolution, Scene};
+use crate::solver::equilibrium::{Failure, NewtonSettings};
+use nalgebra::Vector2;
+use std::time::Instant;
+
+/// Barrier over the stiffness at rest that gives a law without a mesh limit at finite depth one (the paper's law loses
+/// stability the earlier, the finer its nodes are; with 0.3 of its stiffness every method reaches the whole depth at
+/// every spacing).
+const BARRIER_SHARE: f64 = 0.3;
+/// Ticks over which a step is timed; the insertion is that many pieces.
+const TICKS: u32 = 2000;
+
+/// The scene itself if its law has a limit at finite depth under mesh refinement, else with a barrier added to the
+/// body's law and the inclusions' own; and the barrier added, stress units.
+///
+/// # Errors
+/// [`ModelError::Unsupported`] when the law cannot take a barrier.
+pub fn with_mesh_limit(scene: &Scene) -> Result<(Scene, Option<f64>), ModelError> {
+    if scene.material.has_mesh_limit() {
+        return Ok((scene.clone(), None));
+    }
+    let beta = BARRIER_SHARE * scene.material.rest_stiffness();
+    let with = |material: &Material| {
+        let own = BARRIER_SHARE * material.rest_stiffness();
+        material.clone().with_barrier(own).map_err(|e| ModelError::Unsupported(e.to_string()))
+    };
+    let mut limited = scene.clone();
+    limited.material = with(&scene.material)?;
+    for inclusion in &mut limited.inclusions {
+        if let Some(material) = &mut inclusion.material {
+            *material = with(material)?;
+        }
+    }
+    Ok((limited, Some(beta)))
+}
+
+/// Target displacements along the insertion, paddle by paddle, at every increment.
+pub type Profile = Vec<Vec<Vector2<f64>>>;
+
+/// The insertion by every method, and the fine one that they are held against.
+pub(super) struct Insertion {
+    pub points: Vec<Point>,
+    pub reference: Profile,
+    /// Distance of the reference's two levels.
+    pub open: f64,
+    pub reference_nodes: usize,
+}
+
+/// Depths of the increments.
+fn depths(scene: &Scene) -> impl Iterator<Item = f64> + '_ {
+    let n = scene.needle.increments;
+    (1..=n).map(move |k| scene.needle.depth * f64::from(k) / f64::from(n))
+}
+
+/// Follows the insertion with every paddle as a fixture.
+///
+/// # Errors
+/// [`Failure`] of the first paddle that does not reach the depth.
+pub fn profile(model: &TissueModel) -> Result<Profile, Failure> {
+    (0..model.scene().paddles.len())
+        .map(|paddle| {
+            let mut body = model.body(Some(paddle), NewtonSettings::default())?;
+            depths(model.scene())
+                .map(|depth| body.drive(depth, Vector2::zeros()).map(|()| body.target_displacement()))
+                .collect()
+        })
+        .collect()
+}
+
+/// The insertion as the linear law has it.
+///
+/// # Errors
+/// [`ModelError`] when the body is not held.
+pub fn linear_profile(model: &TissueModel) -> Result<Profile, ModelError> {
+    let responses = rest_responses(model)?;
+    Ok(responses.iter().map(|r| depths(model.scene()).map(|depth| r.target_per_depth * depth).collect()).collect())
+}
+
+/// Worst distance of two profiles over the largest displacement of the second.
+pub fn profile_distance(a: &Profile, b: &Profile) -> f64 {
+    let all = || a.iter().flatten().zip(b.iter().flatten());
+    let largest = b.iter().flatten().map(Vector2::norm).fold(f64::MIN_POSITIVE, f64::max);
+    all().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / largest
+}
+
+fn fine(level: i32) -> Candidate {
+    Candidate { integration: Integration::FemT6, basis: Basis::Linear, support: 2.0, nodes: Nodes::Graded(level) }
+}
+
+/// Runs the insertion with each method, by the nonlinear law and by the linear one.
+pub(super) fn insertion_points(scene: &Scene, quick: bool) -> Result<Insertion, ModelError> {
+    let finest = if quick { 1 } else { 2 };
+    let model = fine(finest).build(scene)?;
+    let (reference, coarser) = (profile(&model)?, profile(&fine(finest - 1).build(scene)?)?);
+    let open = profile_distance(&coarser, &reference);
+    let base = match scene.discretization.resolution {
+        Resolution::Spacing(h) => h,
+        Resolution::Tolerance(_) | Resolution::Level(_) => 0.1 * scene.outline.area().sqrt(),
+    };
+    let nodes: &[Nodes] = if quick {
+        &[Nodes::Uniform(base), Nodes::Graded(-2)]
+    } else {
+        &[Nodes::Uniform(base), Nodes::Uniform(0.5 * base), Nodes::Graded(-2), Nodes::Graded(-1), Nodes::Graded(0)]
+    };
+    let mut points = Vec::new();
+    for integration in super::candidates::RULES {
+        for &nodes in nodes {
+            let candidate = Candidate { integration, basis: Basis::Linear, support: 2.0, nodes };
+            for law in ["nonlinear", "linear"] {
+                let mut point = Point::new(Job::Insertion, candidate, law);
+                let start = Instant::now();
+                let outcome = candidate.build(scene).and_then(|model| {
+                    (point.nodes, point.spacing) = (model.nodes(), model.spacing());
+                    if law == "linear" { linear_profile(&model) } else { Ok(profile(&model)?) }
+                });
+                point.wall_s = start.elapsed().as_secs_f64();
+                match outcome {
+                    Ok(profile) => point.error_static = profile_distance(&profile, &reference),
+                    Err(error) => point.failure = Some(error.to_string()),
+                }
+                points.push(point);
+            }
+        }
+    }
+    Ok(Insertion { points, reference, open, reference_nodes: model.nodes() })
+}
+
+/// Times one tick of a simulated insertion with each kind of plant.
+pub(super) fn step_points(scene: &Scene, quick: bool, reference: &Profile) -> Result<Vec<Point>, ModelError> {
+    let base = match scene.discretization.resolution {
+        Resolution::Spacing(h) => h,
+        Resolution::Tolerance(_) | Resolution::Level(_) => 0.1 * scene.outline.area().sqrt(),
+    };
+    let mut candidates = vec![
+        Candidate { integration: Integration::Scni, basis: Basis::Linear, support: 2.0, nodes: Nodes::Uniform(base) },
+        fine(-2),
+    ];
+    if !quick {
+        candidates.push(fine(0));
+    }
+    let mut points = Vec::new();
+    for candidate in candidates {
+        let model = candidate.build(scene)?;
+        let paddle = best_dynamic(&model)?;
+        let reference = vec![reference[paddle].clone()];
+        let mut add = |method: &'static str, law: &'static str, measured: Result<(f64, Profile), String>| {
+            let mut point = Point::new(Job::Step, candidate, law);
+            if method != "full" {
+                point.method = method;
+            }
+            (point.nodes, point.spacing) = (model.nodes(), model.spacing());
+            match measured {
+                Ok((wall_s, profile)) => {
+                    point.wall_s = wall_s;
+                    point.error_static = profile_distance(&profile, &reference);
+                }
+                Err(reason) => point.failure = Some(reason),
+            }
+            points.push(point);
+        };
+        let mut body = model.body(Some(paddle), TICK_SETTINGS)?;
+        add(
+            "full",
+            "nonlinear",
+            time_ticks(scene, if quick { 200 } else { TICKS }, |depth| {
+                body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
+                Ok(body.target_displacement())
+            }),
+        );
+        let reduced = train(&model, Some(paddle), &TrainingOptions::default()).map_err(|e| e.to_string());
+        add(
+            "reduced",
+            "nonlinear",
+            reduced.and_then(|(reduced, _)| {
+                let mut body = reduced.body();
+                time_ticks(scene, TICKS, |depth| {
+                    body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
+                    Ok(body.target_displacement())
+                })
+            }),
+        );
+        let condensed = Condensed::new(&model, Some(paddle))?;
+        let condensed = std::hint::black_box(condensed);
+        add(
+            "condensed",
+            "linear",
+            time_ticks(scene, TICKS, |depth| {
+                Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
+            }),
+        );
+    }
+    Ok(points)
+}
+
+/// Newton's method for the small steps of a simulator: the last factor nearly always does.
+pub(super) const TICK_SETTINGS: NewtonSettings = NewtonSettings {
+    residual_tolerance: 1e-7,
+    step_tolerance: 1e-6,
+    max_iterations: 25,
+    max_cutbacks: 8,
+    line_search: true,
+    require_stability: false,
+    reuse_tangent: true,
+};
+
+fn best_dynamic(model: &TissueModel) -> Result<usize, ModelError> {
+    let index = crate::placement::study::best_dynamic(model)?;
+    Ok(model.paddle_position(index).unwrap_or(0))
+}
+
+/// Mean time of a tick over the insertion, best of three, and the displacements at the increments' depths.
+pub(super) fn time_ticks(
+    scene: &Scene,
+    ticks: u32,
+    mut step: impl FnMut(f64) -> Result<Vector2<f64>, String>,
+) -> Result<(f64, Profile), String> {
+    let mut best = f64::INFINITY;
+    for _ in 0..3 {
+        step(0.0)?;
+        let start = Instant::now();
+        for tick in 1..=ticks {
+            std::hint::black_box(step(scene.needle.depth * f64::from(tick) / f64::from(ticks))?);
+        }
+        best = best.min(start.elapsed().as_secs_f64() / f64::from(ticks));
+    }
+    let profile = depths(scene).map(step).collect::<Result<Vec<_>, _>>()?;
+    Ok((best, vec![profile]))
+}

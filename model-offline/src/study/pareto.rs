@@ -1,0 +1,267 @@
+//! Error against time: every method on one scene, the Pareto front marked, failures shown.
+//!
+//! Three jobs are charted, since they ask for different things:
+//! - `placement`: nodes, shape functions, the Jacobians and small-depth displacements of all paddles; against quadratic
+//!   triangles far finer than the rest, extrapolated.
+//! - `insertion`: the target displacement along the whole insertion, every paddle as a fixture, by the nonlinear law and
+//!   by the linear one; on a law that has a mesh limit at finite depth.
+//! - `step`: one tick of a simulator: the full, the reduced and the condensed model, against the same fine insertion.
+
+use super::candidates::{Candidate, Nodes, families, rule_name};
+use super::insertion::{insertion_points, step_points, with_mesh_limit};
+use crate::placement::ModelError;
+use crate::placement::adaptive::Reference;
+use crate::scene::Scene;
+use crate::scene::schema::{Basis, Integration};
+
+/// Distance of the reference's two levels at which it is fine enough to judge the finest candidates.
+const REFERENCE_SHARE: f64 = 1e-3;
+/// Runs per candidate; the best counts.
+const REPEATS: u32 = 5;
+/// A family is not refined beyond a candidate that took longer than this.
+const LONGEST_S: f64 = 1.5;
+const LONGEST_QUICK_S: f64 = 0.2;
+
+/// One setting, measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Which job.
+    pub job: Job,
+    /// `rkpm`, `fem`, `reduced` or `condensed`.
+    pub method: &'static str,
+    /// The discretization.
+    pub candidate: Candidate,
+    /// Number of nodes (0 where building failed).
+    pub nodes: usize,
+    /// Finest spacing, length units.
+    pub spacing: f64,
+    /// `linear` or `nonlinear`.
+    pub law: &'static str,
+    /// Best time, s.
+    pub wall_s: f64,
+    /// Worst relative error of the controllability measures; NaN where the job has none.
+    pub error_cm: f64,
+    /// Worst error of the target displacement, over the largest.
+    pub error_static: f64,
+    /// Why it failed.
+    pub failure: Option<String>,
+    /// Whether nothing is both faster and more accurate.
+    pub on_front: bool,
+}
+
+/// What is charted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Job {
+    /// Jacobians and small-depth displacements of all paddles.
+    Placement,
+    /// Target displacement along the insertion, all paddles.
+    Insertion,
+    /// One tick of a simulator.
+    Step,
+}
+
+impl Job {
+    /// Name in the CSV.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Placement => "placement",
+            Self::Insertion => "insertion",
+            Self::Step => "step",
+        }
+    }
+}
+
+impl Point {
+    /// The error by which the job's front is drawn.
+    pub fn error(&self) -> f64 {
+        if self.job == Job::Placement { self.error_cm } else { self.error_static }
+    }
+}
+
+/// A whole comparison.
+#[derive(Debug, Clone)]
+pub struct Pareto {
+    /// Every setting tried.
+    pub points: Vec<Point>,
+    /// How good the references are: worst relative distance of their two finest levels, for `placement` and for the
+    /// finite depths of the other two jobs.
+    pub open: (f64, f64),
+    /// Nodes of the references.
+    pub reference_nodes: (usize, usize),
+    /// The barrier that was added to give the law a mesh limit at finite depth, stress units.
+    pub barrier: Option<f64>,
+}
+
+/// Compares every method on the scene; `progress` is told how much is done, from 0 to 1. Times are those of one thread.
+///
+/// # Errors
+/// [`ModelError`] when not even the reference can be computed.
+pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Pareto, ModelError> {
+    let reference = Reference::compute(scene, if quick { 4.0 * REFERENCE_SHARE } else { REFERENCE_SHARE })?;
+    let families = families(scene, quick);
+    let longest = if quick { LONGEST_QUICK_S } else { LONGEST_S };
+    let mut points = Vec::new();
+    for (i, family) in families.iter().enumerate() {
+        progress(0.8 * i as f64 / families.len() as f64);
+        for candidate in family {
+            let point = placement_point(candidate, scene, &reference);
+            let too_long = point.wall_s > longest;
+            points.push(point);
+            if too_long {
+                break;
+            }
+        }
+    }
+    let (scene, barrier) = with_mesh_limit(scene)?;
+    let insertion = insertion_points(&scene, quick)?;
+    progress(0.9);
+    let steps = step_points(&scene, quick, &insertion.reference)?;
+    let (open, nodes) = (insertion.open, insertion.reference_nodes);
+    points.extend(insertion.points);
+    points.extend(steps);
+    for job in [Job::Placement, Job::Insertion, Job::Step] {
+        mark_front(&mut points, job);
+    }
+    progress(1.0);
+    Ok(Pareto { points, open: (reference.open, open), reference_nodes: (reference.nodes, nodes), barrier })
+}
+
+fn placement_point(candidate: &Candidate, scene: &Scene, reference: &Reference) -> Point {
+    let mut point = Point::new(Job::Placement, *candidate, "linear");
+    match candidate.measure(scene, reference, REPEATS) {
+        Ok(outcome) => {
+            (point.nodes, point.spacing, point.wall_s) = (outcome.nodes, outcome.spacing, outcome.wall_s);
+            (point.error_cm, point.error_static) = outcome.errors;
+        }
+        Err(error) => point.failure = Some(error.to_string()),
+    }
+    point
+}
+
+impl Point {
+    pub(super) fn new(job: Job, candidate: Candidate, law: &'static str) -> Self {
+        Self {
+            job,
+            method: if candidate.is_element() { "fem" } else { "rkpm" },
+            candidate,
+            nodes: 0,
+            spacing: if let Nodes::Uniform(h) = candidate.nodes { h } else { f64::NAN },
+            law,
+            wall_s: f64::NAN,
+            error_cm: f64::NAN,
+            error_static: f64::NAN,
+            failure: None,
+            on_front: false,
+        }
+    }
+}
+
+/// Marks the points of a job that no other beats in both time and error.
+fn mark_front(points: &mut [Point], job: Job) {
+    let usable = |p: &Point| p.job == job && p.failure.is_none() && p.wall_s.is_finite() && p.error().is_finite();
+    let mut order: Vec<usize> = (0..points.len()).filter(|&i| usable(&points[i])).collect();
+    order.sort_by(|&i, &j| points[i].wall_s.total_cmp(&points[j].wall_s));
+    let mut best = f64::INFINITY;
+    for i in order {
+        if points[i].error() < best {
+            best = points[i].error();
+            points[i].on_front = true;
+        }
+    }
+}
+
+impl Pareto {
+    /// The points of a job's front, fastest first.
+    pub fn front(&self, job: Job) -> Vec<&Point> {
+        let mut front: Vec<&Point> = self.points.iter().filter(|p| p.job == job && p.on_front).collect();
+        front.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
+        front
+    }
+
+    /// The comparison as CSV, one line per setting. Times in s; errors relative.
+    pub fn csv(&self) -> String {
+        let mut out = String::from(
+            "method,basis,integration,graded,spacing,support,nodes,dofs,law,wall_s,error_cm,error_static,failed,on_front,job,reason\n",
+        );
+        let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { String::new() };
+        for p in &self.points {
+            let c = &p.candidate;
+            let (basis, support) = match (c.is_element(), c.integration, c.basis) {
+                (true, Integration::FemT6, _) => ("quadratic", String::new()),
+                (true, ..) => ("linear", String::new()),
+                (false, _, Basis::Linear) => ("linear", c.support.to_string()),
+                (false, _, Basis::Quadratic) => ("quadratic", c.support.to_string()),
+            };
+            let fields = [
+                p.method.to_owned(),
+                basis.to_owned(),
+                rule_name(c.integration).to_owned(),
+                matches!(c.nodes, Nodes::Graded(_)).to_string(),
+                number(p.spacing),
+                support,
+                p.nodes.to_string(),
+                (2 * p.nodes).to_string(),
+                p.law.to_owned(),
+                number(p.wall_s),
+                number(p.error_cm),
+                number(p.error_static),
+                p.failure.is_some().to_string(),
+                p.on_front.to_string(),
+                p.job.name().to_owned(),
+                // One line, no quotes to escape.
+                p.failure.as_deref().unwrap_or("").replace([',', '"', '\n'], ";"),
+            ];
+            out.push_str(&fields.join(","));
+            out.push('\n');
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_is_what_nothing_beats() {
+        let candidate = Candidate {
+            integration: Integration::Scni,
+            basis: Basis::Linear,
+            support: 2.0,
+            nodes: Nodes::Uniform(0.1),
+        };
+        let at = |wall_s, error_cm| Point { wall_s, error_cm, ..Point::new(Job::Placement, candidate, "linear") };
+        let mut points = vec![at(1.0, 0.1), at(2.0, 0.2), at(3.0, 0.05), at(0.5, 0.3), at(0.4, f64::NAN)];
+        points.push(Point { failure: Some("x".into()), ..at(0.1, 0.01) });
+        mark_front(&mut points, Job::Placement);
+        assert_eq!(points.iter().map(|p| p.on_front).collect::<Vec<_>>(), [true, false, true, true, false, false]);
+    }
+
+    #[test]
+    fn a_quick_comparison_shows_every_method_and_hides_no_failure() {
+        let scene = Scene::bundled("paper").unwrap().without_inclusions();
+        let pareto = compare(&scene, true, &|_| {}).unwrap();
+        for rule in super::super::candidates::RULES {
+            assert!(pareto.points.iter().any(|p| p.candidate.integration == rule && p.job == Job::Placement));
+        }
+        assert!(pareto.open.0 < 0.004 && pareto.open.1 < 0.05, "{:?}", pareto.open);
+        assert!(pareto.barrier.is_some(), "the paper's law has no mesh limit of its own");
+        for job in [Job::Placement, Job::Insertion, Job::Step] {
+            let front = pareto.front(job);
+            assert!(!front.is_empty());
+            assert!(front.windows(2).all(|w| w[0].wall_s <= w[1].wall_s && w[0].error() > w[1].error()));
+        }
+        let csv = pareto.csv();
+        assert_eq!(csv.lines().count(), pareto.points.len() + 1);
+        assert!(csv.lines().all(|line| line.matches(',').count() == 15));
+        // The linear law is cheaper and, at full depth, worse than the nonlinear one on the same nodes.
+        let by_law = |law: &str| {
+            pareto
+                .points
+                .iter()
+                .find(|p| p.job == Job::Insertion && p.law == law && p.candidate.integration == Integration::FemT6)
+        };
+        let (linear, nonlinear) = (by_law("linear").unwrap(), by_law("nonlinear").unwrap());
+        assert!(linear.wall_s < nonlinear.wall_s && linear.error_static > nonlinear.error_static);
+    }
+}
