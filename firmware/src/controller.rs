@@ -130,6 +130,8 @@ impl<'t, T: Scalar> Controller<'t, T> {
             None => {
                 let measured = from_frame(&sample.displacement);
                 state.displacement = Some(self.runtime.limits.clamp_position(&measured));
+                // Even when everything else is there already: RUN may follow on the next tick.
+                *faults |= Faults::WAITING;
             }
         }
     }

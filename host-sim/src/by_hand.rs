@@ -1,5 +1,6 @@
 //! The plant in a terminal of its own; the controller is started in another one.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
@@ -7,13 +8,17 @@ use iceoryx2::service::ipc;
 use model_offline::placement::{TissueModel, place};
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
-use crate::link::{Departure, PlantPorts, Space};
+use crate::free_run::Succession;
+use crate::handover::CommandAccount;
+use crate::link::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 use crate::peer::{Patience, Peer};
 use crate::recorder::RunMode;
+use crate::result::LoopTiming;
 use crate::run::{Tissue, WorldArgs};
-use crate::world::World;
+use crate::world::{World, published};
 use crate::{free_run, interrupt, lockstep};
 
 /// Options of the plant process.
@@ -37,6 +42,12 @@ pub struct PlantArgs {
     /// Seconds of silence after which the controller is given up
     #[arg(long, default_value_t = 30.0, value_name = "S")]
     pub patience: f64,
+    /// Go on when the controller dies, with the paddle where it is, and let the next one in; free-run only
+    #[arg(long)]
+    pub keep: bool,
+    /// Write what happened here, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
 }
 
 /// Runs the plant's side of one insertion.
@@ -60,10 +71,30 @@ pub fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let space = Space::new(&args.link)?;
     let outcome = insertion(args, &mut world, &space);
     space.leave::<ipc::Service>(Departure::Last);
-    outcome?;
+    let (account, controllers, timing, published) = outcome?;
     let normal = scene.needle.orthogonal();
     let error = |target: [f64; 2]| Vector2::from(target).dot(&normal).abs();
     let largest = world.truths().iter().map(|truth| error(truth.target)).fold(0.0, f64::max);
+    if let Some(path) = &args.json {
+        let pairs = world.truths().windows(2);
+        let [commands, overwritten] = account.counts();
+        let result = PlantResult {
+            ticks: world.truths().len() as u64,
+            controllers,
+            published,
+            commands,
+            overwritten,
+            largest_error: largest,
+            largest_step: pairs
+                .map(|pair| {
+                    let step = (Vector2::from(pair[1].paddle) - Vector2::from(pair[0].paddle)).norm();
+                    step / (pair[1].tick - pair[0].tick) as f64
+                })
+                .fold(0.0, f64::max),
+            timing,
+        };
+        crate::output::write_json(path, &result)?;
+    }
     println!(
         "{} ticks with paddle {paddle}; largest orthogonal target displacement {largest:.6}",
         world.truths().len()
@@ -71,7 +102,31 @@ pub fn plant(args: &PlantArgs) -> Result<(), SimError> {
     Ok(())
 }
 
-fn insertion(args: &PlantArgs, world: &mut World<'_>, space: &Space) -> Result<(), SimError> {
+/// What `plant --json` writes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantResult {
+    /// Ticks simulated.
+    pub ticks: u64,
+    /// Controllers that have come.
+    pub controllers: u64,
+    /// Needle, target and paddle samples published.
+    pub published: [u64; 3],
+    /// Commands executed.
+    pub commands: u64,
+    /// Commands replaced by newer ones before the plant looked.
+    pub overwritten: u64,
+    /// Largest orthogonal target displacement, length.
+    pub largest_error: f64,
+    /// Largest motion of the paddle per tick, length.
+    pub largest_step: f64,
+    /// Timing of the loop; free-run only.
+    pub timing: Option<LoopTiming>,
+}
+
+/// Commands, controllers, timing, samples published.
+type Inserted = (CommandAccount, u64, Option<LoopTiming>, [u64; 3]);
+
+fn insertion(args: &PlantArgs, world: &mut World<'_>, space: &Space) -> Result<Inserted, SimError> {
     let timeout = Duration::from_secs_f64(args.patience);
     let mut ports = PlantPorts::<ipc::Service>::open(space)?;
     let mut peer = Peer::Elsewhere(Box::new(space.clone()), "controller");
@@ -82,15 +137,25 @@ fn insertion(args: &PlantArgs, world: &mut World<'_>, space: &Space) -> Result<(
     ports.connect()?;
     let loop_args = args.world.loop_args;
     let period_ns = loop_args.period_ns();
-    match args.mode {
+    let mut drive = || match args.mode {
         RunMode::Lockstep => {
-            lockstep::run(world, &mut ports, &mut peer, period_ns, timeout, &|| {})?;
+            let account = lockstep::run(world, &mut ports, &mut peer, period_ns, timeout, &|| {})?;
+            Ok((account, 1, None))
         }
         RunMode::FreeRun => {
             let rate_hz = loop_args.rate;
-            free_run::run(world, &mut ports, &mut peer, rate_hz, period_ns, &|| {})?;
+            let mut succession = Succession::new(space);
+            let keep = args.keep.then_some(&mut succession);
+            let (account, timing) = free_run::run(world, &mut ports, &mut peer, rate_hz, period_ns, keep, &|| {})?;
+            Ok((account, succession.controllers, Some(timing)))
         }
+    };
+    let outcome: Result<_, SimError> = drive();
+    if outcome.is_err() {
+        // Whatever has happened, the controller need not wait for its end.
+        let _ = ports.clock.send(ClockFrame::new(ClockKind::Stop, 0, 0));
     }
+    let (account, controllers, timing) = outcome?;
     // The controller closes its accounts with what still waits: it leaves first.
     let mut patience = Patience::new(timeout);
     while ports.command.has_writer() {
@@ -98,5 +163,5 @@ fn insertion(args: &PlantArgs, world: &mut World<'_>, space: &Space) -> Result<(
             break;
         }
     }
-    Ok(())
+    Ok((account, controllers, timing, published(&ports)))
 }

@@ -4,6 +4,7 @@ use firmware::ledger::{DISCARD_REASONS, StreamLedger};
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{Reader, Writer};
+use crate::recorder::stream::RecordAccount;
 use crate::recorder::{EXCHANGE_BYTES, Exchange};
 use crate::result::{LedgerResult, LoopTiming, StreamResult, TickResult};
 
@@ -45,6 +46,9 @@ pub struct Handover {
     pub exchanges: u64,
     /// Exchanges for which there was no room.
     pub exchanges_lost: u64,
+    /// What became of the recording, if there was one.
+    #[serde(default)]
+    pub record: Option<RecordAccount>,
 }
 
 impl Handover {
@@ -156,6 +160,21 @@ impl CommandAccount {
         self.overwritten += u64::from(sequence.wrapping_sub(self.next));
         self.consumed += 1;
         self.next = sequence.wrapping_add(1);
+    }
+
+    /// Whether a number lies before the ones that are due: somebody else counts.
+    pub fn is_behind(&self, sequence: u32) -> bool {
+        sequence.wrapping_sub(self.next) > u32::MAX / 2
+    }
+
+    /// Another controller counts from 0 again.
+    pub fn restart(&mut self) {
+        self.next = 0;
+    }
+
+    /// Commands executed, and commands replaced by newer ones before the plant looked.
+    pub fn counts(&self) -> [u64; 2] {
+        [self.consumed, self.overwritten]
     }
 
     /// The newest command that still waited at the end.

@@ -37,6 +37,7 @@ pub mod report;
 pub mod result;
 pub mod run;
 pub mod sensors;
+pub mod session;
 pub mod statistics;
 pub mod strategy;
 pub mod summary;

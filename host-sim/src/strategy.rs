@@ -195,7 +195,8 @@ fn in_space<'m>(
         }
         RunMode::FreeRun => {
             let rate_hz = simulation.loop_args.rate;
-            let (account, timing) = free_run::run(&mut world, &mut ports, &mut peer, rate_hz, period_ns, progress)?;
+            let (account, timing) =
+                free_run::run(&mut world, &mut ports, &mut peer, rate_hz, period_ns, None, progress)?;
             (account, Some(timing))
         }
     };

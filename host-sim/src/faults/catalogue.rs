@@ -3,6 +3,7 @@
 use firmware::contract::Table;
 
 use super::evidence::Evidence;
+use super::processes::{self, Stage};
 use super::rows::{Outcome, Trial, actuation, bytes, needle, streams, time, values};
 use crate::error::SimError;
 
@@ -11,6 +12,8 @@ use crate::error::SimError;
 pub(crate) enum Method {
     /// In lockstep and virtual time, from a seeded schedule.
     Lockstep(fn(&Trial<'_>, &mut Evidence) -> Outcome),
+    /// With real processes, in real time.
+    Processes(fn(&Stage<'_>, &mut Evidence) -> Outcome),
 }
 
 /// One row.
@@ -26,6 +29,10 @@ pub(crate) struct Row {
 
 const fn lockstep(id: u32, name: &'static str, run: fn(&Trial<'_>, &mut Evidence) -> Outcome) -> Row {
     Row { id, name, method: Method::Lockstep(run) }
+}
+
+const fn real(id: u32, name: &'static str, run: fn(&Stage<'_>, &mut Evidence) -> Outcome) -> Row {
+    Row { id, name, method: Method::Processes(run) }
 }
 
 /// All rows in order.
@@ -62,6 +69,19 @@ pub(crate) const ROWS: &[Row] = &[
     lockstep(30, "depth outside the table", needle::beyond_the_table),
     lockstep(31, "needle reverses", needle::reversal),
     lockstep(32, "needle too fast", needle::too_fast),
+    real(33, "simulator killed at 200 phases", processes::plant_killed),
+    real(34, "controller killed and restarted", processes::controller_restarted),
+    real(35, "killed during service creation", processes::killed_at_start),
+    real(36, "100 kill and restart cycles", processes::cycles),
+    real(37, "two controllers", processes::two_controllers),
+    real(38, "reader that never reads", processes::never_reads),
+    real(39, "shared memory full", processes::memory_full),
+    real(40, "file deleted under it", processes::file_deleted),
+    real(41, "another user", processes::other_user),
+    real(42, "garbage in the payload", processes::garbage),
+    real(43, "other layout version", processes::other_layout),
+    real(44, "disk of the log full", processes::disk_full),
+    real(45, "panic in the step", processes::panic_in_step),
 ];
 
 impl Row {
@@ -69,10 +89,11 @@ impl Row {
     ///
     /// # Errors
     /// [`SimError`] when it could not be set up; what does not hold is in the evidence.
-    pub(crate) fn run(&self, table: &Table<f64, 2>, seed: u64) -> Result<Evidence, SimError> {
+    pub(crate) fn run(&self, table: &Table<f64, 2>, seed: u64, effort: f64) -> Result<Evidence, SimError> {
         let mut evidence = Evidence::default();
         match self.method {
             Method::Lockstep(run) => run(&Trial { table, seed }, &mut evidence)?,
+            Method::Processes(run) => run(&Stage::new(table, seed, effort)?, &mut evidence)?,
         }
         Ok(evidence)
     }
@@ -95,7 +116,7 @@ mod tests {
             // The bytes of a table do not depend on a seed.
             let seeds = if (26..=29).contains(&row.id) { 1 } else { 3 };
             for seed in 1..=seeds {
-                let evidence = row.run(&table, seed).unwrap();
+                let evidence = row.run(&table, seed, 1.0).unwrap();
                 let failures = &evidence.failures;
                 assert_eq!(evidence.verdict(), Verdict::Passed, "row {} seed {seed}: {failures:?}", row.id);
                 assert!(evidence.injected > 0, "row {}", row.id);

@@ -23,6 +23,9 @@ pub struct FaultsArgs {
     /// Random schedules of several faults at once [default: 1000, none with --only]
     #[arg(long, value_name = "N")]
     pub seeds: Option<u64>,
+    /// Part of the repetitions of rows 33, 35 and 36 (200 kills, 100 kills, 100 cycles)
+    #[arg(long, default_value_t = 1.0, value_name = "PART")]
+    pub effort: f64,
     /// Write faults.csv and faults.json into this directory
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -56,7 +59,7 @@ pub fn faults(args: &FaultsArgs) -> Result<FaultsResult, SimError> {
     for row in ROWS.iter().filter(|row| args.only.is_empty() || args.only.contains(&row.id)) {
         interrupt::check()?;
         let started = Instant::now();
-        let row = RowResult::new(row, &row.run(&table, args.seed)?);
+        let row = RowResult::new(row, &row.run(&table, args.seed, args.effort)?);
         print_row(&row, started.elapsed().as_secs_f64());
         result.rows.push(row);
     }

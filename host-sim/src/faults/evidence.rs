@@ -97,6 +97,23 @@ impl Evidence {
         });
     }
 
+    /// Adds what was seen in another trial.
+    pub fn merge(&mut self, other: Self) {
+        self.injected += other.injected;
+        self.detected += other.detected;
+        self.ticks_to_detect = self.ticks_to_detect.max(other.ticks_to_detect);
+        self.max_error = match (self.max_error, other.max_error) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        self.final_state = other.final_state.or(self.final_state);
+        self.unaccounted += other.unaccounted;
+        self.failed += other.failed;
+        self.failures.extend(other.failures);
+        self.failures.truncate(KEPT);
+        self.notes.extend(other.notes);
+    }
+
     /// Whether the row holds.
     pub fn verdict(&self) -> Verdict {
         if self.failed > 0 || self.unaccounted > 0 {

@@ -14,6 +14,7 @@ pub mod command;
 pub mod evidence;
 pub mod fault;
 pub mod invariants;
+mod processes;
 pub mod random;
 pub mod report;
 pub(crate) mod rows;

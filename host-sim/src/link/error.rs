@@ -20,6 +20,20 @@ pub enum LinkError {
         /// Why.
         source: std::io::Error,
     },
+    /// The directory for the link's files is not ours alone.
+    #[error("{} belongs to another user, or others may write to it; choose another --link name", path.display())]
+    Foreign {
+        /// Where.
+        path: PathBuf,
+    },
+    /// Shared memory is full.
+    #[error("shared memory (/dev/shm) has {available} bytes left, the link needs {needed}: make room there")]
+    Memory {
+        /// Bytes left.
+        available: u64,
+        /// Bytes needed.
+        needed: u64,
+    },
     /// The node, the process's own entry in shared memory, cannot be created.
     #[error("cannot enter shared memory")]
     Node(#[source] iceoryx2::node::NodeCreationFailure),

@@ -1,5 +1,7 @@
 //! The ports of both sides. Ports belong to the thread that uses them: create them there.
 
+use std::time::{Duration, Instant};
+
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::io::{CommandSink, SampleSource};
 use iceoryx2::node::{Node, NodeBuilder};
@@ -18,6 +20,32 @@ fn node<S: Service>(space: &Space) -> Result<Node<S>, LinkError> {
         .map_err(LinkError::Node)
 }
 
+/// How long a place is tried that the dead still hold, and how often.
+const DEAD_TIMEOUT: Duration = Duration::from_secs(5);
+const BETWEEN_TRIALS: Duration = Duration::from_millis(20);
+
+/// Opens a side. Where a process that was killed still holds its place, or has left it half made, clears that and tries
+/// again, for a bounded time.
+fn patiently<S: Service, P>(space: &Space, open: impl Fn() -> Result<P, LinkError>) -> Result<P, LinkError> {
+    space.check_room()?;
+    let until = Instant::now() + DEAD_TIMEOUT;
+    loop {
+        // One at a time: whoever finds something half made knows that nobody is at it.
+        let lock = space.lock()?;
+        match open() {
+            Err(_) if Instant::now() < until && space.clear_if_dead::<S>()? => {
+                drop(lock);
+                std::thread::sleep(BETWEEN_TRIALS);
+            }
+            Err(error) => return Err(error),
+            Ok(ports) => {
+                space.secure()?;
+                return Ok(ports);
+            }
+        }
+    }
+}
+
 /// The side of tissue, sensors and actuator.
 #[derive(Debug)]
 pub struct PlantPorts<S: Service> {
@@ -31,6 +59,7 @@ pub struct PlantPorts<S: Service> {
     pub clock: Sender<S, ClockFrame>,
     /// Commands in.
     pub command: Receiver<S, PaddleCommand>,
+    space: Space,
     // Ports go before their node.
     _node: Node<S>,
 }
@@ -41,14 +70,17 @@ impl<S: Service> PlantPorts<S> {
     /// # Errors
     /// [`LinkError`].
     pub fn open(space: &Space) -> Result<Self, LinkError> {
-        let node = node::<S>(space)?;
-        Ok(Self {
-            command: Receiver::new(&node)?,
-            needle: Sender::new(&node)?,
-            target: Sender::new(&node)?,
-            paddle: Sender::new(&node)?,
-            clock: Sender::new(&node)?,
-            _node: node,
+        patiently::<S, _>(space, || {
+            let node = node::<S>(space)?;
+            Ok(Self {
+                command: Receiver::new(&node)?,
+                needle: Sender::new(&node)?,
+                target: Sender::new(&node)?,
+                paddle: Sender::new(&node)?,
+                clock: Sender::new(&node)?,
+                space: space.clone(),
+                _node: node,
+            })
         })
     }
 
@@ -69,7 +101,8 @@ impl<S: Service> PlantPorts<S> {
         self.needle.connect()?;
         self.target.connect()?;
         self.paddle.connect()?;
-        self.clock.connect()
+        self.clock.connect()?;
+        self.space.secure()
     }
 }
 
@@ -94,6 +127,7 @@ pub struct ControllerPorts<S: Service> {
     pub command: Sender<S, PaddleCommand>,
     /// First failure of a read: the traits of `firmware` cannot return it, the next send does.
     failed: Option<LinkError>,
+    space: Space,
     _node: Node<S>,
 }
 
@@ -103,15 +137,18 @@ impl<S: Service> ControllerPorts<S> {
     /// # Errors
     /// [`LinkError`]; [`LinkError::Taken`] for a second controller.
     pub fn open(space: &Space) -> Result<Self, LinkError> {
-        let node = node::<S>(space)?;
-        Ok(Self {
-            needle: Receiver::new(&node)?,
-            target: Receiver::new(&node)?,
-            paddle: Receiver::new(&node)?,
-            clock: Receiver::new(&node)?,
-            command: Sender::new(&node)?,
-            failed: None,
-            _node: node,
+        patiently::<S, _>(space, || {
+            let node = node::<S>(space)?;
+            Ok(Self {
+                needle: Receiver::new(&node)?,
+                target: Receiver::new(&node)?,
+                paddle: Receiver::new(&node)?,
+                clock: Receiver::new(&node)?,
+                command: Sender::new(&node)?,
+                failed: None,
+                space: space.clone(),
+                _node: node,
+            })
         })
     }
 
@@ -125,7 +162,8 @@ impl<S: Service> ControllerPorts<S> {
     /// # Errors
     /// [`LinkError::Connect`].
     pub fn connect(&self) -> Result<(), LinkError> {
-        self.command.connect()
+        self.command.connect()?;
+        self.space.secure()
     }
 
     /// What the receivers of needle, target and paddle samples counted.

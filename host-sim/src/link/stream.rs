@@ -21,7 +21,7 @@ use super::{Frame, LinkError, Wire};
 const BUFFERED_FRAMES: usize = 8;
 
 /// How long a service that another process is creating or removing right now is waited for.
-const IN_FLUX_TIMEOUT: Duration = Duration::from_secs(2);
+const IN_FLUX_TIMEOUT: Duration = Duration::from_millis(500);
 
 type Factory<S, F> = PortFactory<S, Wire<F>, ()>;
 

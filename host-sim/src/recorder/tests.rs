@@ -1,3 +1,6 @@
+use firmware::Settings;
+use firmware::contract::{NeedleSample, TargetSample};
+
 use super::*;
 
 fn recording(ticks: u64) -> Recording {
