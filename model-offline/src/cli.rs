@@ -1,9 +1,12 @@
 //! The command line of `model-offline`.
 
+mod new;
+
 use crate::discretization::DiscretizationError;
 use crate::output::{self, OutputError};
 use crate::placement::adaptive::{self, ErrorEstimate};
 use crate::placement::table::{self, TableBuildError, TableOptions};
+use crate::placement::verdict::verdict;
 use crate::placement::{ModelError, Placement, TissueModel, study};
 use crate::scene::schema::{self, Basis, Essential, Integration};
 use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
@@ -28,7 +31,7 @@ enum Command {
     /// Full placement study: every paddle, as a fixture and as an actuator.
     #[command(after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json")]
     Place {
-        /// Scene file, or the name of a bundled scene (paper, paper-hull).
+        /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, prostate, tethered).
         scene: PathBuf,
         /// Leave the inclusions out: homogeneous tissue.
         #[arg(long)]
@@ -145,6 +148,11 @@ enum Command {
         #[arg(long)]
         quiet: bool,
     },
+    /// A commented scene to start from, also from an SVG drawing or a Gmsh mesh.
+    #[command(
+        after_help = "Examples:\n  model-offline new -o my.toml\n  model-offline new --svg outline.svg --size 120 -o my.toml\n  model-offline new --msh body.msh -o my.toml"
+    )]
+    New(new::NewArgs),
     /// JSON Schema of the scene file.
     #[command(after_help = "Example:\n  model-offline schema > scene.schema.json")]
     Schema,
@@ -376,6 +384,7 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             }
             Ok(())
         }
+        Command::New(args) => new::new(&args),
         Command::Schema => {
             println!("{}", pretty(&schema::json_schema()));
             Ok(())
@@ -506,6 +515,9 @@ fn summary(
         "\nbest as a fixture: paddle {}; best as an actuator: paddle {}",
         placement.optimum.fixture, placement.optimum.dynamic
     );
+    for line in verdict(placement, scene) {
+        let _ = writeln!(out, "{line}");
+    }
     out
 }
 

@@ -212,3 +212,17 @@ fn unusable_moduli_are_refused() {
     assert!(FungTensors::from_entries(&[(0, 0, 0, 2, 1.0)], &[], 0.0).is_err());
     assert!(paper_law(0.0).with_barrier(f64::INFINITY).is_err());
 }
+
+/// At strains of 1e-7 a law counted as a difference of numbers near 1 has nothing left but rounding; the quadratic form of
+/// linear elasticity is exact there to 1e-6.
+#[test]
+fn energies_of_tiny_strains_are_those_of_linear_elasticity() {
+    let linear = Material::linear(383.0, 318.5).unwrap();
+    let h = Matrix2::new(2.0e-7, -0.7e-7, 1.1e-7, -0.4e-7);
+    let solid = Matrix3::new(2.0e-7, -0.7e-7, 0.3e-7, 1.1e-7, -0.4e-7, 0.9e-7, 0.2e-7, -0.8e-7, 1.3e-7);
+    for (name, law) in laws().into_iter().filter(|(name, _)| ["neo-hookean", "st venant-kirchhoff"].contains(name)) {
+        let planar = law.respond(&h).energy / linear.respond(&h).energy - 1.0;
+        let full = law.respond(&solid).energy / linear.respond(&solid).energy - 1.0;
+        assert!(planar.abs() < 2e-6 && full.abs() < 2e-6, "{name}: {planar:e} {full:e}");
+    }
+}

@@ -236,8 +236,14 @@ impl Material {
                 let inverse_t = inverse_transpose(&f, j);
                 let trace = f.norm_squared() + (3 - D) as f64;
                 let factor = j.powf(-2.0 / 3.0);
+                // From ∇u, never as a difference of numbers near 1: at strains of 1e-6, as at the start of an
+                // insertion, the energy would be nothing but rounding, and the line search with it.
+                let dilation = dilation(h);
+                let stretch = 2.0 * h.trace() + h.norm_squared();
+                let log = dilation.ln_1p();
+                let distortion = factor * stretch + 3.0 * (-2.0 / 3.0 * log).exp_m1();
                 Response {
-                    energy: 0.5 * mu * (factor * trace - 3.0) + 0.25 * kappa * (j * j - 1.0 - 2.0 * j.ln()),
+                    energy: 0.5 * mu * distortion + 0.25 * kappa * (dilation * dilation + 2.0 * (dilation - log)),
                     pk1_stress: (f - inverse_t * (trace / 3.0)) * (mu * factor)
                         + inverse_t * (0.5 * kappa * (j * j - 1.0)),
                 }
@@ -415,6 +421,17 @@ fn cofactors<const D: usize>(f: &Matrix<D>) -> Matrix<D> {
 #[inline]
 pub fn determinant<const D: usize>(f: &Matrix<D>) -> f64 {
     f.row(0).dot(&cofactors(f).row(0))
+}
+
+/// J − 1 = det(I + ∇u) − 1 from ∇u itself, exact also where J is 1 to within rounding.
+fn dilation<const D: usize>(h: &Matrix<D>) -> f64 {
+    let trace = h.trace();
+    let minors = 0.5 * (trace * trace - (h * h).trace());
+    match D {
+        1 => trace,
+        2 => trace + determinant(h),
+        _ => trace + minors + determinant(h),
+    }
 }
 
 /// F⁻ᵀ; not finite when J is 0.

@@ -6,6 +6,7 @@ pub mod model;
 pub mod rest;
 pub mod study;
 pub mod table;
+pub mod verdict;
 
 pub use model::{Body, ModelError, TissueModel};
 pub use study::{PaddleResult, Placement, StaticStudy, place};

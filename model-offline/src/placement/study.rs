@@ -44,6 +44,8 @@ pub struct PaddleResult {
     pub index: u32,
     /// Actuation Jacobian at zero depth, needle held: rows target x, y, columns paddle x, y.
     pub jacobian: [[f64; 2]; 2],
+    /// Condition number ‖J‖·‖J⁻¹‖ in the Frobenius norm, as the controller judges it.
+    pub condition: f64,
     /// ‖J⁻¹ n‖: paddle displacement per orthogonal target displacement.
     pub controllability_measure: f64,
     /// J⁻¹ n.
@@ -213,6 +215,7 @@ fn study_paddle(
     Ok(PaddleResult {
         index,
         jacobian: rows(&rest.jacobian),
+        condition: firmware::contract::condition_number(&rest.jacobian),
         controllability_measure: rest.controllability_measure,
         best_direction: rest.best_direction.into(),
         target_per_depth: rest.target_per_depth.into(),

@@ -3,7 +3,10 @@
 use super::model::{Body, ModelError, TissueModel};
 use super::study::best_direction;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
-use firmware::contract::{Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity};
+use firmware::contract::{
+    CONDITION_LIMIT, Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity,
+    condition_number,
+};
 use firmware::stability::default_gain;
 use nalgebra::{Matrix2, Vector2};
 
@@ -49,6 +52,18 @@ pub enum TableBuildError {
         /// Paddle displacement there is.
         available: f64,
     },
+    /// The Jacobian is too nearly singular for a controller.
+    #[error(
+        "paddle {paddle} cannot hold the target: at depth {depth:.4} its actuation Jacobian is ill-conditioned, condition number {condition:.3e}, at most {CONDITION_LIMIT:.0e} is accepted; choose another paddle position, or another needle direction"
+    )]
+    IllConditioned {
+        /// Paddle index.
+        paddle: u32,
+        /// Needle depth.
+        depth: f64,
+        /// Condition number ‖J‖·‖J⁻¹‖ in the Frobenius norm.
+        condition: f64,
+    },
     /// A label does not fit into the table.
     #[error("label {0:?} is too long for the table")]
     Label(String),
@@ -76,6 +91,10 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
         let depth = scene.needle.depth * k as f64 / (options.knots - 1) as f64;
         match knot(&mut fixture, &mut steered, depth, paddle_index, scene.needle.orthogonal()) {
             Ok(knot) => {
+                let condition = condition_number(&knot.jacobian);
+                if condition > CONDITION_LIMIT {
+                    return Err(TableBuildError::IllConditioned { paddle: paddle_index, depth, condition });
+                }
                 let needed = knot.paddle_path.norm();
                 let available = scene.actuator.max_displacement;
                 if needed > available {

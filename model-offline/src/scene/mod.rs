@@ -2,7 +2,9 @@
 
 mod error;
 pub mod geometry;
+pub mod import;
 pub mod schema;
+pub mod starter;
 mod validate;
 
 pub use error::SceneError;
@@ -15,8 +17,13 @@ use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// The bundled scenes: name and text.
-pub const BUNDLED: [(&str, &str); 2] =
-    [("paper", include_str!("../../scenes/paper.toml")), ("paper-hull", include_str!("../../scenes/paper-hull.toml"))];
+pub const BUNDLED: [(&str, &str); 5] = [
+    ("paper", include_str!("../../scenes/paper.toml")),
+    ("paper-hull", include_str!("../../scenes/paper-hull.toml")),
+    ("breast", include_str!("../../scenes/breast.toml")),
+    ("prostate", include_str!("../../scenes/prostate.toml")),
+    ("tethered", include_str!("../../scenes/tethered.toml")),
+];
 
 /// A validated scene.
 #[derive(Debug, Clone)]

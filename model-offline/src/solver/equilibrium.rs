@@ -412,7 +412,7 @@ impl<const D: usize> Equilibrium<D> {
             }
             self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, &mut step, &mut mu);
             self.effort.iterations += 1;
-            let slope: f64 = step.iter().zip(&self.at.force).map(|(x, f)| x * f).sum();
+            let slope = dot(&step, &self.at.force);
             match self.search(&step, feasible.then_some(slope)) {
                 Ok(()) => {}
                 Err((reason, detail)) => return Attempt::Failed(reason, detail),
@@ -455,9 +455,14 @@ impl<const D: usize> Equilibrium<D> {
     }
 
     /// Takes the step, shortened until the configuration is admissible and (when the held values are already met and
-    /// `slope` is given) the energy has decreased enough (Armijo).
+    /// `slope` is given) the energy has decreased enough (Armijo). Where the decrease drowns in the rounding of the
+    /// energy, as in the small steps of a simulation, the slope decides instead: the approximate Wolfe condition of
+    /// Hager and Zhang (SIAM J. Optim. 16, 2005, equation 4.1).
     fn search(&mut self, step: &[f64], slope: Option<f64>) -> Result<(), (FailureReason, String)> {
         const SUFFICIENT: f64 = 1e-4;
+        // Share of the energy within which two energies are the same for the approximate condition: Hager and Zhang
+        // take 1e-6; rounding at strains of 1e-6 needs 1e-10.
+        const ROUNDING: f64 = 1e-9;
         let start = self.at.coefficients.clone();
         let energy = self.at.energy;
         // Differences of energies below this are rounding.
@@ -472,6 +477,8 @@ impl<const D: usize> Equilibrium<D> {
             let decreased = match (&outcome, slope) {
                 (Ok(()), Some(slope)) if self.settings.line_search => {
                     self.at.energy <= energy + SUFFICIENT * length * slope + noise
+                        || (self.at.energy <= energy + ROUNDING * energy.abs() + noise
+                            && dot(step, &self.at.force) <= (2.0 * SUFFICIENT - 1.0) * slope)
                 }
                 (Ok(()), _) => true,
                 (Err(_), _) => false,
@@ -504,4 +511,8 @@ impl<const D: usize> Equilibrium<D> {
         let load = norm(&mut self.at.external.iter().copied());
         residual / held.max(load).max(self.smallest_force)
     }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

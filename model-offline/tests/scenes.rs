@@ -1,0 +1,120 @@
+//! The gallery, scenes in other units, and starter scenes, as a user runs them.
+
+use assert_cmd::Command;
+use model_offline::placement::{TissueModel, place};
+use model_offline::scene::{BUNDLED, Scene};
+use model_offline::solver::equilibrium::NewtonSettings;
+use std::path::Path;
+
+fn model_offline() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_model-offline"))
+}
+
+#[test]
+fn every_bundled_scene_is_valid_and_carries_its_own_name() {
+    for (name, text) in BUNDLED {
+        assert_eq!(Scene::parse(text, name).unwrap().name, name);
+    }
+}
+
+/// The same body measured in other units: 1000 times the length and 7 times the stress change no ranking and no
+/// dimensionless number, and scale displacements exactly. A constant that assumes a unit somewhere would show.
+#[test]
+fn results_do_not_depend_on_the_units() {
+    let length = 1000.0;
+    let text = BUNDLED[0].1;
+    let scaled: String = text
+        .lines()
+        .map(|line| {
+            let (code, comment) = line.split_once('#').unwrap_or((line, ""));
+            let key = code.split('=').next().unwrap_or("").trim();
+            let factor = match key {
+                "outline" | "paths" | "contact" | "depth" | "position" | "segment" | "spacing" => length,
+                "lambda" | "mu" | "c" => 7.0,
+                _ => return format!("{code}\n"),
+            };
+            let _ = comment;
+            let (key, values) = code.split_once('=').unwrap();
+            format!("{key}={}\n", times(values, factor))
+        })
+        .collect();
+    let solve = |text: &str| {
+        let model = TissueModel::new(&Scene::parse(text, "scaled").unwrap()).unwrap();
+        place(&model, NewtonSettings::default(), 1, &|| {}).unwrap()
+    };
+    let (one, other) = (solve(text), solve(&scaled));
+    assert_eq!(one.optimum, other.optimum);
+    for (a, b) in one.paddles.iter().zip(&other.paddles) {
+        assert!((a.controllability_measure / b.controllability_measure - 1.0).abs() < 1e-9);
+        assert!((a.fixture.max_orthogonal * length / b.fixture.max_orthogonal - 1.0).abs() < 1e-6);
+    }
+}
+
+/// Every number in `text` times `factor`.
+fn times(text: &str, factor: f64) -> String {
+    let mut out = String::new();
+    let mut number = String::new();
+    for c in text.chars().chain([' ']) {
+        if c.is_ascii_digit() || c == '.' || c == '-' {
+            number.push(c);
+        } else {
+            if !number.is_empty() {
+                out += &format!("{:?}", number.parse::<f64>().unwrap() * factor);
+                number.clear();
+            }
+            out.push(c);
+        }
+    }
+    out
+}
+
+#[test]
+fn a_scene_where_no_paddle_helps_is_called_so_and_gives_no_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("t.table");
+    let said = model_offline().args(["place", "tethered"]).assert().success();
+    let said = String::from_utf8(said.get_output().stdout.clone()).unwrap();
+    assert!(
+        said.contains("ill-conditioned (condition number") && said.contains("no paddle of this scene can"),
+        "{said}"
+    );
+    let refused = model_offline().args(["table", "tethered", "-o"]).arg(&table).assert().code(1);
+    let refused = String::from_utf8(refused.get_output().stderr.clone()).unwrap();
+    assert!(refused.contains("condition number"), "{refused}");
+    assert!(!table.exists());
+}
+
+#[test]
+fn new_scenes_can_be_placed_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawing = folder.path().join("outline.svg");
+    std::fs::write(
+        &drawing,
+        r#"<svg xmlns="http://www.w3.org/2000/svg"><path d="M 0 90 C 10 0 190 0 200 90 Z"/></svg>"#,
+    )
+    .unwrap();
+    let mesh = folder.path().join("block.msh");
+    std::fs::write(
+        &mesh,
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 80 0 0\n3 80 50 0\n4 0 50 0\n$EndNodes\n\
+         $Elements\n2\n1 2 2 1 1 1 2 3\n2 2 2 1 1 1 3 4\n$EndElements\n",
+    )
+    .unwrap();
+    let from = |arguments: &[&str], input: Option<&Path>| {
+        let scene = folder.path().join("new.toml");
+        let mut command = model_offline();
+        command.arg("new").args(arguments);
+        if let Some(input) = input {
+            command.arg(input);
+        }
+        command.args(["--force", "-o"]).arg(&scene).assert().success();
+        model_offline().arg("place").arg(&scene).assert().success();
+        model_offline().args(["new", "-o"]).arg(&scene).assert().code(2);
+    };
+    from(&[], None);
+    from(&["--size", "120", "--svg"], Some(&drawing));
+    from(&["--msh"], Some(&mesh));
+    model_offline().args(["new", "--size", "3"]).assert().code(2);
+    model_offline().args(["new", "--msh"]).arg(&drawing).assert().code(2);
+    model_offline().args(["new", "--svg", "absent.svg"]).assert().code(2);
+}
