@@ -11,7 +11,7 @@ use crate::placement::{ModelError, Placement, TissueModel, study};
 use crate::scene::schema::{self, Basis, Essential, Integration};
 use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
-use crate::study::{fit, pareto};
+use crate::study::{fit, pareto, stability};
 use clap::{Args, Parser, Subcommand};
 use nalgebra::Vector2;
 use std::io::IsTerminal as _;
@@ -93,6 +93,23 @@ enum Command {
         /// Leave the inclusions out: homogeneous tissue.
         #[arg(long)]
         without_inclusion: bool,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// Where each method stops working, and why: depth reached against every parameter.
+    #[command(after_help = "Example:\n  model-offline stability paper --out stability --quick")]
+    Stability {
+        /// Scene file, or the name of a bundled scene.
+        scene: PathBuf,
+        /// Folder for stability.csv, stability.svg and zero_energy.csv; made when it is not there.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Fewer values and one spacing for the sweeps.
+        #[arg(long)]
+        quick: bool,
+        /// Index of the paddle attached as a fixture (default: the best dynamic paddle).
+        #[arg(long, value_name = "K")]
+        paddle: Option<u32>,
         #[command(flatten)]
         common: Common,
     },
@@ -343,6 +360,9 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             }
             Ok(())
         }
+        Command::Stability { scene, out, quick, paddle, common } => {
+            stability_study(&common.scene(&scene, false)?, &out, quick, paddle, &common)
+        }
         Command::Inspect { table, json } => {
             let bad = |reason: String| CliError::BadTable { path: table.clone(), reason };
             let bytes = std::fs::read(&table).map_err(|e| bad(e.to_string()))?;
@@ -521,6 +541,43 @@ fn summary(
     out
 }
 
+fn stability_study(
+    scene: &Scene,
+    out: &Path,
+    quick: bool,
+    paddle: Option<u32>,
+    common: &Common,
+) -> Result<(), CliError> {
+    let Resolution::Spacing(_) = scene.discretization.resolution else {
+        return Err(CliError::Usage(
+            "the study varies a spacing, and this scene has a tolerance".into(),
+            "give the spacing to vary around, e.g. --spacing 0.1".into(),
+        ));
+    };
+    let paddle = match paddle {
+        Some(index) if scene.paddles.iter().any(|p| p.index == index) => index,
+        Some(index) => return Err(no_such_paddle(scene, index)),
+        None => study::best_dynamic(&TissueModel::new(&scene.without_inclusions())?)?,
+    };
+    output::make_folder(out)?;
+    let plan = stability::Plan::new(scene, quick);
+    let bar = common.progress(plan.runs() as u64);
+    let result = plan.run(scene, paddle, common.threads(), &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    output::write_whole(&out.join("stability.csv"), stability::csv(&result).as_bytes())?;
+    output::write_whole(&out.join("zero_energy.csv"), stability::zero_energy_csv(&result).as_bytes())?;
+    output::write_whole(&out.join("stability.svg"), stability::figure(&result).svg().as_bytes())?;
+    if !common.quiet {
+        print!("{}", stability::summary(&result));
+    }
+    Ok(())
+}
+
+fn no_such_paddle(scene: &Scene, index: u32) -> CliError {
+    let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
+    CliError::Usage(format!("the scene has no paddle {index}"), format!("choose one of {}", known.join(", ")))
+}
+
 struct SolveFiles<'a> {
     json: Option<&'a Path>,
     vtu: Option<&'a Path>,
@@ -536,10 +593,7 @@ fn solve(
     quiet: bool,
 ) -> Result<(), CliError> {
     let model = TissueModel::new(scene)?;
-    let position = model.paddle_position(paddle).ok_or_else(|| {
-        let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
-        CliError::Usage(format!("the scene has no paddle {paddle}"), format!("choose one of {}", known.join(", ")))
-    })?;
+    let position = model.paddle_position(paddle).ok_or_else(|| no_such_paddle(scene, paddle))?;
     let mut body = model.body(Some(position), NewtonSettings::default()).map_err(ModelError::from)?;
     // In pieces of the scene's increment: the path matters near the limits of stability.
     let pieces = (depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0);

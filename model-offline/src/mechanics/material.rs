@@ -5,6 +5,8 @@
 //! S = ∂W/∂E and the material tangent C = ∂S/∂E; then P = F S and A_iJkL = δ_ik S_JL + F_iM C_MJNL F_kN.
 //! In two dimensions the state is plane strain.
 
+mod variants;
+
 use nalgebra::SMatrix;
 use serde::Serialize;
 

@@ -4,3 +4,4 @@ pub mod fit;
 pub mod insertion;
 pub mod pareto;
 mod pareto_chart;
+pub mod stability;

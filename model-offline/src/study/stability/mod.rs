@@ -1,0 +1,155 @@
+//! Where each method stops working, and how: the needle is driven up to twice the scene's depth while one parameter at
+//! a time is varied, for every meshfree rule and finite element.
+//!
+//! What limits a run may be the method or the law. [`law_limit`] gives the stretch past which the law itself no longer
+//! resists compression; every run reports the smallest principal stretch of its last converged state beside it, and whether
+//! strong ellipticity was lost anywhere: past that no continuum would stay whole, whatever the method.
+
+pub mod law_limit;
+pub mod plan;
+pub mod probe;
+pub mod zero_energy;
+
+mod files;
+mod verdict;
+
+use crate::placement::ModelError;
+use crate::placement::study::parallel;
+use crate::scene::{Resolution, Scene};
+use law_limit::{Lateral, limit_stretch};
+use plan::{Entry, Setting};
+use probe::Outcome;
+use zero_energy::ZeroEnergy;
+
+pub use files::{csv, figure, zero_energy_csv};
+pub use verdict::{Pairs, Verdict, summary, verdict};
+
+/// Whether the law with some factor c has a limit in compression, and where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LawLimit {
+    /// Factor c of the exponential term; absent for the scene's own law.
+    pub c: Option<f64>,
+    /// Stretch at the peak of nominal stress, lateral faces held.
+    pub confined: Option<f64>,
+    /// The same with free lateral faces.
+    pub free: Option<f64>,
+}
+
+/// A finished study.
+#[derive(Debug, Clone)]
+pub struct Stability {
+    /// The scene.
+    pub scene: Scene,
+    /// Spacing that the sweeps are made at, length units.
+    pub spacing: f64,
+    /// Index of the paddle that was attached, as a fixture.
+    pub paddle: u32,
+    /// What was varied, and what came of it, in the order of the files.
+    pub rows: Vec<(Entry, Outcome)>,
+    /// Limits of the scene's law, and of the law with every c that was tried.
+    pub limits: Vec<LawLimit>,
+    /// Zero-energy modes by method.
+    pub zero_energy: Vec<ZeroEnergy>,
+}
+
+impl Stability {
+    /// Every setting once, however many sweeps it is part of.
+    pub fn distinct(&self) -> Vec<(Setting, &Outcome)> {
+        let mut distinct: Vec<(Setting, &Outcome)> = Vec::new();
+        for (entry, outcome) in &self.rows {
+            if !distinct.iter().any(|d| d.0 == entry.setting) {
+                distinct.push((entry.setting, outcome));
+            }
+        }
+        distinct
+    }
+}
+
+/// A study with its runs known, to say how many there are before they start.
+#[derive(Debug)]
+pub struct Plan {
+    entries: Vec<Entry>,
+    /// Settings that differ, finest first, so that long runs do not come last.
+    settings: Vec<Setting>,
+}
+
+impl Plan {
+    /// What the study of a scene will run. Empty when the scene's resolution is not a spacing.
+    pub fn new(scene: &Scene, quick: bool) -> Self {
+        let entries = plan::entries(scene, quick);
+        let mut settings: Vec<Setting> = Vec::new();
+        for entry in &entries {
+            if !settings.contains(&entry.setting) {
+                settings.push(entry.setting);
+            }
+        }
+        settings.sort_by(|a, b| a.spacing.total_cmp(&b.spacing));
+        Self { entries, settings }
+    }
+
+    /// Number of runs.
+    pub fn runs(&self) -> usize {
+        self.settings.len()
+    }
+
+    /// Runs everything with the paddle of this index attached; the result does not depend on `threads`.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the scene's own model cannot be made, or has no paddle of this index. A run that fails is a
+    /// row of the result.
+    pub fn run(
+        &self,
+        scene: &Scene,
+        paddle: u32,
+        threads: usize,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Stability, ModelError> {
+        let Resolution::Spacing(spacing) = scene.discretization.resolution else {
+            return Err(ModelError::Unsupported("the study varies a spacing: give one instead of a tolerance".into()));
+        };
+        let place = scene
+            .paddles
+            .iter()
+            .position(|p| p.index == paddle)
+            .ok_or_else(|| ModelError::Unsupported(format!("the scene has no paddle {paddle}")))?;
+        let outcomes = parallel(self.settings.len(), threads, |i| {
+            let outcome = probe::run(scene, place, &self.settings[i]);
+            progress();
+            outcome
+        });
+        let rows = self
+            .entries
+            .iter()
+            .filter_map(|entry| {
+                let place = self.settings.iter().position(|s| *s == entry.setting)?;
+                Some((*entry, outcomes[place].clone()))
+            })
+            .collect();
+        Ok(Stability {
+            spacing,
+            paddle,
+            rows,
+            limits: limits(scene, &self.entries),
+            zero_energy: zero_energy::measure(scene, spacing)?,
+            scene: scene.clone(),
+        })
+    }
+}
+
+/// Limits of the scene's own law, then of those with every c of the plan.
+fn limits(scene: &Scene, entries: &[Entry]) -> Vec<LawLimit> {
+    let mut values: Vec<f64> = entries.iter().filter_map(|e| e.setting.c).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    std::iter::once(None)
+        .chain(values.into_iter().map(Some))
+        .filter_map(|c| {
+            let law = match c {
+                None => scene.material.clone(),
+                Some(c) => scene.material.with_exponential_factor(c)?.ok()?,
+            };
+            let at = |lateral| limit_stretch(&law, lateral);
+            Some(LawLimit { c, confined: at(Lateral::Confined), free: at(Lateral::Free) })
+        })
+        .collect()
+}

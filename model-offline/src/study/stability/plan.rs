@@ -1,0 +1,263 @@
+//! What is varied: one parameter at a time around the scene's own setting.
+
+use crate::scene::schema::Integration;
+use crate::scene::{Resolution, Scene};
+
+/// Every method there is.
+pub const METHODS: [Integration; 6] = [
+    Integration::Dni,
+    Integration::Scni,
+    Integration::Nsni,
+    Integration::Gauss,
+    Integration::FemT3,
+    Integration::FemT6,
+];
+
+/// Name of a method on the command line and in files.
+pub fn name(integration: Integration) -> &'static str {
+    match integration {
+        Integration::Dni => "dni",
+        Integration::Scni => "scni",
+        Integration::Nsni => "nsni",
+        Integration::Gauss => "gauss",
+        Integration::FemT3 => "fem-t3",
+        Integration::FemT6 => "fem-t6",
+    }
+}
+
+/// Whether a method is meshfree.
+pub fn is_meshfree(integration: Integration) -> bool {
+    !matches!(integration, Integration::FemT3 | Integration::FemT6)
+}
+
+/// Everything that decides a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setting {
+    /// Integration rule or element.
+    pub integration: Integration,
+    /// Node spacing, length units.
+    pub spacing: f64,
+    /// Kernel support over spacing (meshfree only).
+    pub support: f64,
+    /// Largest displacement of interior nodes over the spacing, either axis.
+    pub jitter: f64,
+    /// Which random displacement.
+    pub seed: u64,
+    /// Stiffness of the inclusions over the body's; without inclusions when absent.
+    pub contrast: Option<f64>,
+    /// Poisson ratio; the scene's own λ when absent.
+    pub poisson: Option<f64>,
+    /// Factor c of the exponential term; the scene's own when absent.
+    pub c: Option<f64>,
+    /// Barrier β over the shear modulus at rest; the scene's own when absent.
+    pub barrier: Option<f64>,
+    /// Increments over the scene's depth.
+    pub increments: u32,
+    /// Whether steps that raise the energy are shortened.
+    pub line_search: bool,
+    /// Whether an increment that fails is cut.
+    pub cutback: bool,
+}
+
+/// What is varied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Parameter {
+    /// Node spacing, length units.
+    Spacing,
+    /// Kernel support over spacing.
+    Support,
+    /// Displacement of interior nodes, per cent of the spacing.
+    Jitter,
+    /// Stiffness of the inclusions.
+    Contrast,
+    /// Poisson ratio.
+    Poisson,
+    /// Factor c of the exponential term, stress units.
+    C,
+    /// Increments over the scene's depth, with line search and cutback.
+    Increments,
+    /// Increments over the scene's depth, plain Newton.
+    IncrementsPlain,
+    /// Means of the solver.
+    Solver,
+    /// Volumetric barrier over the shear modulus.
+    Barrier,
+}
+
+impl Parameter {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spacing => "spacing",
+            Self::Support => "support",
+            Self::Jitter => "jitter_percent",
+            Self::Contrast => "contrast",
+            Self::Poisson => "poisson",
+            Self::C => "c",
+            Self::Increments => "increments",
+            Self::IncrementsPlain => "increments_plain",
+            Self::Solver => "solver",
+            Self::Barrier => "barrier_over_mu",
+        }
+    }
+}
+
+/// Names of the solver's means, by the value of [`Parameter::Solver`].
+pub const SOLVERS: [&str; 5] = ["plain", "line-search", "cutback", "both", "both+barrier"];
+
+/// One row of the study.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// What is varied.
+    pub parameter: Parameter,
+    /// Its value.
+    pub value: f64,
+    /// All of the setting.
+    pub setting: Setting,
+}
+
+impl Entry {
+    /// The value as files show it.
+    pub fn value_text(&self) -> String {
+        match self.parameter {
+            Parameter::Solver => SOLVERS[self.value as usize].to_owned(),
+            _ => format!("{}", self.value),
+        }
+    }
+}
+
+/// The scene's own setting with a method at a spacing.
+pub fn base(scene: &Scene, integration: Integration, spacing: f64) -> Setting {
+    Setting {
+        integration,
+        spacing,
+        support: scene.discretization.support,
+        jitter: 0.0,
+        seed: 0,
+        contrast: None,
+        poisson: None,
+        c: None,
+        barrier: None,
+        increments: scene.needle.increments,
+        line_search: true,
+        cutback: true,
+    }
+}
+
+/// Values of each parameter.
+struct Values {
+    support: Vec<f64>,
+    jitter: &'static [f64],
+    seeds: u64,
+    contrast: &'static [f64],
+    poisson: &'static [f64],
+    c: &'static [f64],
+    increments: &'static [u32],
+    barrier: &'static [f64],
+}
+
+impl Values {
+    fn full() -> Self {
+        Self {
+            // 1.2 to 4, exact to the last digit.
+            support: (6..=20).map(|k| f64::from(k) / 5.0).collect(),
+            jitter: &[0.0, 10.0, 20.0, 30.0, 40.0],
+            seeds: 5,
+            contrast: &[1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6],
+            poisson: &[0.0, 0.2, 0.3, 0.4, 0.45, 0.49, 0.499, 0.4999],
+            c: &[0.0, 0.779, 10.0, 100.0, 1000.0],
+            increments: &[1, 2, 5, 10, 20, 50],
+            barrier: &[0.0, 0.03, 0.1, 0.3, 1.0, 3.0],
+        }
+    }
+
+    fn few() -> Self {
+        Self {
+            support: vec![1.2, 1.6, 2.0, 3.0, 4.0],
+            jitter: &[0.0, 20.0, 40.0],
+            seeds: 2,
+            contrast: &[1.0, 100.0, 1e6],
+            poisson: &[0.2, 0.4, 0.49, 0.4999],
+            c: &[0.0, 0.779, 10.0, 100.0, 1000.0],
+            increments: &[1, 5, 10, 50],
+            barrier: &[0.0, 0.1, 1.0],
+        }
+    }
+}
+
+/// Every row of the study of a scene, in the order of the files. `quick` takes fewer values; the full study repeats
+/// every sweep but that of the spacing at half the scene's spacing.
+pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
+    let Resolution::Spacing(spacing) = scene.discretization.resolution else { return Vec::new() };
+    let factors: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25] };
+    let mut entries = Vec::new();
+    for integration in METHODS {
+        for factor in factors {
+            let setting = base(scene, integration, spacing * factor);
+            entries.push(Entry { parameter: Parameter::Spacing, value: setting.spacing, setting });
+        }
+        if quick {
+            sweeps(scene, base(scene, integration, spacing), &Values::few(), &mut entries);
+        } else {
+            sweeps(scene, base(scene, integration, spacing), &Values::full(), &mut entries);
+            sweeps(scene, base(scene, integration, 0.5 * spacing), &Values::few(), &mut entries);
+        }
+    }
+    let key = |e: &Entry| (e.parameter, METHODS.iter().position(|m| *m == e.setting.integration));
+    entries.sort_by(|a, b| {
+        key(a)
+            .cmp(&key(b))
+            .then(b.setting.spacing.total_cmp(&a.setting.spacing))
+            .then(a.value.total_cmp(&b.value))
+            .then(a.setting.seed.cmp(&b.setting.seed))
+    });
+    entries
+}
+
+fn sweeps(scene: &Scene, base: Setting, values: &Values, out: &mut Vec<Entry>) {
+    let mut push = |parameter, value, setting| out.push(Entry { parameter, value, setting });
+    if is_meshfree(base.integration) {
+        for &support in &values.support {
+            push(Parameter::Support, support, Setting { support, ..base });
+        }
+    }
+    for &percent in values.jitter {
+        // Without jitter every seed gives the same nodes.
+        for seed in 0..if percent == 0.0 { 1 } else { values.seeds } {
+            push(Parameter::Jitter, percent, Setting { jitter: 0.01 * percent, seed, ..base });
+        }
+    }
+    if !scene.inclusions.is_empty() {
+        for &contrast in values.contrast {
+            push(Parameter::Contrast, contrast, Setting { contrast: Some(contrast), ..base });
+        }
+    }
+    if scene.material.with_poisson_ratio(0.3).is_some() {
+        for &poisson in values.poisson {
+            push(Parameter::Poisson, poisson, Setting { poisson: Some(poisson), ..base });
+        }
+    }
+    if scene.material.with_exponential_factor(0.0).is_some() {
+        for &c in values.c {
+            push(Parameter::C, c, Setting { c: Some(c), ..base });
+        }
+    }
+    let plain = Setting { line_search: false, cutback: false, ..base };
+    for &increments in values.increments {
+        push(Parameter::Increments, f64::from(increments), Setting { increments, ..base });
+        push(Parameter::IncrementsPlain, f64::from(increments), Setting { increments, ..plain });
+    }
+    let means = [
+        plain,
+        Setting { cutback: false, ..base },
+        Setting { line_search: false, ..base },
+        base,
+        Setting { barrier: Some(1.0), ..base },
+    ];
+    for (place, setting) in means.into_iter().enumerate() {
+        push(Parameter::Solver, place as f64, setting);
+    }
+    for &barrier in values.barrier {
+        push(Parameter::Barrier, barrier, Setting { barrier: Some(barrier), ..base });
+    }
+}

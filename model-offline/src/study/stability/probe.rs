@@ -1,0 +1,221 @@
+//! One run: the needle goes in until something gives.
+
+use super::plan::Setting;
+use crate::discretization::lattice::lattice_nodes;
+use crate::discretization::{DiscretizationError, Method, Planar};
+use crate::mechanics::{Material, MaterialError};
+use crate::placement::{ModelError, TissueModel};
+use crate::scene::Scene;
+use crate::scene::geometry::{Location, Point2, distance_to_polyline};
+use crate::solver::equilibrium::{FailureReason, NewtonSettings};
+use nalgebra::{Matrix2, Vector2};
+
+/// How far beyond the scene's depth the needle is driven.
+pub const BEYOND: u32 = 2;
+
+/// Cutbacks where they are allowed: finds the depth to a sixteenth of an increment.
+const MAX_CUTBACKS: u32 = 4;
+
+/// Why a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Reason {
+    /// It did not: the needle went as far as it was driven.
+    #[error("reached")]
+    Reached,
+    /// No equilibrium, or none that is stable.
+    #[error("{0}")]
+    Solve(FailureReason),
+    /// Shape functions do not exist at a node.
+    #[error("singular-moment-matrix")]
+    SingularMomentMatrix,
+    /// The nodes cannot be triangulated.
+    #[error("no-triangulation")]
+    NoTriangulation,
+    /// A held feature has no node.
+    #[error("nothing-held")]
+    NothingHeld,
+    /// The law with these numbers is not stable at rest.
+    #[error("unstable-law")]
+    UnstableLaw,
+    /// The methods do not combine.
+    #[error("unsupported")]
+    Unsupported,
+}
+
+/// What came of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// Nodes of the model; those asked for when there is none.
+    pub nodes: usize,
+    /// Depth of the last converged state, length units.
+    pub depth: f64,
+    /// Why it ended there.
+    pub reason: Reason,
+    /// Numbers behind the reason.
+    pub detail: String,
+    /// Smallest principal stretch at the integration points of the last converged state.
+    pub min_stretch: f64,
+    /// Smallest eigenvalue of the acoustic tensor Q_ik = N_J A_iJkL N_L over all directions N and all integration points of
+    /// the last converged state, over that at rest. Not above zero: strong ellipticity is lost.
+    pub ellipticity: f64,
+    /// Strain energy of the last converged state, per unit thickness.
+    pub energy: f64,
+}
+
+/// Runs a setting with the paddle at this place of the scene's list as a fixture.
+pub fn run(scene: &Scene, paddle: usize, setting: &Setting) -> Outcome {
+    let stopped = |nodes: usize, error: ModelError| Outcome {
+        nodes,
+        depth: 0.0,
+        reason: reason_of(&error),
+        detail: error.to_string(),
+        min_stretch: 1.0,
+        ellipticity: 1.0,
+        energy: 0.0,
+    };
+    let scene = match varied(scene, setting) {
+        Ok(scene) => scene,
+        Err(error) => {
+            let none = stopped(0, ModelError::Unsupported(error.to_string()));
+            return Outcome { reason: Reason::UnstableLaw, ..none };
+        }
+    };
+    let nodes = jittered(&scene, setting);
+    let count = nodes.len();
+    let model = match discretise(&scene, nodes, setting) {
+        Ok(model) => model,
+        Err(error) => return stopped(count, error),
+    };
+    let settings = NewtonSettings {
+        line_search: setting.line_search,
+        max_cutbacks: if setting.cutback { MAX_CUTBACKS } else { 0 },
+        ..NewtonSettings::default()
+    };
+    let mut body = match model.body(Some(paddle), settings) {
+        Ok(body) => body,
+        Err(failure) => return stopped(model.nodes(), failure.into()),
+    };
+    let (mut reason, mut detail) = (Reason::Reached, String::new());
+    for increment in 1..=BEYOND * setting.increments {
+        let depth = scene.needle.depth * f64::from(increment) / f64::from(setting.increments);
+        if let Err(failure) = body.drive(depth, Vector2::zeros()) {
+            (reason, detail) = (Reason::Solve(failure.reason), failure.detail);
+            break;
+        }
+    }
+    let gradients = body.equilibrium().state().displacement_gradients();
+    Outcome {
+        nodes: model.nodes(),
+        depth: body.depth(),
+        reason,
+        detail,
+        min_stretch: gradients.iter().map(smallest_stretch).fold(f64::INFINITY, f64::min),
+        // An inclusion of the same law scales both ends of the ratio.
+        ellipticity: gradients.iter().map(|h| smallest_acoustic(&scene.material, h)).fold(f64::INFINITY, f64::min)
+            / smallest_acoustic(&scene.material, &Matrix2::zeros()),
+        energy: body.equilibrium().energy(),
+    }
+}
+
+/// Smallest principal stretch √(λmin(FᵀF)).
+fn smallest_stretch(h: &Matrix2<f64>) -> f64 {
+    (Matrix2::identity() + h).singular_values().min()
+}
+
+/// Smallest eigenvalue of the acoustic tensor over directions five degrees apart.
+fn smallest_acoustic(law: &Material, h: &Matrix2<f64>) -> f64 {
+    let a = law.tangent(h);
+    (0..36)
+        .map(|i| {
+            let (sin, cos) = (f64::from(i) * std::f64::consts::PI / 36.0).sin_cos();
+            let n = [cos, sin];
+            let q: Matrix2<f64> = Matrix2::from_fn(|i, k| {
+                (0..2).flat_map(|j| (0..2).map(move |l| (j, l))).map(|(j, l)| n[j] * a[i][j][k][l] * n[l]).sum()
+            });
+            let (mean, half) = (0.5 * q.trace(), 0.5 * (q[(0, 0)] - q[(1, 1)]));
+            mean - half.hypot(q[(0, 1)])
+        })
+        .fold(f64::INFINITY, f64::min)
+}
+
+fn reason_of(error: &ModelError) -> Reason {
+    match error {
+        ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_)) => {
+            Reason::SingularMomentMatrix
+        }
+        ModelError::Discretization(DiscretizationError::Triangulation(_)) => Reason::NoTriangulation,
+        ModelError::Solve(failure) => Reason::Solve(failure.reason),
+        ModelError::NothingHeld(_) => Reason::NothingHeld,
+        _ => Reason::Unsupported,
+    }
+}
+
+/// The scene with the setting's material and inclusions.
+pub(super) fn varied(scene: &Scene, setting: &Setting) -> Result<Scene, MaterialError> {
+    let mut law = scene.material.clone();
+    if let Some(poisson) = setting.poisson {
+        law = law.with_poisson_ratio(poisson).unwrap_or(Ok(law))?;
+    }
+    if let Some(c) = setting.c {
+        law = law.with_exponential_factor(c).unwrap_or(Ok(law))?;
+    }
+    if let Some(share) = setting.barrier {
+        let shear = law.tangent(&Matrix2::zeros())[0][1][0][1];
+        law = law.with_barrier(share * shear)?;
+    }
+    let mut scene = scene.clone();
+    match setting.contrast {
+        None => scene.inclusions.clear(),
+        Some(contrast) => scene.inclusions.iter_mut().for_each(|i| i.stiffness = contrast),
+    }
+    scene.material = law;
+    Ok(scene)
+}
+
+/// Lattice nodes, those inside the body moved at random; nodes on the boundary and on what is held stay.
+fn jittered(scene: &Scene, setting: &Setting) -> Vec<Point2> {
+    let mut nodes = lattice_nodes(scene, setting.spacing);
+    if setting.jitter == 0.0 {
+        return nodes;
+    }
+    let tolerance = 1e-9 * scene.outline.size();
+    let mut state = setting.seed;
+    for x in &mut nodes {
+        let shift = Point2::new(uniform(&mut state), uniform(&mut state)) * (setting.jitter * setting.spacing);
+        let inside = scene.outline.locate(*x, tolerance) == Location::Inside;
+        if inside && distance_to_polyline(*x, &scene.needle.contact) > tolerance {
+            *x += shift;
+        }
+    }
+    nodes
+}
+
+/// The next number in [−1, 1) of SplitMix64 (Steele, Lea & Flood 2014): the same on every machine and in every version.
+fn uniform(state: &mut u64) -> f64 {
+    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let mut z = *state;
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Setting) -> Result<TissueModel, ModelError> {
+    let method = Method {
+        integration: setting.integration,
+        basis: scene.discretization.basis,
+        support: setting.support,
+        consistent: true,
+    };
+    let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(setting.spacing), method)?;
+    TissueModel::on(scene, planar, setting.spacing)
+}
+
+/// The homogeneous model of a setting, for measures other than the insertion, and the lattice it was jittered from.
+///
+/// # Errors
+/// [`ModelError`] when there is none.
+pub(super) fn model(scene: &Scene, setting: &Setting) -> Result<TissueModel, ModelError> {
+    let scene = scene.without_inclusions();
+    let nodes = jittered(&scene, setting);
+    discretise(&scene, nodes, setting)
+}

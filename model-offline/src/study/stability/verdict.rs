@@ -1,0 +1,216 @@
+//! The claim that meshfree methods are more stable than finite elements under large deformation, counted.
+
+use super::plan::{self, METHODS, Parameter, Setting, is_meshfree};
+use super::{Outcome, Stability};
+use std::fmt::Write as _;
+
+/// Depths within this share of the larger one count as the same.
+const SAME: f64 = 0.05;
+/// Models within this share of nodes count as equally large.
+const EQUAL_NODES: f64 = 0.1;
+
+/// Pairs of one meshfree and one finite-element run that differ in nothing else.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Pairs {
+    /// Meshfree reached deeper, by more than 5 %.
+    pub meshfree_deeper: usize,
+    /// Within 5 % of each other.
+    pub same: usize,
+    /// Finite elements reached deeper, by more than 5 %.
+    pub elements_deeper: usize,
+    /// Median of meshfree over finite-element depth; not a number without pairs.
+    pub median_ratio: f64,
+}
+
+impl Pairs {
+    fn count(depths: &[(f64, f64)]) -> Self {
+        let mut pairs = Self { median_ratio: f64::NAN, ..Self::default() };
+        let mut ratios: Vec<f64> = Vec::new();
+        for &(meshfree, elements) in depths {
+            let margin = SAME * meshfree.max(elements);
+            if (meshfree - elements).abs() <= margin {
+                pairs.same += 1;
+            } else if meshfree > elements {
+                pairs.meshfree_deeper += 1;
+            } else {
+                pairs.elements_deeper += 1;
+            }
+            if elements > 0.0 {
+                ratios.push(meshfree / elements);
+            }
+        }
+        ratios.sort_by(f64::total_cmp);
+        if !ratios.is_empty() {
+            pairs.median_ratio = ratios[ratios.len() / 2];
+        }
+        pairs
+    }
+
+    /// Number of pairs.
+    pub fn total(&self) -> usize {
+        self.meshfree_deeper + self.same + self.elements_deeper
+    }
+}
+
+/// The claim's answer by element.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verdict {
+    /// Against linear triangles, which have the same nodes: equal spacing and equal degrees of freedom.
+    pub linear: Pairs,
+    /// Against quadratic triangles of the same spacing, which have about four times the nodes.
+    pub quadratic_equal_spacing: Pairs,
+    /// Against quadratic triangles with as many nodes.
+    pub quadratic_equal_nodes: Pairs,
+    /// Runs whose law has a limit in compression, and those of them whose last state is compressed beyond it somewhere.
+    pub beyond_limit: (usize, usize),
+    /// Runs that had a model, and those of them whose last state has lost strong ellipticity somewhere.
+    pub not_elliptic: (usize, usize),
+}
+
+/// A setting with what came of it.
+type Run<'a, 's> = &'a (Setting, &'s Outcome);
+
+/// Counts every pair of runs that differ in the method only (and, for equal degrees of freedom, in the spacing).
+/// Meshfree runs of every support are compared; a run counts once, however many sweeps it is part of.
+pub fn verdict(study: &Stability) -> Verdict {
+    let distinct = study.distinct();
+    let alike = |m: &Setting, e: &Setting| {
+        let stripped = |s: &Setting| Setting { integration: plan::METHODS[0], spacing: 0.0, support: 0.0, ..*s };
+        stripped(m) == stripped(e)
+    };
+    let pairs = |element, matches: &dyn Fn(Run<'_, '_>, Run<'_, '_>) -> bool| {
+        let mut depths = Vec::new();
+        for m in distinct.iter().filter(|d| is_meshfree(d.0.integration)) {
+            for e in distinct.iter().filter(|d| d.0.integration == element && alike(&m.0, &d.0)) {
+                if matches(m, e) {
+                    depths.push((m.1.depth, e.1.depth));
+                }
+            }
+        }
+        Pairs::count(&depths)
+    };
+    let equal_spacing = |m: Run<'_, '_>, e: Run<'_, '_>| m.0.spacing == e.0.spacing;
+    let equal_nodes = |m: Run<'_, '_>, e: Run<'_, '_>| {
+        let (m, e) = (m.1.nodes as f64, e.1.nodes as f64);
+        (m - e).abs() <= EQUAL_NODES * m.max(e)
+    };
+    let [linear, quadratic] = [METHODS[4], METHODS[5]];
+    let started: Vec<Run<'_, '_>> = distinct.iter().filter(|d| d.1.depth > 0.0).collect();
+    let limited: Vec<(f64, &Outcome)> =
+        started.iter().filter_map(|(setting, outcome)| Some((limit_of(study, setting)?, *outcome))).collect();
+    Verdict {
+        linear: pairs(linear, &equal_spacing),
+        quadratic_equal_spacing: pairs(quadratic, &equal_spacing),
+        quadratic_equal_nodes: pairs(quadratic, &equal_nodes),
+        beyond_limit: (limited.len(), limited.iter().filter(|(limit, o)| o.min_stretch < *limit).count()),
+        not_elliptic: (started.len(), started.iter().filter(|d| d.1.ellipticity <= 0.0).count()),
+    }
+}
+
+/// The law's limit under a setting; none where a barrier or another Poisson ratio makes it another law.
+pub(super) fn limit_of(study: &Stability, setting: &Setting) -> Option<f64> {
+    if setting.barrier.is_some_and(|b| b > 0.0) || setting.poisson.is_some() {
+        return None;
+    }
+    study.limits.iter().find(|l| l.c == setting.c)?.confined
+}
+
+/// One screen: depths by method and parameter, and the claim's answer.
+pub fn summary(study: &Stability) -> String {
+    let scene = &study.scene;
+    let mut out = format!(
+        "{} · paddle {} as a fixture · needle driven to {} at most, twice the scene's depth · {} runs in {} rows\n\n",
+        scene.name,
+        study.paddle,
+        f64::from(super::probe::BEYOND) * scene.needle.depth,
+        study.distinct().len(),
+        study.rows.len()
+    );
+    let _ = write!(out, "{:<26}", "depth reached");
+    for method in METHODS {
+        let _ = write!(out, "{:>9}", plan::name(method));
+    }
+    out.push('\n');
+    let mut line = |label: &str, pick: &dyn Fn(&super::Entry) -> bool| {
+        let _ = write!(out, "{label:<26}");
+        for method in METHODS {
+            let depths: Vec<f64> = study
+                .rows
+                .iter()
+                .filter(|(e, _)| e.setting.integration == method && pick(e))
+                .map(|(_, o)| o.depth)
+                .collect();
+            let low = depths.iter().copied().fold(f64::INFINITY, f64::min);
+            let _ = if depths.is_empty() { write!(out, "{:>9}", "–") } else { write!(out, "{low:>9.3}") };
+        }
+        out.push('\n');
+    };
+    let mut seen: Vec<(Parameter, String)> = Vec::new();
+    for (entry, _) in &study.rows {
+        let key = (entry.parameter, entry.value_text());
+        let shown = match entry.parameter {
+            Parameter::Spacing => true,
+            Parameter::Jitter => entry.value == 40.0,
+            Parameter::Contrast => entry.value == 1e6,
+            Parameter::Poisson => entry.value >= 0.49,
+            Parameter::C => entry.value != 0.779,
+            Parameter::Support => [1.2, 3.0, 4.0].contains(&entry.value),
+            Parameter::Solver => entry.value == 0.0,
+            Parameter::Barrier => entry.value == 1.0,
+            Parameter::Increments | Parameter::IncrementsPlain => false,
+        };
+        if shown && !seen.contains(&key) {
+            let label = match entry.parameter {
+                Parameter::Jitter => "jitter 40 %, worst seed".to_owned(),
+                p => format!("{} {}", p.name().replace('_', " "), key.1),
+            };
+            let sweep = entry.parameter != Parameter::Spacing;
+            line(&label, &|e| {
+                e.parameter == key.0 && e.value_text() == key.1 && (!sweep || e.setting.spacing == study.spacing)
+            });
+            seen.push(key);
+        }
+    }
+    let v = verdict(study);
+    out.push_str(
+        "\n\"Meshfree is more stable than finite elements under large deformation\" (5 % counts as the same):\n",
+    );
+    for (what, p) in [
+        ("linear triangles, same nodes", v.linear),
+        ("quadratic, same spacing", v.quadratic_equal_spacing),
+        ("quadratic, as many nodes", v.quadratic_equal_nodes),
+    ] {
+        let _ = writeln!(
+            out,
+            "  against {what:<30} deeper in {:>3} of {:>3} pairs, the same in {:>3}, less deep in {:>3}; median ratio {:.2}",
+            p.meshfree_deeper,
+            p.total(),
+            p.same,
+            p.elements_deeper,
+            p.median_ratio
+        );
+    }
+    if let Some(limit) = study.limits.first().and_then(|l| l.confined) {
+        let _ = writeln!(
+            out,
+            "the law's own limit: nominal stress peaks at stretch {limit:.4}; {} of {} last states are beyond it somewhere, \
+             {} of {} have lost strong ellipticity somewhere",
+            v.beyond_limit.1, v.beyond_limit.0, v.not_elliptic.1, v.not_elliptic.0
+        );
+    }
+    out.push_str(
+        "zero modes (3 is right) | share felt of the checkerboard's energy, in the interior | of any mode at least\n",
+    );
+    for z in study.zero_energy.iter().filter(|z| z.jitter == 0.0) {
+        let _ = writeln!(
+            out,
+            "  {:<7} {} | {:.1e}, {:.1e} | {:.1e}",
+            plan::name(z.integration),
+            z.zero_modes,
+            z.checkerboard_felt,
+            z.interior_felt,
+            z.least_felt
+        );
+    }
+    out
+}

@@ -1,0 +1,167 @@
+//! Deformations that a rule does not feel: eigenvalues of the unconstrained tangent at rest, and the energy of
+//! displacements that alternate from node to node.
+
+use super::plan::{self, METHODS, Setting, is_meshfree};
+use super::probe;
+use crate::discretization::finite_element::Elements;
+use crate::discretization::triangulation::triangulate;
+use crate::discretization::{DiscretizationError, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration};
+use crate::mechanics::material::Tensor4;
+use crate::placement::ModelError;
+use crate::scene::schema::Integration;
+use crate::scene::{Point2, Scene};
+use nalgebra::{DMatrix, DVector, Matrix2};
+
+/// Eigenvalues below this share of the largest count as zero.
+const ZERO: f64 = 1e-10;
+
+/// What one method feels of deformations that alternate from node to node, on the scene's homogeneous body, nothing held.
+///
+/// On a regular lattice the checkerboard is symmetric about every node of the interior: its gradient vanishes at the node
+/// (DNI) and its mean vanishes over the nodal cell (SCNI), so that neither feels it there, and only the boundary keeps it
+/// from being free. NSNI feels the variation of the gradient.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZeroEnergy {
+    /// Method.
+    pub integration: Integration,
+    /// Node jitter over spacing.
+    pub jitter: f64,
+    /// Nodes.
+    pub nodes: usize,
+    /// Zero eigenvalues of the unconstrained tangent; the three rigid motions are right.
+    pub zero_modes: usize,
+    /// Energy of the checkerboard displacement over that of one sine wave over the body with the same ‖d‖.
+    pub checkerboard_over_smooth: f64,
+    /// Energy of the checkerboard displacement over the energy that the same field has when integrated accurately.
+    pub checkerboard_felt: f64,
+    /// The same, in the cells that are far enough from the boundary not to feel it; not a number when there are none.
+    pub interior_felt: f64,
+    /// The least share of its energy, integrated accurately, that the rule gives to any deformation.
+    pub least_felt: f64,
+}
+
+/// Measures every method at a spacing, on a regular lattice and with nodes jittered by 40 %.
+///
+/// # Errors
+/// [`ModelError`] when a model cannot be made.
+pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelError> {
+    [0.0, 0.4]
+        .into_iter()
+        .flat_map(|jitter| METHODS.map(|m| Setting { jitter, ..plan::base(scene, m, spacing) }))
+        .map(|setting| measure_one(scene, &setting))
+        .collect()
+}
+
+fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelError> {
+    let (integration, spacing) = (setting.integration, setting.spacing);
+    let model = probe::model(scene, setting)?;
+    // The lattice before it was jittered: what the checkerboard alternates on.
+    let lattice = probe::model(scene, &Setting { jitter: 0.0, ..*setting })?.positions().to_vec();
+    let law = scene.material.tangent(&Matrix2::zeros());
+    let everywhere = |_: u32| true;
+    let stiffness = dense_tangent(model.rule(), &law, model.nodes(), &everywhere);
+    // Elements are integrated exactly by their own rule.
+    let accurate = match is_meshfree(integration) {
+        true => Some(accurate_rule(scene, model.positions(), setting)?),
+        false => None,
+    };
+    let exact = match &accurate {
+        Some((rule, _)) => dense_tangent(rule, &law, model.nodes(), &everywhere),
+        None => stiffness.clone(),
+    };
+    // Quadratic triangles have nodes at half the spacing.
+    let pitch = if integration == Integration::FemT6 { 0.5 * spacing } else { spacing };
+    let (low, high) = scene.outline.bounds();
+    let extent = (high - low).max();
+    let even = |x: &Point2| {
+        let steps = (x - low) / pitch;
+        (steps.x.round() + steps.y.round()).rem_euclid(2.0) == 0.0
+    };
+    let checkerboard: Vec<f64> = lattice.iter().map(|x| if even(x) { 1.0 } else { -1.0 }).collect();
+    let smooth: Vec<f64> = lattice
+        .iter()
+        .map(|x| {
+            let phase = (x - low) * (std::f64::consts::TAU / extent);
+            phase.x.sin() * phase.y.sin()
+        })
+        .collect();
+    let interior_felt = accurate.as_ref().map_or(1.0, |(rule, cells)| {
+        // Cells in which no kernel feels the boundary.
+        let clear = setting.support * spacing - 1e-9 * extent;
+        let inside = |cells: &[NodalCell]| -> Vec<bool> {
+            cells.iter().map(|c| c.corners().iter().all(|x| scene.outline.distance_to_boundary(*x) >= clear)).collect()
+        };
+        let per_area = |rule: &Quadrature<2>, cells: &[NodalCell]| {
+            let inside = inside(cells);
+            let area: f64 = cells.iter().zip(&inside).filter(|c| *c.1).map(|c| c.0.area).sum();
+            energy(&dense_tangent(rule, &law, model.nodes(), &|c| inside[c as usize]), &checkerboard) / area
+        };
+        per_area(model.rule(), model.cells()) / per_area(rule, cells)
+    });
+    let eigenvalues = stiffness.clone().symmetric_eigenvalues();
+    let zero = ZERO * eigenvalues.max();
+    Ok(ZeroEnergy {
+        integration,
+        jitter: setting.jitter,
+        nodes: model.nodes(),
+        zero_modes: eigenvalues.iter().filter(|v| v.abs() <= zero).count(),
+        checkerboard_over_smooth: energy(&stiffness, &checkerboard) / energy(&stiffness, &smooth),
+        checkerboard_felt: energy(&stiffness, &checkerboard) / energy(&exact, &checkerboard),
+        interior_felt,
+        least_felt: if is_meshfree(integration) { least_share(&stiffness, &exact) } else { 1.0 },
+    })
+}
+
+/// ½ dᵀKd / ‖d‖², for the field along x plus the field along y.
+fn energy(k: &DMatrix<f64>, field: &[f64]) -> f64 {
+    (0..2)
+        .map(|axis| {
+            let d = DVector::from_fn(k.nrows(), |u, _| if u % 2 == axis { field[u / 2] } else { 0.0 });
+            0.5 * d.dot(&(k * &d)) / d.norm_squared()
+        })
+        .sum()
+}
+
+/// Six Gauss points in every triangle of the nodes, for the same kernels, and the triangles.
+fn accurate_rule(
+    scene: &Scene,
+    nodes: &[Point2],
+    setting: &Setting,
+) -> Result<(Quadrature<2>, Vec<NodalCell>), ModelError> {
+    let cloud = NodeCloud::new(nodes.to_vec(), vec![setting.spacing * setting.support; nodes.len()]);
+    let shape = ShapeFunctions::new(&cloud, scene.discretization.basis);
+    let triangles = triangulate(nodes, &scene.outline, &[]).map_err(DiscretizationError::from)?;
+    let cells = Elements::linear(nodes.to_vec(), triangles.clone()).cells();
+    Ok((integration::gauss(&shape, &triangles, &cells, true, false)?, cells))
+}
+
+/// K_IJ = Σ_q w_q g_I · A · g_J over the points of the cells that are wanted, 2 × 2 blocks.
+fn dense_tangent(rule: &Quadrature<2>, a: &Tensor4<2>, nodes: usize, wanted: &dyn Fn(u32) -> bool) -> DMatrix<f64> {
+    let mut k = DMatrix::zeros(2 * nodes, 2 * nodes);
+    for point in rule.points().filter(|p| wanted(p.cell)) {
+        for (&i, gi) in point.nodes.iter().zip(point.gradients) {
+            for (&j, gj) in point.nodes.iter().zip(point.gradients) {
+                for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                    let block: f64 = (0..2)
+                        .flat_map(|m| (0..2).map(move |n| (m, n)))
+                        .map(|(m, n)| gi[m] * a[r][m][c][n] * gj[n])
+                        .sum();
+                    k[(2 * i as usize + r, 2 * j as usize + c)] += point.weight * block;
+                }
+            }
+        }
+    }
+    k
+}
+
+/// The smallest xᵀKx / xᵀK₀x over all x that are no rigid motion.
+fn least_share(k: &DMatrix<f64>, exact: &DMatrix<f64>) -> f64 {
+    let modes = exact.clone().symmetric_eigen();
+    let zero = ZERO * modes.eigenvalues.max();
+    let kept: Vec<usize> = (0..modes.eigenvalues.len()).filter(|i| modes.eigenvalues[*i] > zero).collect();
+    let mut basis = modes.eigenvectors.select_columns(&kept);
+    for (mut column, i) in basis.column_iter_mut().zip(&kept) {
+        column /= modes.eigenvalues[*i].sqrt();
+    }
+    (basis.transpose() * k * basis).symmetric_eigenvalues().min()
+}

@@ -1,0 +1,155 @@
+//! The stability study: depths of an independent implementation, typed reasons, and the files as a user gets them.
+
+use assert_cmd::Command;
+use model_offline::scene::Scene;
+use model_offline::scene::schema::Integration;
+use model_offline::solver::equilibrium::FailureReason;
+use model_offline::study::stability::plan::{Setting, base};
+use model_offline::study::stability::probe::{Outcome, Reason, run};
+use model_offline::study::stability::zero_energy;
+use std::path::Path;
+
+fn paper() -> Scene {
+    Scene::bundled("paper").unwrap()
+}
+
+/// Plain Newton, ten increments over the scene's depth of 0.1.
+fn plain(integration: Integration, spacing: f64, paddle: u32) -> Outcome {
+    let scene = paper();
+    let place = scene.paddles.iter().position(|p| p.index == paddle).unwrap();
+    let setting = Setting { line_search: false, cutback: false, ..base(&scene, integration, spacing) };
+    run(&scene, place, &setting)
+}
+
+/// Needle depths that an independent implementation reached on this scene (homogeneous, increments of 0.01, plain
+/// Newton, c = 0.779), as a fixture with paddle 2 and paddle 4; they must be met within one increment.
+#[test]
+fn depths_agree_with_an_independent_implementation() {
+    use Integration::{Dni, FemT3, Scni};
+    for (integration, spacing, nodes, depths) in [
+        (Dni, 0.1, 106, [0.13, 0.13]),
+        (Scni, 0.1, 106, [0.13, 0.14]),
+        (FemT3, 0.1, 106, [0.13, 0.13]),
+        (Dni, 0.05, 386, [0.09, 0.09]),
+        (Scni, 0.05, 386, [0.09, 0.09]),
+        (FemT3, 0.05, 386, [0.09, 0.09]),
+        (FemT3, 0.025, 1471, [0.06, 0.06]),
+    ] {
+        for (paddle, depth) in [2, 4].into_iter().zip(depths) {
+            let outcome = plain(integration, spacing, paddle);
+            assert_eq!(outcome.nodes, nodes);
+            assert!((outcome.depth - depth).abs() < 0.0101, "{integration:?} {spacing} paddle {paddle}: {outcome:?}");
+            assert!(matches!(outcome.reason, Reason::Solve(_)), "{outcome:?}");
+        }
+    }
+}
+
+/// How deep quadratic triangles get depends on which diagonal cuts each lattice square: with other diagonals (nodes moved
+/// by one per cent of the spacing) the depth changes by up to two increments. The reference, whose diagonals are not
+/// known, must be within one increment of the depths that eight choices reach.
+#[test]
+fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
+    let scene = paper();
+    for (spacing, nodes, depths) in [(0.1, 386, [0.11, 0.12]), (0.05, 1471, [0.07, 0.08])] {
+        for (place, depth) in [1, 3].into_iter().zip(depths) {
+            let reached = (0..8).map(|seed| {
+                let regular = base(&scene, Integration::FemT6, spacing);
+                let setting = Setting { line_search: false, cutback: false, jitter: 0.01, seed, ..regular };
+                let outcome = run(&scene, place, &setting);
+                assert_eq!(outcome.nodes, nodes);
+                outcome.depth
+            });
+            let (low, high) = reached.fold((f64::MAX, 0.0_f64), |(low, high), d| (low.min(d), high.max(d)));
+            assert!(low - 0.0101 <= depth && depth <= high + 0.0101, "{spacing}: {depth} outside {low}..{high}");
+        }
+    }
+}
+
+#[test]
+fn every_way_to_fail_has_its_type_and_names_its_place() {
+    let scene = paper();
+    let regular = base(&scene, Integration::Scni, 0.1);
+    let small = run(&scene, 2, &Setting { support: 0.8, ..regular });
+    assert_eq!((small.reason, small.depth), (Reason::SingularMomentMatrix, 0.0));
+    assert!(small.detail.contains("node"), "{}", small.detail);
+    let incompressible = run(&scene, 2, &Setting { poisson: Some(0.5), ..regular });
+    assert_eq!(incompressible.reason, Reason::UnstableLaw);
+    let leap =
+        Setting { increments: 1, line_search: false, cutback: false, integration: Integration::FemT6, ..regular };
+    let leap = run(&scene, 2, &leap);
+    assert_eq!((leap.reason, leap.depth), (Reason::Solve(FailureReason::ElementInverted), 0.0));
+    assert!(leap.detail.contains("integration point"), "{}", leap.detail);
+    let guarded = run(&scene, 2, &Setting { barrier: Some(1.0), ..regular });
+    assert_eq!((guarded.reason, guarded.depth), (Reason::Reached, 0.2));
+}
+
+#[test]
+fn a_last_state_shows_how_far_the_law_was_taken() {
+    let scene = paper();
+    let outcome = run(&scene, 2, &base(&scene, Integration::Scni, 0.1));
+    // Driven to where it fails: well past the stretch of 0.5768 at which the law's nominal stress peaks.
+    assert!(outcome.min_stretch < 0.5768 && outcome.ellipticity < 0.0, "{outcome:?}");
+    assert!(outcome.energy > 0.0);
+}
+
+/// On a regular lattice the checkerboard is symmetric about every interior node, so that neither the gradient at the node
+/// (DNI) nor its mean over the nodal cell (SCNI) sees it; the rules that sample the gradient's variation do.
+#[test]
+fn the_checkerboard_is_felt_by_rules_that_see_the_gradient_vary() {
+    let measured = zero_energy::measure(&paper(), 0.1).unwrap();
+    assert!(measured.iter().all(|z| z.zero_modes == 3), "{measured:?}");
+    let of =
+        |integration, jitter| *measured.iter().find(|z| (z.integration, z.jitter) == (integration, jitter)).unwrap();
+    for blind in [Integration::Dni, Integration::Scni] {
+        let z = of(blind, 0.0);
+        assert!(z.interior_felt.abs() < 1e-12 && z.least_felt < 0.2, "{z:?}");
+    }
+    for seeing in [Integration::Nsni, Integration::Gauss] {
+        let z = of(seeing, 0.0);
+        assert!(z.interior_felt > 0.9 && z.least_felt > 0.8, "{z:?}");
+        assert!(of(seeing, 0.4).least_felt > 5.0 * of(Integration::Dni, 0.4).least_felt);
+    }
+}
+
+fn study(out: &Path, threads: &str) -> assert_cmd::assert::Assert {
+    Command::new(env!("CARGO_BIN_EXE_model-offline"))
+        .args(["stability", "paper", "--quick", "--spacing", "0.2", "--paddle", "4", "--threads", threads, "--out"])
+        .arg(out)
+        .assert()
+}
+
+#[test]
+fn the_files_are_the_same_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, two) = (folder.path().join("new/one"), folder.path().join("two"));
+    let output = study(&one, "1").success().get_output().stdout.clone();
+    study(&two, "2").success();
+    for file in ["stability.csv", "stability.svg", "zero_energy.csv"] {
+        assert_eq!(std::fs::read(one.join(file)).unwrap(), std::fs::read(two.join(file)).unwrap(), "{file}");
+    }
+    let csv = std::fs::read_to_string(one.join("stability.csv")).unwrap();
+    let header = "method,integration,parameter,value,spacing,nodes,depth_reached,reason,";
+    assert!(csv.starts_with(header), "{}", csv.lines().next().unwrap());
+    for parameter in ["spacing", "support", "jitter_percent", "contrast", "poisson", "c", "increments", "solver"] {
+        assert!(csv.contains(&format!("rkpm,scni,{parameter},")), "{parameter}");
+        assert_eq!(csv.contains(&format!("fem,fem-t6,{parameter},")), parameter != "support", "{parameter}");
+    }
+    let summary = String::from_utf8(output).unwrap();
+    assert!(summary.contains("Meshfree is more stable") && summary.contains("median ratio"), "{summary}");
+    assert!(summary.lines().count() <= 45, "one screen: {}", summary.lines().count());
+}
+
+#[test]
+fn bad_requests_are_refused_before_anything_is_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    for arguments in [["--paddle", "9"], ["--tolerance", "0.01"]] {
+        Command::new(env!("CARGO_BIN_EXE_model-offline"))
+            .args(["stability", "paper", "--quick", "--out"])
+            .arg(&out)
+            .args(arguments)
+            .assert()
+            .code(2);
+        assert!(!out.exists());
+    }
+}
