@@ -223,7 +223,11 @@ impl ReducedBody {
         let before = self.amplitudes.clone();
         self.amplitudes[..model.controls]
             .copy_from_slice(&super::lifting::control_values(depth, paddle)[..model.controls]);
-        let outcome = if self.converge() { self.check() } else { Err(Invalid::NoEquilibrium { depth }) };
+        let outcome = if self.converge() || self.converge_from_rest() {
+            self.check()
+        } else {
+            Err(Invalid::NoEquilibrium { depth })
+        };
         if outcome.is_err() {
             self.amplitudes = before;
             self.factor = None;
@@ -264,6 +268,13 @@ impl ReducedBody {
             last = length;
         }
         false
+    }
+
+    /// After a long way the last amplitudes are a bad start, and the response at rest is a better one.
+    fn converge_from_rest(&mut self) -> bool {
+        self.amplitudes[self.model.controls..].fill(0.0);
+        self.factor = None;
+        self.converge()
     }
 
     fn check(&mut self) -> Result<(), Invalid> {

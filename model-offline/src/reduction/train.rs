@@ -14,6 +14,20 @@ use std::sync::Arc;
 
 /// Depths of the snapshots over the trained depth. Denser towards the end, where the response bends most.
 const DEPTHS: [f64; 5] = [0.0, 0.3, 0.6, 0.8, 1.0];
+/// Less than this part of the depth asked for is not worth training.
+const SHALLOWEST: f64 = 0.02;
+/// Part of the depth that the tissue reached with the paddle everywhere that is trained: the very end is singular.
+const KEPT_DEPTH: f64 = 0.9;
+/// Where the tissue loses stability on the way, finding that depth to an eighth of a step is enough.
+const SNAPSHOT_SETTINGS: NewtonSettings = NewtonSettings {
+    residual_tolerance: 1e-9,
+    step_tolerance: 1e-8,
+    max_iterations: 12,
+    max_cutbacks: 3,
+    line_search: true,
+    require_stability: true,
+    reuse_tangent: false,
+};
 /// States that the model is tried on.
 const TRIALS: usize = 24;
 /// Numbers of modes that are tried, until the trial is passed.
@@ -123,6 +137,11 @@ pub fn train(
         },
     };
     let (snapshots, domain) = take_snapshots(model, paddle, asked, options.threads)?;
+    let (snapshots, domain) = match domain.depth < asked.depth {
+        // The tissue does not reach the depth with the paddle everywhere: train again, as far as it does.
+        true => take_snapshots(model, paddle, domain, options.threads)?,
+        false => (snapshots, domain),
+    };
     let trials = take_trials(model, paddle, domain, options.threads);
     let space = Space::new(model, &lifts, &snapshots);
     let scale = snapshots.iter().map(|s| s.target.norm()).fold(f64::MIN_POSITIVE, f64::max);
@@ -177,8 +196,8 @@ fn take_snapshots(
             (0..9).map(|k| Vector2::new(f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0) * asked.paddle).collect()
         }
     };
-    let runs = parallel(places.len(), threads, |k| -> Result<Vec<Snapshot>, ModelError> {
-        let mut body = model.body(paddle, NewtonSettings::default())?;
+    let runs = parallel(places.len(), threads, |k| -> Result<(Vec<Snapshot>, f64), ModelError> {
+        let mut body = model.body(paddle, SNAPSHOT_SETTINGS)?;
         let mut taken = Vec::new();
         for depth in DEPTHS.map(|share| share * asked.depth) {
             if body.drive(depth, places[k]).is_err() {
@@ -186,15 +205,19 @@ fn take_snapshots(
             }
             taken.push(snapshot(&body));
         }
-        Ok(taken)
+        Ok((taken, body.depth()))
     });
     let runs = runs.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let reached = runs.iter().map(Vec::len).min().unwrap_or(0);
-    if reached < 2 {
-        return Err(TrainingError::TooShallow { reached: 0.0, asked: asked.depth });
+    let reached = runs.iter().map(|run| run.1).fold(asked.depth, f64::min);
+    if reached < SHALLOWEST * asked.depth {
+        return Err(TrainingError::TooShallow { reached, asked: asked.depth });
     }
-    let domain = Domain { depth: DEPTHS[reached - 1] * asked.depth, ..asked };
-    let kept = runs.into_iter().flat_map(|run| run.into_iter().take(reached));
+    let complete = runs.iter().map(|run| run.0.len()).min().unwrap_or(0);
+    let depth = if complete == DEPTHS.len() { asked.depth } else { KEPT_DEPTH * reached };
+    let domain = Domain { depth, ..asked };
+    let runs = runs.into_iter().map(|run| run.0);
+    let reached = complete;
+    let kept = runs.flat_map(|run| run.into_iter().take(reached));
     // The state at rest teaches nothing.
     Ok((kept.filter(|s| s.controls.iter().any(|c| *c != 0.0)).collect(), domain))
 }

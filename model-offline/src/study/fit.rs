@@ -150,14 +150,19 @@ fn worst(outcome: &Outcome, reference: &Reference) -> f64 {
     outcome.errors.0.max(outcome.errors.1) + reference.open
 }
 
-/// The fastest candidate within the tolerance that the next finer one confirms.
-fn discretization(
+/// The fastest candidate within the tolerance that the next finer one confirms, with what it measured and how far the
+/// finer one is away; fills `rejected`.
+///
+/// # Errors
+/// [`ModelError::ToleranceNotReached`] when no candidate keeps it.
+pub fn discretization(
     scene: &Scene,
     tolerance: f64,
     reference: &Reference,
     rejected: &mut Vec<Rejected>,
 ) -> Result<(Candidate, Outcome, f64), ModelError> {
     let mut measured: Vec<(Candidate, Outcome)> = Vec::new();
+    let mut unusable = Vec::new();
     let mut best_wall = f64::INFINITY;
     let mut best_error = f64::INFINITY;
     // Elements first: they are cheapest, so that dearer families are given up early.
@@ -169,8 +174,8 @@ fn discretization(
                 Ok(outcome) => outcome,
                 Err(error) => {
                     let reason = format!("does not work: {error}");
-                    rejected.push(rejection("discretization", describe(&candidate), f64::NAN, reason));
-                    continue;
+                    unusable.push(rejection("discretization", describe(&candidate), f64::NAN, reason));
+                    break;
                 }
             };
             let (wall_s, error) = (outcome.wall_s, worst(&outcome, reference));
@@ -220,6 +225,7 @@ fn discretization(
             }
         }
     }
+    rejected.extend(unusable);
     chosen.ok_or(ModelError::ToleranceNotReached { tolerance, reached: best_error })
 }
 
