@@ -1,6 +1,7 @@
 //! In which direction the paddle moves to remove an orthogonal error.
 
 use nalgebra::{SMatrix, SVector};
+use serde::{Deserialize, Serialize};
 
 use crate::contract::condition_number;
 use crate::scalar::Scalar;
@@ -10,7 +11,7 @@ use crate::scalar::Scalar;
 pub const DAMPING_CONDITION: f64 = 1e2;
 
 /// Paddle direction per unit of orthogonal target displacement.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Direction {
     /// J⁻¹n: moves the target along n only, its axial position is left alone (the paper, section III.B).
     #[default]
@@ -41,10 +42,14 @@ impl Direction {
 /// Damped least squares (JᵀJ + μ²I)⁻¹Jᵀn with μ² = (‖J‖/κ_d)²·(1 − (κ_d/κ)²) past the condition number κ_d, and
 /// μ = 0 up to it; continuous in κ (after Nakamura & Hanafusa, 1986).
 fn damped_inverse<T: Scalar, const D: usize>(jacobian: &SMatrix<T, D, D>, orthogonal: &SVector<T, D>) -> SVector<T, D> {
-    let condition = condition_number(jacobian);
-    if condition <= DAMPING_CONDITION {
-        return jacobian.try_inverse().map_or_else(SVector::zeros, |inverse| inverse * orthogonal);
+    // The condition number in squares, from the inverse that is needed anyway.
+    if let Some(inverse) = jacobian.try_inverse() {
+        let squared = jacobian.norm_squared().to_f64() * inverse.norm_squared().to_f64();
+        if squared <= DAMPING_CONDITION * DAMPING_CONDITION {
+            return inverse * orthogonal;
+        }
     }
+    let condition = condition_number(jacobian);
     let ratio = DAMPING_CONDITION / condition;
     let scale = jacobian.norm() / T::of(DAMPING_CONDITION);
     let damping = scale * scale * T::of(1.0 - ratio * ratio);

@@ -4,6 +4,8 @@
 //! sequence numbers say and `missed` are the gaps (overwritten by newer samples, or lost). For the loop:
 //! due ticks = RUN + HOLD + SAFE + skipped.
 
+use serde::{Deserialize, Serialize};
+
 use crate::supervisor::Mode;
 
 /// Why a received sample was not used.
@@ -31,7 +33,7 @@ pub enum Discard {
 pub const DISCARD_REASONS: usize = 8;
 
 /// Account of one input stream.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StreamLedger {
     /// Samples that the publisher must have sent, from the sequence numbers.
     pub published: u64,
@@ -48,6 +50,11 @@ pub struct StreamLedger {
 }
 
 impl StreamLedger {
+    /// An account without entries.
+    pub const fn new() -> Self {
+        Self { published: 0, consumed: 0, missed: 0, discarded: [0; DISCARD_REASONS], duplicates: 0, strays: 0 }
+    }
+
     /// Counts one refusal.
     pub(crate) fn discard(&mut self, reason: Discard) {
         if let Some(count) = self.discarded.get_mut(reason as usize) {
@@ -68,7 +75,7 @@ impl StreamLedger {
 }
 
 /// Account of the loop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TickLedger {
     /// Ticks that came due.
     pub due: u64,
@@ -105,7 +112,7 @@ impl TickLedger {
 }
 
 /// All accounts of a controller.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ledger {
     /// Needle samples.
     pub needle: StreamLedger,

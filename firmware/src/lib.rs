@@ -83,6 +83,7 @@ mod runtime;
 pub mod scalar;
 pub mod schedule;
 pub mod sequence;
+pub mod serial;
 pub mod settings;
 pub mod stability;
 pub mod supervisor;

@@ -4,11 +4,12 @@
 //! addition. The admissible set is convex, so that a step towards an admissible position stays admissible.
 
 use nalgebra::SVector;
+use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Scalar, bounded};
 
 /// Shape of the admissible positions.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PositionLimit {
     /// Norm of the displacement: a disc; saturation keeps the direction.
     #[default]
@@ -78,8 +79,9 @@ impl<T: Scalar> Limits<T> {
         previous: &SVector<T, D>,
     ) -> SVector<T, D> {
         let wish = feed_forward + integral;
-        let pending = self.clamp_position(&wish) - previous;
-        if pending.norm() > self.max_step && pending.dot(correction) > T::zero() {
+        let reachable = self.clamp_position(&wish);
+        let pending = reachable - previous;
+        if pending.norm_squared() > self.max_step * self.max_step && pending.dot(correction) > T::zero() {
             return *integral;
         }
         let corrected = wish + correction;
@@ -87,10 +89,9 @@ impl<T: Scalar> Limits<T> {
         if admissible == corrected {
             return integral + correction;
         }
-        let excess = (wish - self.clamp_position(&wish)).norm();
-        if excess == T::zero() {
+        if reachable == wish {
             admissible - feed_forward
-        } else if (corrected - admissible).norm() < excess {
+        } else if (corrected - admissible).norm_squared() < (wish - reachable).norm_squared() {
             integral + correction
         } else {
             *integral
@@ -100,8 +101,8 @@ impl<T: Scalar> Limits<T> {
 
 /// `vector`, or its direction with norm `limit` if it is longer.
 fn shorten<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> SVector<T, D> {
-    let norm = vector.norm();
-    if norm <= limit { *vector } else { vector * (limit / norm) }
+    // Compared in squares: a square root costs more than all the rest on most microcontrollers.
+    if vector.norm_squared() <= limit * limit { *vector } else { vector * (limit / vector.norm()) }
 }
 
 #[cfg(test)]

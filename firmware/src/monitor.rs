@@ -82,26 +82,36 @@ pub const GATE_FLOOR: f64 = 0.01;
 pub const GATE_FLOOR_STATED: f64 = 0.002;
 /// Accepted samples that are remembered; the motion since the oldest one may show in the newest measurement.
 const GATE_HISTORY: usize = 8;
+// Indices of the ring wrap with those of the machine.
+const _: () = assert!(GATE_HISTORY.is_power_of_two());
 
 /// Refuses target samples that jump further than motion and noise can explain (wrong association).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct InnovationGate {
     /// Motion so far.
     pub(crate) travel: Travel,
-    /// Motion at the arrival of the last accepted samples, newest first.
+    /// Motion at the arrival of the last accepted samples: a ring, from `newest` on ever older.
     at_arrival: [Travel; GATE_HISTORY],
+    newest: usize,
 }
 
 impl InnovationGate {
     /// A target sample has been accepted now.
     pub(crate) fn accept(&mut self) {
-        self.at_arrival.rotate_right(1);
-        self.at_arrival[0] = self.travel;
+        self.newest = self.newest.wrapping_sub(1) % GATE_HISTORY;
+        if let Some(oldest) = self.at_arrival.get_mut(self.newest) {
+            *oldest = self.travel;
+        }
+    }
+
+    /// Motion at the arrival of the accepted sample so many before the newest.
+    fn at_arrival(&self, samples_ago: usize) -> Travel {
+        self.at_arrival.get(self.newest.wrapping_add(samples_ago) % GATE_HISTORY).copied().unwrap_or_default()
     }
 
     /// Needle travel since the last accepted sample, length.
     pub(crate) fn needle_travel(&self) -> f64 {
-        self.travel.needle - self.at_arrival[0].needle
+        self.travel.needle - self.at_arrival(0).needle
     }
 
     /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + ‖J‖·paddle travel) + floor, where the travel reaches back
@@ -113,7 +123,7 @@ impl InnovationGate {
         current: &[f64; 2],
     ) -> Result<(), Discard> {
         let reach = (runtime.delay_samples as usize + 1).min(GATE_HISTORY - 1);
-        let oldest = self.at_arrival.get(reach).copied().unwrap_or_default();
+        let oldest = self.at_arrival(reach);
         let motion = runtime.target_slope * (self.travel.needle - oldest.needle)
             + runtime.jacobian_norm * (self.travel.paddle - oldest.paddle);
         let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;

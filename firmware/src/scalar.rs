@@ -43,6 +43,8 @@ pub trait Scalar: RealField + Copy + Debug + Display + Default + Serialize + Des
     const KIND: ScalarKind;
     /// How far the norm of a unit vector may be from 1: a few rounding errors of this type.
     const UNIT_TOLERANCE: f64;
+    /// 0, where a constant is needed.
+    const ZERO: Self;
 
     /// Nearest value of this type.
     fn of(value: f64) -> Self;
@@ -53,6 +55,7 @@ pub trait Scalar: RealField + Copy + Debug + Display + Default + Serialize + Des
 impl Scalar for f32 {
     const KIND: ScalarKind = ScalarKind::F32;
     const UNIT_TOLERANCE: f64 = 1e-6;
+    const ZERO: Self = 0.0;
 
     fn of(value: f64) -> Self {
         value as f32
@@ -66,6 +69,7 @@ impl Scalar for f32 {
 impl Scalar for f64 {
     const KIND: ScalarKind = ScalarKind::F64;
     const UNIT_TOLERANCE: f64 = 1e-12;
+    const ZERO: Self = 0.0;
 
     fn of(value: f64) -> Self {
         value

@@ -29,6 +29,11 @@ pub struct SequenceTracker {
 }
 
 impl SequenceTracker {
+    /// A tracker before the first delivery.
+    pub const fn new() -> Self {
+        Self { newest: None, arrived: 0, known: 0 }
+    }
+
     /// Newest sequence number seen.
     pub const fn newest(&self) -> Option<u32> {
         self.newest

@@ -2,12 +2,14 @@
 
 use core::fmt;
 
+use serde::{Deserialize, Serialize};
+
 use crate::law::Direction;
 use crate::limits::PositionLimit;
 use crate::stability;
 
 /// What the user may choose. [`Settings::new`] gives defaults that follow from the rates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// Period of the loop, ns.
     pub loop_period_ns: u64,

@@ -3,6 +3,8 @@
 use core::fmt;
 use core::ops::{BitOr, BitOrAssign};
 
+use serde::{Deserialize, Serialize};
+
 /// State of the controller, with its number on the wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
@@ -29,7 +31,7 @@ impl Mode {
 }
 
 /// Bit set of fault codes; the values are part of the contract and never reused.
-#[derive(Clone, Copy, Default, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Faults(u64);
 
 macro_rules! fault_codes {

@@ -8,6 +8,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use crate::control::LoopArgs;
+use crate::core::Hardware;
 use crate::error::SimError;
 use crate::handover::Handover;
 use crate::link::Space;
@@ -36,6 +37,8 @@ pub struct ControllerCall<'a> {
     pub space: &'a Space,
     /// What drives time.
     pub mode: RunMode,
+    /// What computes the steps.
+    pub hardware: Hardware,
     /// Rates, latency, noise.
     pub loop_args: LoopArgs,
     /// Insertion depth, for the default of the noise.
@@ -56,6 +59,7 @@ impl ControllerProcess {
             .arg(call.table)
             .args(["--link", call.space.name()])
             .args(["--mode", &call.mode.to_string()])
+            .args(["--controller", call.hardware.name()])
             .args(call.loop_args.to_arguments(call.depth))
             .args(["--capacity", &call.capacity.to_string()])
             .args(["--parent", &std::process::id().to_string()])

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Parser, Subcommand};
 
+use crate::board::command::{BoardArgs, board};
 use crate::by_hand::{PlantArgs, plant};
 use crate::controller::{ControllerArgs, serve};
 use crate::error::SimError;
@@ -57,6 +58,11 @@ pub enum Command {
         /// Recording, as `run` writes it
         recording: PathBuf,
     },
+    /// Measures the controller's bare-metal images on a Cortex-M7 in QEMU
+    #[command(
+        after_help = "Example:\n  host-sim run --tissue inclusion --mode lockstep --insertion-time 1.5 --out short\n  host-sim board short/inclusion-dynamic.rec --budget firmware/image/budget.toml"
+    )]
+    Board(BoardArgs),
     /// Makes the report of a finished run again
     #[command(
         after_help = "Examples:\n  host-sim report stillpoint-report\n  host-sim report stillpoint-report --svg-dir figures"
@@ -82,6 +88,7 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
         Some(Command::Plant(args)) => plant(&args),
         Some(Command::Timing(args)) => timing(&args).map(drop),
         Some(Command::Faults(args)) => faults(&args).map(drop),
+        Some(Command::Board(args)) => board(&args),
         Some(Command::Replay { recording }) => {
             let replayed = replay::replay_file(&recording)?;
             println!(

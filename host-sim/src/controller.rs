@@ -4,12 +4,13 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use firmware::Mode;
 use firmware::contract::{Table, decode};
-use firmware::{Controller, Mode};
 use iceoryx2::service::ipc;
 use serde::{Deserialize, Serialize};
 
 use crate::control::LoopArgs;
+use crate::core::{AnyTable, Hardware, emulated};
 use crate::error::SimError;
 use crate::handover::Handover;
 use crate::interrupt;
@@ -31,6 +32,9 @@ pub struct ControllerArgs {
     /// What drives time
     #[arg(long, value_enum, default_value_t = RunMode::Lockstep)]
     pub mode: RunMode,
+    /// What computes the steps
+    #[arg(long = "controller", value_enum, default_value_t)]
+    pub hardware: Hardware,
     /// Rates, latency, noise.
     #[command(flatten)]
     pub loop_args: LoopArgs,
@@ -72,12 +76,18 @@ pub fn serve(args: &ControllerArgs) -> Result<(), SimError> {
     interrupt::install();
     args.loop_args.check()?;
     crate::control::positive("--patience", args.patience)?;
-    let (table, table_bytes) = read_table(&args.table)?;
-    let settings = args.loop_args.settings(table.validity.depth_end);
-    let controller = Controller::new(&table, &settings)?;
-    let header = Header { mode: args.mode, seed: 0, scene_hash: table.scene_hash, settings, table: table_bytes };
+    let path = &args.table;
+    let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: path.clone(), source })?;
+    let table = AnyTable::decode(&bytes).map_err(|source| SimError::Table { path: path.clone(), source })?;
+    let settings = args.loop_args.settings(table.depth_end());
+    let core = match args.hardware {
+        Hardware::Native => table.native(&settings)?,
+        Hardware::Qemu if args.mode == RunMode::FreeRun => return Err(qemu_is_lockstep_only()),
+        Hardware::Qemu => emulated(&bytes, &settings, Duration::from_secs_f64(args.patience))?,
+    };
+    let header = Header { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
     let recorder = args.record.as_deref().map(|path| StreamRecorder::create(path, &header)).transpose()?;
-    let mut session = Session::new(&controller, args.capacity);
+    let mut session = Session::new(core, args.capacity);
     session.recorder = recorder;
     session.panic_at = args.panic_at;
     let space = Space::new(&args.link)?;
@@ -99,6 +109,11 @@ pub fn serve(args: &ControllerArgs) -> Result<(), SimError> {
         );
     }
     Ok(())
+}
+
+/// An emulated board's time is that of its instructions.
+pub(crate) fn qemu_is_lockstep_only() -> SimError {
+    SimError::Usage("--controller qemu runs in lockstep: add --mode lockstep".to_owned())
 }
 
 /// What `controller --json` writes.
@@ -127,7 +142,7 @@ fn serve_in(mut session: Session<'_>, space: &Space, args: &ControllerArgs) -> R
         RunMode::Lockstep => session.lockstep(&mut ports, &mut peer, timeout),
         RunMode::FreeRun => session.free_run(&mut ports, &mut peer, timeout, &args.loop_args),
     };
-    let (handover, exchanges) = session.end(&mut ports);
+    let (handover, exchanges) = session.end(&mut ports)?;
     Ok((handover, exchanges, ended))
 }
 

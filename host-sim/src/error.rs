@@ -102,6 +102,9 @@ pub enum SimError {
     /// The controller process cannot be started.
     #[error("cannot start the controller process: {0}")]
     Spawn(std::io::Error),
+    /// The controller on a board cannot be used.
+    #[error("the controller on the board cannot be used")]
+    Board(#[from] crate::board::BoardError),
     /// The peer is gone.
     #[error("the {peer} process has died ({how}); the run is void, shared memory has been cleaned up")]
     PeerDied {

@@ -12,6 +12,7 @@
 //! [recorded](recorder) and every sample accounted for ([`handover`]). [`run`] puts it together, [`result`] is what
 //! comes out.
 
+pub mod board;
 pub mod by_hand;
 pub mod bytes;
 pub mod child;
@@ -19,6 +20,7 @@ pub mod cli;
 pub mod clock;
 pub mod control;
 pub mod controller;
+pub mod core;
 pub mod describe;
 pub mod error;
 pub mod faults;

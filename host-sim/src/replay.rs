@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use firmware::contract::{PaddleCommand, decode};
-use firmware::{Controller, State};
+use firmware::contract::PaddleCommand;
 
+use crate::core::AnyTable;
 use crate::error::SimError;
 use crate::recorder::{Recording, RunMode};
 
@@ -36,14 +36,13 @@ pub fn replay_file(path: &Path) -> Result<Replayed, SimError> {
 /// [`SimError::ReplayDiffers`]; [`SimError::Table`], [`SimError::Settings`] if the controller cannot be built again.
 pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, SimError> {
     let header = &recording.header;
-    let table = decode(&header.table).map_err(|source| SimError::Table { path: path.to_owned(), source })?;
-    let controller = Controller::new(&table, &header.settings)?;
-    let mut state = State::<f64>::new();
+    let table = AnyTable::decode(&header.table).map_err(|source| SimError::Table { path: path.to_owned(), source })?;
+    let mut core = table.native(&header.settings)?;
     let mut differences = 0;
     let mut first = None;
     for record in &recording.records {
         let inputs = &record.exchange.inputs;
-        let command = controller.step(&mut state, inputs);
+        let command = core.step(inputs)?;
         if let Some(detail) = difference(&record.exchange.command, &command) {
             differences += 1;
             first.get_or_insert((inputs.tick, detail));
@@ -59,7 +58,7 @@ pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, SimError> 
 }
 
 /// The first field that differs in a single bit; NaN and −0 are not excused.
-fn difference(recorded: &PaddleCommand, again: &PaddleCommand) -> Option<String> {
+pub fn difference(recorded: &PaddleCommand, again: &PaddleCommand) -> Option<String> {
     macro_rules! compare {
         ($($field:ident),*) => {
             $(if recorded.$field != again.$field {

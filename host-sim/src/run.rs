@@ -14,8 +14,10 @@ use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use sha2::{Digest, Sha256};
 
+use crate::board::{Image, Processor};
 use crate::control::{LoopArgs, not_negative, positive};
-use crate::controller::read_table;
+use crate::controller::{qemu_is_lockstep_only, read_table};
+use crate::core::{Hardware, ScalarChoice};
 use crate::error::SimError;
 use crate::interrupt;
 use crate::plant::ActuatorModel;
@@ -137,6 +139,12 @@ pub struct RunArgs {
     /// What drives time [default: lockstep, then the dynamic strategy once more in free-run]
     #[arg(long, value_enum)]
     pub mode: Option<RunMode>,
+    /// What computes the controller's steps: this machine, or the bare-metal image on a Cortex-M7 in QEMU (in lockstep)
+    #[arg(long = "controller", value_enum, default_value_t)]
+    pub hardware: Hardware,
+    /// Number type that the controller computes in
+    #[arg(long, value_enum, default_value_t)]
+    pub scalar: ScalarChoice,
     /// Directory for the report, created whole
     #[arg(long, default_value = "stillpoint-report", value_name = "DIR")]
     pub out: PathBuf,
@@ -168,6 +176,13 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
     let started = Instant::now();
     let scene = args.world.scene()?;
     let simulation = args.world.simulation(&scene)?;
+    if args.hardware == Hardware::Qemu && args.mode == Some(RunMode::FreeRun) {
+        return Err(qemu_is_lockstep_only());
+    }
+    if args.hardware == Hardware::Qemu {
+        // Before anybody waits for the controller: compiling takes a while the first time.
+        Image::build(args.scalar.kind(), Processor::Double)?;
+    }
     output::check_directory(&args.out)?;
     let given_table = args.table.as_deref().map(read_table).transpose()?;
     if let (Some(path), Some((table, _))) = (&args.table, &given_table) {
@@ -183,6 +198,7 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
             let (table, bytes) = given_table.clone().map_or_else(|| studies.table(case.table_tissue), Ok)?;
             // Refused settings are bad input: found before anything runs.
             Controller::new(&table, &simulation.loop_args.settings(table.validity.depth_end))?;
+            let bytes = args.scalar.encode(&table, bytes)?;
             Ok((table, bytes))
         })
         .collect::<Result<Vec<_>, SimError>>()?;
@@ -202,7 +218,7 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
                 RunMode::FreeRun => "dynamic-free-run",
             };
             studies.say(&format!("{}: dynamic, {mode}", case.tissue.name()));
-            let controller = Active { program: &program, table, table_bytes, mode };
+            let controller = Active { program: &program, table, table_bytes, mode, hardware: args.hardware };
             let model = studies.model(case.tissue);
             let progress = || studies.bar.inc(1);
             active(model, &controller, &simulation, &case.label(name), &progress)
@@ -211,7 +227,7 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
             strategies.dynamic = Some(keep(dynamic(RunMode::Lockstep)?));
         }
         let free_run = match args.mode {
-            None => !case.is_mismatch,
+            None => !case.is_mismatch && args.hardware == Hardware::Native,
             Some(mode) => mode == RunMode::FreeRun,
         };
         if free_run {

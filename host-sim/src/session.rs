@@ -4,14 +4,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use firmware::contract::PaddleCommand;
-use firmware::io::{CommandSink, SampleSource, run_tick};
+use firmware::io::{CommandSink, SampleSource};
 use firmware::schedule::Schedule;
-use firmware::{Controller, Faults, Inputs, Mode, State};
+use firmware::{Faults, Inputs, Mode};
 use iceoryx2::service::Service;
 
 use crate::clock::{now_ns, release_real_time, request_real_time, sleep_until};
 use crate::control::LoopArgs;
 use crate::controller::mode_name;
+use crate::core::Core;
 use crate::error::SimError;
 use crate::handover::{Handover, SequenceSpan};
 use crate::interrupt;
@@ -28,10 +29,8 @@ const TICKS_PER_LOOK: u64 = 16;
 const TICKS_IN_SAFE: u64 = 20;
 
 /// A controller at work.
-#[derive(Debug)]
 pub struct Session<'c> {
-    controller: &'c Controller<'c, f64>,
-    state: State<f64>,
+    core: Box<dyn Core + 'c>,
     exchanges: Vec<Exchange>,
     exchanges_lost: u64,
     faults: Faults,
@@ -50,12 +49,17 @@ pub struct Session<'c> {
     pub(crate) panic_at: Option<u64>,
 }
 
+impl std::fmt::Debug for Session<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Session").field("exchanges", &self.exchanges.len()).finish_non_exhaustive()
+    }
+}
+
 impl<'c> Session<'c> {
     /// A controller before its first tick, with room for the record of `capacity` ticks.
-    pub fn new(controller: &'c Controller<'c, f64>, capacity: usize) -> Self {
+    pub fn new(core: Box<dyn Core + 'c>, capacity: usize) -> Self {
         Self {
-            controller,
-            state: State::new(),
+            core,
             exchanges: Vec::with_capacity(capacity),
             exchanges_lost: 0,
             faults: Faults::NONE,
@@ -185,19 +189,25 @@ impl<'c> Session<'c> {
         }
     }
 
-    fn tick<S: Service>(&mut self, ports: &mut ControllerPorts<S>, tick: u64, time_ns: u64) -> Result<(), LinkError> {
+    fn tick<S: Service>(&mut self, ports: &mut ControllerPorts<S>, tick: u64, time_ns: u64) -> Result<(), SimError> {
         let stepped = if self.tripped {
             None
         } else {
             // A panic in the step must not end the commands: the paddle's owner hears SAFE from then on.
             let step = || {
                 assert!(self.panic_at.is_none_or(|at| tick < at), "panic on purpose in tick {tick}");
-                run_tick(self.controller, &mut self.state, tick, time_ns, ports)
+                let inputs =
+                    Inputs { tick, time_ns, needle: ports.needle(), target: ports.target(), paddle: ports.paddle() };
+                self.core.step(&inputs).map(|command| (inputs, command))
             };
             catch_unwind(AssertUnwindSafe(step)).ok()
         };
         let (inputs, command) = match stepped {
-            Some(outcome) => outcome?,
+            Some(outcome) => {
+                let (inputs, command) = outcome?;
+                ports.send(&command)?;
+                (inputs, command)
+            }
             None => self.safe_command(ports, tick, time_ns)?,
         };
         self.last = command;
@@ -249,8 +259,11 @@ impl<'c> Session<'c> {
     }
 
     /// Closes the accounts, with what still waits in the buffers.
-    pub fn end<S: Service>(self, ports: &mut ControllerPorts<S>) -> (Handover, Vec<Exchange>) {
-        let ledger = self.state.ledger();
+    ///
+    /// # Errors
+    /// [`SimError::Board`] if a board does not tell its own.
+    pub fn end<S: Service>(mut self, ports: &mut ControllerPorts<S>) -> Result<(Handover, Vec<Exchange>), SimError> {
+        let ledger = self.core.ledger()?;
         let [needle, target, paddle] = self.spans;
         let waiting = (ports.needle(), ports.target(), ports.paddle());
         let ticks = &ledger.ticks;
@@ -276,6 +289,6 @@ impl<'c> Session<'c> {
             exchanges_lost: self.exchanges_lost,
             record: self.recorder.map(StreamRecorder::finish),
         };
-        (handover, self.exchanges)
+        Ok((handover, self.exchanges))
     }
 }

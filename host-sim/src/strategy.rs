@@ -10,6 +10,7 @@ use nalgebra::Vector2;
 use sha2::{Digest, Sha256};
 
 use crate::child::{ControllerCall, ControllerProcess};
+use crate::core::Hardware;
 use crate::error::SimError;
 use crate::handover::Handover;
 use crate::interrupt;
@@ -105,6 +106,8 @@ pub struct Active<'a> {
     pub table_bytes: &'a [u8],
     /// What drives time.
     pub mode: RunMode,
+    /// What computes the controller's steps.
+    pub hardware: Hardware,
 }
 
 /// The insertion with the controller as a process of its own.
@@ -178,6 +181,7 @@ fn in_space<'m>(
         table: &table,
         space,
         mode: controller.mode,
+        hardware: controller.hardware,
         loop_args: simulation.loop_args,
         depth: simulation.depth,
         capacity: simulation.ticks(),

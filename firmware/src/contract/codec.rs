@@ -16,6 +16,7 @@
 //! Everything is checked before the payload is decoded, and nothing is allocated for lengths that a file claims.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
+use serde::de::DeserializeOwned;
 
 use super::{Table, TableError};
 use crate::scalar::{Scalar, ScalarKind};
@@ -131,6 +132,22 @@ pub fn encode<T: Scalar, const D: usize>(table: &Table<T, D>, buffer: &mut [u8])
 /// # Errors
 /// The first check that fails, as its own [`TableError`].
 pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, TableError> {
+    let mut table = Table::empty();
+    decode_into(bytes, &mut table)?;
+    Ok(table)
+}
+
+/// As [`decode`], into a table that already has its place: one knot at a time, so that the stack holds one knot and
+/// not all of them. After an error the table holds no knots, which validation refuses.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_into<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>) -> Result<(), TableError> {
+    table.knots.clear();
+    fill(bytes, table).inspect_err(|_| table.knots.clear())
+}
+
+fn fill<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>) -> Result<(), TableError> {
     let (header, payload) = split(bytes)?;
     if header.scalar != T::KIND {
         return Err(TableError::ScalarKind { found: header.scalar.name(), expected: T::KIND.name() });
@@ -141,13 +158,36 @@ pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, Ta
     if usize::from(header.paddle_dof) != D {
         return Err(TableError::PaddleDof { found: header.paddle_dof.into(), expected: D });
     }
-    let (mut table, rest) = postcard::take_from_bytes::<Table<T, D>>(payload).map_err(|_| TableError::Payload)?;
-    if !rest.is_empty() {
-        return Err(TableError::PayloadTrailing { extra: rest.len() });
+    // The fields of `Table` in their order, which postcard writes one after the other; the knots are the last.
+    let mut payload = Payload(payload);
+    table.units = payload.take()?;
+    table.tissue = payload.take()?;
+    table.paddle = payload.take()?;
+    table.needle_axis = payload.take()?;
+    table.orthogonal = payload.take()?;
+    table.target_position = payload.take()?;
+    table.validity = payload.take()?;
+    table.gains = payload.take()?;
+    let knots: usize = payload.take()?;
+    for _ in 0..knots {
+        table.knots.push(payload.take()?).map_err(|_| TableError::Payload)?;
+    }
+    if !payload.0.is_empty() {
+        return Err(TableError::PayloadTrailing { extra: payload.0.len() });
     }
     table.scene_hash = header.scene_hash;
-    table.validate()?;
-    Ok(table)
+    table.validate()
+}
+
+/// Takes values off the front of the payload.
+struct Payload<'a>(&'a [u8]);
+
+impl Payload<'_> {
+    fn take<V: DeserializeOwned>(&mut self) -> Result<V, TableError> {
+        let (value, rest) = postcard::take_from_bytes(self.0).map_err(|_| TableError::Payload)?;
+        self.0 = rest;
+        Ok(value)
+    }
 }
 
 /// Header and payload of an intact file.

@@ -119,6 +119,39 @@ pub enum TableError {
     },
 }
 
+impl TableError {
+    /// Number of the check that failed, for where there is no room for words. Part of the contract, never reused.
+    pub const fn code(&self) -> u8 {
+        match self {
+            Self::TooShort { .. } => 1,
+            Self::NotATable => 2,
+            Self::FormatVersion { .. } => 3,
+            Self::Reserved => 4,
+            Self::UnknownScalar { .. } => 5,
+            Self::Truncated { .. } => 6,
+            Self::TrailingBytes { .. } => 7,
+            Self::Checksum { .. } => 8,
+            Self::ScalarKind { .. } => 9,
+            Self::Dimension { .. } => 10,
+            Self::PaddleDof { .. } => 11,
+            Self::Payload => 12,
+            Self::PayloadTrailing { .. } => 13,
+            Self::NotFinite { .. } => 14,
+            Self::NotPositive { .. } => 15,
+            Self::NotUnit { .. } => 16,
+            Self::NotOrthogonal => 17,
+            Self::TooFewKnots { .. } => 18,
+            Self::DepthOrder { .. } => 19,
+            Self::DepthRange => 20,
+            Self::DisplacementRange => 21,
+            Self::IllConditioned { .. } => 22,
+            Self::PathBeyondLimit { .. } => 23,
+            Self::Gains => 24,
+            Self::BufferTooSmall { .. } => 25,
+        }
+    }
+}
+
 impl fmt::Display for TableError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const REWRITE: &str = "the file is damaged: write it again with `model-offline table`";

@@ -9,7 +9,7 @@ pub mod frames;
 pub mod table;
 mod validate;
 
-pub use codec::{Header, MAX_TABLE_BYTES, decode, encode};
+pub use codec::{Header, MAX_TABLE_BYTES, decode, decode_into, encode};
 pub use error::TableError;
 pub use frames::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 pub use table::{Gains, Knot, MAX_KNOTS, Paddle, Table, Units, Validity};

@@ -4,7 +4,7 @@
 //! degrees of freedom of the paddle. Lengths are in the scene's own unit, times in seconds.
 
 use heapless::{String, Vec};
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{ArrayStorage, SMatrix, SVector};
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::Scalar;
@@ -109,6 +109,30 @@ pub struct Table<T: Scalar, const D: usize> {
 }
 
 impl<T: Scalar, const D: usize> Table<T, D> {
+    /// A table of zeros without knots, which validation refuses: the place for [`super::decode_into`] to fill.
+    ///
+    /// Constant, so that a microcontroller can keep it in a `static` and never on its stack (it is up to 31 KB).
+    pub const fn empty() -> Self {
+        let zero = SVector::from_array_storage(ArrayStorage([[T::ZERO; D]; 1]));
+        Self {
+            scene_hash: [0; 32],
+            units: Units { length: String::new(), stress: String::new() },
+            tissue: String::new(),
+            paddle: Paddle { index: 0, segment: [zero; 2], max_displacement: T::ZERO, max_rate: T::ZERO },
+            needle_axis: zero,
+            orthogonal: zero,
+            target_position: zero,
+            validity: Validity {
+                depth_start: T::ZERO,
+                depth_end: T::ZERO,
+                paddle_displacement: T::ZERO,
+                needle_speed: T::ZERO,
+            },
+            gains: Gains { loop_gain: T::ZERO, delay_samples: 0, lambda_max: T::ZERO },
+            knots: Vec::new(),
+        }
+    }
+
     /// The same table in another scalar type, every number rounded to nearest.
     ///
     /// The result is not validated: knots closer than the resolution of `U` fall together.

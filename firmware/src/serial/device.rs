@@ -1,0 +1,388 @@
+//! The device's side of the line: takes a table, runs the controller, answers.
+//!
+//! One loop without interrupts of its own: poll the line, serve the watchdog, step when it is time. The watchdog is
+//! served once per pass, so that a step that never returns is noticed, and a silent host is not: silence is the
+//! controller's own business (ages of samples, HOLD, SAFE).
+
+use super::frame::{FrameReader, FrameWriter};
+use super::message::{Account, ClockSource, Identity, PROTOCOL_VERSION, Refusal, Reply, Request, ResetCause};
+use crate::contract::codec::FORMAT_VERSION;
+use crate::contract::frames::LAYOUT_VERSION;
+use crate::contract::{PaddleCommand, Table, decode_into};
+use crate::controller::{Controller, State};
+use crate::inputs::Inputs;
+use crate::scalar::Scalar;
+use crate::schedule::Schedule;
+use crate::sequence::Arrival;
+use crate::settings::Settings;
+use crate::supervisor::{Faults, Mode};
+
+/// Room for an encoded table: 256 knots in f64 with two paddle degrees of freedom take 31 KB.
+pub const TABLE_BYTES: usize = 32 * 1024;
+
+/// Bits of [`Board::counter`]: those of a SysTick.
+pub const COUNTER_BITS: u32 = 24;
+const COUNTER_MASK: u32 = (1 << COUNTER_BITS) - 1;
+
+/// What a microcontroller has to provide.
+pub trait Board {
+    /// Rate of the counter, Hz.
+    const COUNTER_HZ: u32;
+
+    /// A byte from the line, if one has arrived.
+    fn read(&mut self) -> Option<u8>;
+    /// Sends a byte; waits while the transmitter is busy.
+    fn write(&mut self, byte: u8);
+    /// A counter that goes up and wraps after [`COUNTER_BITS`].
+    fn counter(&mut self) -> u32;
+    /// Serves the watchdog.
+    fn alive(&mut self);
+    /// Never returns and never serves the watchdog.
+    fn hang(&mut self);
+    /// Deepest use of the stack since the start, bytes.
+    fn stack_bytes(&self) -> u32;
+    /// Whether the line is gone for good, which it never is outside of tests.
+    fn is_closed(&self) -> bool {
+        false
+    }
+}
+
+/// Everything large that a device needs, for a `static`.
+#[derive(Debug)]
+pub struct Memory<T: Scalar> {
+    table: Table<T, 2>,
+    encoded: [u8; TABLE_BYTES],
+    filled: usize,
+    line: Line,
+}
+
+#[derive(Debug)]
+struct Line {
+    reader: FrameReader,
+    writer: FrameWriter,
+}
+
+impl<T: Scalar> Memory<T> {
+    /// Memory of a device that starts.
+    pub const fn new() -> Self {
+        let line = Line { reader: FrameReader::new(), writer: FrameWriter::new() };
+        Self { table: Table::empty(), encoded: [0; TABLE_BYTES], filled: 0, line }
+    }
+
+    /// The frame of a SAFE command that moves nothing, for an exception to send before it resets the device: it has
+    /// nothing left to compute then. To be asked for before [`serve`].
+    pub fn last_word(&mut self) -> &[u8] {
+        let command =
+            PaddleCommand { state: Mode::Safe as u32, faults: Faults::WATCHDOG.bits(), ..PaddleCommand::default() };
+        self.line.writer.restart();
+        self.line.writer.encode(&Reply::Command { command, counts: 0 }).unwrap_or_default()
+    }
+}
+
+impl<T: Scalar> Default for Memory<T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Serves the line for ever (in tests: until it is closed).
+pub fn serve<T: Scalar, B: Board>(board: &mut B, memory: &mut Memory<T>, reset: ResetCause) {
+    let Memory { table, encoded, filled, line } = memory;
+    line.writer.restart();
+    let identity = Identity {
+        protocol: PROTOCOL_VERSION,
+        layout: LAYOUT_VERSION,
+        table_format: FORMAT_VERSION,
+        scalar: T::KIND as u8,
+        table_bytes: TABLE_BYTES as u32,
+        counter_hz: B::COUNTER_HZ,
+        reset,
+    };
+    line.send_hello(board, identity);
+    while !board.is_closed() {
+        board.alive();
+        if line.poll(board).is_none() {
+            continue;
+        }
+        match line.reader.message() {
+            Some(Request::Hello) => line.send_hello(board, identity),
+            Some(Request::Table { offset, bytes }) => match take(encoded, filled, offset, bytes) {
+                Ok(bytes) => line.send_taken(board, bytes),
+                Err(refusal) => line.send_refusal(board, refusal),
+            },
+            Some(Request::Begin { settings, clock }) => {
+                let begun = check_table(encoded.get(..*filled).unwrap_or_default(), table)
+                    .and_then(|()| run(board, line, table, &settings, clock));
+                match begun {
+                    Ok(()) if board.is_closed() => {}
+                    // The run was ended by a Hello.
+                    Ok(()) => line.send_hello(board, identity),
+                    Err(refusal) => line.send_refusal(board, refusal),
+                }
+            }
+            Some(Request::TestWatchdog) => board.hang(),
+            Some(Request::Account | Request::Rearm) => line.send_refusal(board, Refusal::Order),
+            // Samples of a run that a reset has ended: the host will see the Hello.
+            Some(Request::Needle(_) | Request::Target(_) | Request::Paddle(_) | Request::Time { .. }) => {}
+            None => line.reader.count_unknown(),
+        }
+    }
+}
+
+// What happens once, and what is large, is kept out of line below: the stack of the loop then does not carry it.
+
+/// Appends a piece of the table; returns the bytes that are there.
+#[inline(never)]
+fn take(encoded: &mut [u8; TABLE_BYTES], filled: &mut usize, offset: u32, bytes: &[u8]) -> Result<u32, Refusal> {
+    if offset == 0 {
+        *filled = 0;
+    }
+    let start = offset as usize;
+    if start != *filled {
+        return Err(Refusal::Offset { expected: *filled as u32 });
+    }
+    let place = encoded.get_mut(start..).and_then(|rest| rest.get_mut(..bytes.len())).ok_or(Refusal::TooLarge)?;
+    for (to, from) in place.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    *filled = start + bytes.len();
+    Ok(*filled as u32)
+}
+
+#[inline(never)]
+fn check_table<T: Scalar>(encoded: &[u8], table: &mut Table<T, 2>) -> Result<(), Refusal> {
+    decode_into(encoded, table).map_err(|error| Refusal::Table { code: error.code() })
+}
+
+#[inline(never)]
+fn build<'t, T: Scalar>(table: &'t Table<T, 2>, settings: &Settings) -> Result<Controller<'t, T>, Refusal> {
+    Controller::new(table, settings).map_err(|_| Refusal::Settings)
+}
+
+/// Builds the controller and runs it until the host says Hello.
+#[inline(never)]
+fn run<T: Scalar, B: Board>(
+    board: &mut B,
+    line: &mut Line,
+    table: &Table<T, 2>,
+    settings: &Settings,
+    clock: ClockSource,
+) -> Result<(), Refusal> {
+    let controller = build(table, settings)?;
+    let mut state = State::new();
+    line.send_ready(board);
+    Run {
+        controller: &controller,
+        state: &mut state,
+        inbox: Inputs::default(),
+        clock,
+        now: Now::new(board.counter()),
+        period_ns: settings.loop_period_ns,
+        schedule: Schedule::new(0, settings.loop_period_ns),
+    }
+    .serve(board, line);
+    Ok(())
+}
+
+/// A controller at work.
+struct Run<'r, T: Scalar> {
+    controller: &'r Controller<'r, T>,
+    state: &'r mut State<T>,
+    /// Newest sample of each stream since the last step.
+    inbox: Inputs,
+    clock: ClockSource,
+    now: Now,
+    period_ns: u64,
+    /// Releases on the board's clock, in the host's time.
+    schedule: Schedule,
+}
+
+impl<T: Scalar> Run<'_, T> {
+    #[inline(never)]
+    fn serve<B: Board>(&mut self, board: &mut B, line: &mut Line) {
+        while !board.is_closed() {
+            board.alive();
+            let now_ns = self.now.read(board);
+            if let (ClockSource::Board, Some(now_ns)) = (self.clock, now_ns)
+                && now_ns >= self.schedule.next_release_ns()
+            {
+                let release = self.schedule.begin(now_ns);
+                self.step(board, line, release.tick, now_ns);
+                if let Some(end_ns) = self.now.read(board) {
+                    self.schedule.finish(end_ns);
+                }
+            }
+            let Some(arrival) = line.poll(board) else { continue };
+            let message = line.reader.message();
+            let new = arrival == Arrival::New;
+            match message {
+                Some(Request::Needle(sample)) => keep_newest(&mut self.inbox.needle, sample, |s| s.sequence),
+                Some(Request::Target(sample)) => keep_newest(&mut self.inbox.target, sample, |s| s.sequence),
+                Some(Request::Paddle(sample)) => keep_newest(&mut self.inbox.paddle, sample, |s| s.sequence),
+                // Anything but a sample means something only in its place.
+                _ if !new => {}
+                Some(Request::Time { tick, time_ns }) => match self.clock {
+                    ClockSource::Frames => self.step(board, line, tick, time_ns),
+                    ClockSource::Board => self.set_clock(board, time_ns),
+                },
+                Some(Request::Rearm) => self.state.rearm(),
+                Some(Request::Account) => self.send_account(board, line),
+                Some(Request::Hello) => return,
+                Some(Request::TestWatchdog) => board.hang(),
+                Some(Request::Table { .. } | Request::Begin { .. }) => {
+                    line.send_refusal(board, Refusal::Order);
+                }
+                None => line.reader.count_unknown(),
+            }
+        }
+    }
+
+    /// One tick.
+    #[inline(never)]
+    fn step<B: Board>(&mut self, board: &mut B, line: &mut Line, tick: u64, time_ns: u64) {
+        let inputs = Inputs { tick, time_ns, ..core::mem::take(&mut self.inbox) };
+        let (command, counts) = timed_step(board, self.controller, self.state, &inputs);
+        line.send(board, &Reply::Command { command, counts });
+    }
+
+    /// The host's clock shows `time_ns` now. The first time, the next release is one period ahead.
+    fn set_clock<B: Board>(&mut self, board: &mut B, time_ns: u64) {
+        if self.now.offset_ns.is_none() {
+            self.schedule = Schedule::new(time_ns.saturating_add(self.period_ns), self.period_ns);
+        }
+        self.now.set(board, time_ns);
+    }
+
+    #[inline(never)]
+    fn send_account<B: Board>(&self, board: &mut B, line: &mut Line) {
+        let account = Account {
+            ledger: *self.state.ledger(),
+            line: *line.reader.ledger(),
+            state: self.state.mode() as u32,
+            faults: self.state.faults(),
+            stack_bytes: board.stack_bytes(),
+        };
+        line.send(board, &Reply::Account(account));
+    }
+}
+
+/// `Controller::step` and the counts that it took. Not inlined, and with its arguments and result opaque, so that
+/// nothing of the step is moved out of the count and nothing else into it.
+#[inline(never)]
+fn timed_step<T: Scalar, B: Board>(
+    board: &mut B,
+    controller: &Controller<'_, T>,
+    state: &mut State<T>,
+    inputs: &Inputs,
+) -> (PaddleCommand, u32) {
+    use core::hint::black_box;
+    let before = board.counter();
+    let command = black_box(controller).step(black_box(&mut *state), black_box(inputs));
+    black_box((&command, state));
+    let counts = board.counter().wrapping_sub(before) & COUNTER_MASK;
+    (command, counts)
+}
+
+/// Keeps the newer of two samples; sequence numbers wrap.
+fn keep_newest<S>(kept: &mut Option<S>, sample: S, sequence: impl Fn(&S) -> u32) {
+    let older = kept.as_ref().is_some_and(|kept| sequence(&sample).wrapping_sub(sequence(kept)) > u32::MAX / 2);
+    if !older {
+        *kept = Some(sample);
+    }
+}
+
+/// The host's time, carried on by the board's counter. Never goes back.
+struct Now {
+    counter: u32,
+    /// Counts since the start of the run.
+    elapsed: u64,
+    /// Host time minus board time, ns; `None` before the first word of the host.
+    offset_ns: Option<i64>,
+    /// Board time of the last word of the host, ns.
+    told_ns: u64,
+    last_ns: u64,
+}
+
+/// Two crystals may drift apart by one part in this many: 100 ppm.
+const DRIFT: u64 = 10_000;
+
+impl Now {
+    fn new(counter: u32) -> Self {
+        Self { counter, elapsed: 0, offset_ns: None, told_ns: 0, last_ns: 0 }
+    }
+
+    /// Must be called at least once per wrap of the counter. `None` until the host has said the time.
+    fn read<B: Board>(&mut self, board: &mut B) -> Option<u64> {
+        let board_ns = self.board_ns(board);
+        let now_ns = board_ns.saturating_add_signed(self.offset_ns?);
+        self.last_ns = self.last_ns.max(now_ns);
+        Some(self.last_ns)
+    }
+
+    /// The host's clock showed `time_ns` when it sent this. Every message is late by its time on the line, so that
+    /// the offset is the largest one seen, forgotten as fast as crystals drift.
+    fn set<B: Board>(&mut self, board: &mut B, time_ns: u64) {
+        let board_ns = self.board_ns(board);
+        let measured = time_ns.wrapping_sub(board_ns).cast_signed();
+        let forgotten = (board_ns.saturating_sub(self.told_ns) / DRIFT).cast_signed();
+        self.offset_ns = Some(match self.offset_ns {
+            Some(offset) => measured.max(offset.saturating_sub(forgotten)),
+            None => measured,
+        });
+        self.told_ns = board_ns;
+    }
+
+    fn board_ns<B: Board>(&mut self, board: &mut B) -> u64 {
+        const SECOND_NS: u64 = 1_000_000_000;
+        let counter = board.counter();
+        self.elapsed += u64::from(counter.wrapping_sub(self.counter) & COUNTER_MASK);
+        self.counter = counter;
+        // In two parts: the product of all counts with 10⁹ would overflow after ten minutes.
+        let rate = u64::from(B::COUNTER_HZ.max(1));
+        (self.elapsed / rate) * SECOND_NS + (self.elapsed % rate) * SECOND_NS / rate
+    }
+}
+
+impl Line {
+    /// Sends a reply. Every reply fits into a frame.
+    #[inline(never)]
+    fn send<B: Board>(&mut self, board: &mut B, reply: &Reply) {
+        for byte in self.writer.encode(reply).unwrap_or_default() {
+            board.write(*byte);
+        }
+    }
+
+    #[inline(never)]
+    fn send_hello<B: Board>(&mut self, board: &mut B, identity: Identity) {
+        self.send(board, &Reply::Hello(identity));
+    }
+
+    #[inline(never)]
+    fn send_taken<B: Board>(&mut self, board: &mut B, bytes: u32) {
+        self.send(board, &Reply::Taken { bytes });
+    }
+
+    #[inline(never)]
+    fn send_ready<B: Board>(&mut self, board: &mut B) {
+        self.send(board, &Reply::Ready);
+    }
+
+    #[inline(never)]
+    fn send_refusal<B: Board>(&mut self, board: &mut B, refusal: Refusal) {
+        self.send(board, &Reply::Refused(refusal));
+    }
+
+    /// Takes the bytes that have arrived, up to the end of a frame.
+    fn poll<B: Board>(&mut self, board: &mut B) -> Option<Arrival> {
+        while let Some(byte) = board.read() {
+            let arrival = self.reader.feed(byte);
+            if arrival.is_some() {
+                return arrival;
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests;

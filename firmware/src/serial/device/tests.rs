@@ -1,0 +1,200 @@
+//! A device on a line of two queues, with a counter that the test turns.
+
+use std::collections::VecDeque;
+use std::vec::Vec;
+
+use super::super::message::TABLE_CHUNK_BYTES;
+use super::*;
+use crate::contract::{MAX_TABLE_BYTES, encode};
+use crate::test_support::{MS, Plant, table};
+
+/// A board whose line is closed once the host has nothing left to say.
+#[derive(Default)]
+struct Bench {
+    to_device: VecDeque<u8>,
+    from_device: Vec<u8>,
+    counter: u32,
+    /// Counts per look at the counter.
+    speed: u32,
+    served: u32,
+    hung: bool,
+}
+
+impl Board for Bench {
+    const COUNTER_HZ: u32 = 1_000_000;
+
+    fn read(&mut self) -> Option<u8> {
+        self.to_device.pop_front()
+    }
+    fn write(&mut self, byte: u8) {
+        self.from_device.push(byte);
+    }
+    fn counter(&mut self) -> u32 {
+        self.counter = (self.counter + self.speed) & COUNTER_MASK;
+        self.counter
+    }
+    fn alive(&mut self) {
+        self.served += 1;
+    }
+    fn hang(&mut self) {
+        self.hung = true;
+    }
+    fn stack_bytes(&self) -> u32 {
+        7
+    }
+    fn is_closed(&self) -> bool {
+        self.to_device.is_empty()
+    }
+}
+
+fn encoded<T: Scalar>(table: &Table<T, 2>) -> Vec<u8> {
+    let mut bytes = std::vec![0; MAX_TABLE_BYTES];
+    let length = encode(table, &mut bytes).unwrap();
+    bytes.truncate(length);
+    bytes
+}
+
+/// The requests that give a device this table, and begin a run.
+fn loading(table: &[u8], clock: ClockSource) -> Vec<Request<'_>> {
+    let pieces = table.chunks(TABLE_CHUNK_BYTES).enumerate();
+    let mut requests: Vec<_> =
+        pieces.map(|(i, bytes)| Request::Table { offset: (i * TABLE_CHUNK_BYTES) as u32, bytes }).collect();
+    requests.push(Request::Begin { settings: Settings::new(MS, 20 * MS, 20 * MS), clock });
+    requests
+}
+
+/// What a device answers to these requests.
+fn answers<T: Scalar>(bench: &mut Bench, requests: &[Request<'_>]) -> Vec<Reply> {
+    let mut writer = FrameWriter::new();
+    for request in requests {
+        bench.to_device.extend(writer.encode(request).unwrap());
+    }
+    let mut memory = std::boxed::Box::new(Memory::<T>::new());
+    serve(bench, &mut memory, ResetCause::PowerOn);
+    let mut reader = FrameReader::new();
+    let replies = bench.from_device.iter().filter_map(|byte| reader.feed(*byte).and_then(|_| reader.message()));
+    replies.collect()
+}
+
+/// Inputs of a closed loop and the commands that the controller gives by itself.
+fn insertion<T: Scalar>(ticks: u64) -> Vec<(Inputs, PaddleCommand)> {
+    let table = table().cast::<T>();
+    let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+    let (mut state, mut plant) = (State::<T>::new(), Plant::new());
+    (0..ticks)
+        .map(|_| {
+            let inputs = plant.sense();
+            let command = controller.step(&mut state, &inputs);
+            plant.act(&command);
+            (inputs, command)
+        })
+        .collect()
+}
+
+fn requests_of<'a>(inputs: &Inputs) -> impl Iterator<Item = Request<'a>> + use<'a> {
+    let Inputs { tick, time_ns, needle, target, paddle } = *inputs;
+    let samples = [needle.map(Request::Needle), target.map(Request::Target), paddle.map(Request::Paddle)];
+    samples.into_iter().flatten().chain([Request::Time { tick, time_ns }])
+}
+
+fn commands_are_the_controllers<T: Scalar>() {
+    let bytes = encoded(&table().cast::<T>());
+    let expected = insertion::<T>(300);
+    let mut requests = loading(&bytes, ClockSource::Frames);
+    requests.extend(expected.iter().flat_map(|(inputs, _)| requests_of(inputs)));
+    requests.push(Request::Account);
+    let replies = answers::<T>(&mut Bench::default(), &requests);
+    let commands: Vec<_> = replies
+        .iter()
+        .filter_map(|reply| match reply {
+            Reply::Command { command, .. } => Some(*command),
+            _ => None,
+        })
+        .collect();
+    assert!(commands.iter().eq(expected.iter().map(|(_, command)| command)));
+    let Some(Reply::Account(account)) = replies.last() else { panic!("no account: {:?}", replies.last()) };
+    assert_eq!((account.ledger.unaccounted(), account.ledger.ticks.due), (0, 300));
+    assert_eq!((account.line.frames.unaccounted(), account.line.damaged), (0, 0));
+    assert_eq!(account.state, Mode::Run as u32);
+}
+
+#[test]
+fn commands_are_the_controllers_in_both_precisions() {
+    commands_are_the_controllers::<f64>();
+    commands_are_the_controllers::<f32>();
+}
+
+#[test]
+fn requests_out_of_place_are_refused() {
+    let bytes = encoded(&table());
+    let begin = |bytes| *loading(bytes, ClockSource::Frames).last().unwrap();
+    let refusal = |requests: &[Request<'_>]| match answers::<f64>(&mut Bench::default(), requests).last() {
+        Some(Reply::Refused(refusal)) => *refusal,
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(refusal(&[Request::Account]), Refusal::Order);
+    assert_eq!(refusal(&[Request::Table { offset: 3, bytes: &[0] }]), Refusal::Offset { expected: 0 });
+    assert_eq!(
+        refusal(&[begin(&bytes)]),
+        Refusal::Table { code: crate::contract::TableError::TooShort { bytes: 0 }.code() }
+    );
+    let single = encoded(&table().cast::<f32>());
+    let kind = crate::contract::TableError::ScalarKind { found: "f32", expected: "f64" };
+    assert_eq!(refusal(&loading(&single, ClockSource::Frames)), Refusal::Table { code: kind.code() });
+    let mut requests = loading(&bytes, ClockSource::Frames);
+    requests.pop();
+    requests.push(Request::Begin { settings: Settings::new(0, 1, 1), clock: ClockSource::Frames });
+    assert_eq!(refusal(&requests), Refusal::Settings);
+    let too_much = std::vec![0; TABLE_CHUNK_BYTES];
+    let pieces: Vec<_> = (0..=TABLE_BYTES / TABLE_CHUNK_BYTES)
+        .map(|i| Request::Table { offset: (i * TABLE_CHUNK_BYTES) as u32, bytes: &too_much })
+        .collect();
+    assert_eq!(refusal(&pieces), Refusal::TooLarge);
+    let mut twice = loading(&bytes, ClockSource::Frames);
+    twice.push(begin(&bytes));
+    assert_eq!(refusal(&twice), Refusal::Order);
+}
+
+#[test]
+fn the_board_releases_its_own_steps_without_drift() {
+    // 100 µs per look: about ten looks per period, and the counter wraps.
+    let mut bench = Bench { speed: 100, counter: COUNTER_MASK - 5_000, ..Bench::default() };
+    let bytes = encoded(&table());
+    let mut requests = loading(&bytes, ClockSource::Board);
+    let start_ns = 5_000 * MS;
+    requests.push(Request::Time { tick: 0, time_ns: start_ns });
+    // Empty words on the line keep it open while the board's time goes on.
+    requests.extend(std::iter::repeat_n(Request::Rearm, 400));
+    let replies = answers::<f64>(&mut bench, &requests);
+    let times: Vec<(u64, u64)> = replies
+        .iter()
+        .filter_map(|reply| match reply {
+            Reply::Command { command, .. } => Some((command.tick, command.time_ns)),
+            _ => None,
+        })
+        .collect();
+    assert!(times.len() > 20, "{} steps", times.len());
+    for (tick, time_ns) in times {
+        let due_ns = start_ns + (tick + 1) * MS;
+        assert!((due_ns..due_ns + MS / 2).contains(&time_ns), "tick {tick} at {time_ns}");
+    }
+}
+
+#[test]
+fn the_watchdog_is_served_and_its_proof_test_stops_that() {
+    let mut bench = Bench::default();
+    answers::<f64>(&mut bench, &[Request::Hello, Request::TestWatchdog]);
+    assert!(bench.hung && bench.served > 0);
+}
+
+#[test]
+fn the_last_word_is_a_safe_command_that_moves_nothing() {
+    let mut memory = std::boxed::Box::new(Memory::<f64>::new());
+    let mut reader = FrameReader::new();
+    let arrival = memory.last_word().iter().filter_map(|byte| reader.feed(*byte)).last();
+    assert_eq!(arrival, Some(Arrival::New));
+    let Some(Reply::Command { command, .. }) = reader.message() else { panic!("no command") };
+    assert_eq!((command.state, command.is_valid()), (Mode::Safe as u32, false));
+    assert_eq!(command.faults, Faults::WATCHDOG.bits());
+    assert!(memory.last_word().len() <= 64, "fits where an exception finds it");
+}

@@ -1,0 +1,358 @@
+//! The controller at the end of a serial line: in a thread of this process always, in QEMU where it is installed.
+
+use std::io::{ErrorKind, Read, Write};
+use std::os::unix::net::UnixStream;
+use std::time::Duration;
+
+use firmware::contract::frames::TARGET_VISIBLE;
+use firmware::contract::{Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample};
+use firmware::contract::{Units, Validity};
+use firmware::scalar::ScalarKind;
+use firmware::serial::{Board, Memory, Reply, Request, ResetCause, serve};
+use firmware::{Faults, Inputs, Mode, Settings};
+use host_sim::board::tamper::{Damage, Tamper};
+use host_sim::board::{BoardError, Device, Image, Processor, SerialLine};
+use host_sim::core::encode_as;
+use nalgebra::{Matrix2, Vector2};
+
+const MS: u64 = 1_000_000;
+/// Long against a step, even on a busy machine; short for a test that loses some.
+const PATIENCE: Duration = Duration::from_millis(60);
+
+/// A board in a thread: the device's own code over a socket.
+struct Socket {
+    stream: UnixStream,
+    waiting: std::vec::IntoIter<u8>,
+    closed: bool,
+}
+
+impl Board for Socket {
+    const COUNTER_HZ: u32 = 25_000_000;
+
+    fn read(&mut self) -> Option<u8> {
+        if let Some(byte) = self.waiting.next() {
+            return Some(byte);
+        }
+        let mut buffer = [0; 1024];
+        match self.stream.read(&mut buffer) {
+            Ok(0) => self.closed = true,
+            Ok(count) => self.waiting = Vec::from(&buffer[..count]).into_iter(),
+            Err(error) => self.closed = !matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut),
+        }
+        self.waiting.next()
+    }
+    fn write(&mut self, byte: u8) {
+        let _ = self.stream.write_all(&[byte]);
+    }
+    fn counter(&mut self) -> u32 {
+        0
+    }
+    fn alive(&mut self) {}
+    fn hang(&mut self) {}
+    fn stack_bytes(&self) -> u32 {
+        0
+    }
+    fn is_closed(&self) -> bool {
+        self.closed
+    }
+}
+
+/// A device in a thread, with damage on the way from it.
+fn thread_device(back: Tamper) -> Device {
+    let (host, board) = UnixStream::pair().unwrap();
+    board.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+    std::thread::spawn(move || {
+        let mut board = Socket { stream: board, waiting: Vec::new().into_iter(), closed: false };
+        serve(&mut board, &mut Box::new(Memory::<f64>::new()), ResetCause::PowerOn);
+    });
+    let line = SerialLine::tampered(host.try_clone().unwrap(), host, Tamper::none(), back);
+    Device::connect(line, ScalarKind::F64, None).unwrap()
+}
+
+fn jacobian() -> Matrix2<f64> {
+    Matrix2::new(0.30, 0.05, -0.04, 0.25)
+}
+
+/// Depth 0 to 0.1; without the paddle the target moves sideways by 0.02 per unit of depth.
+fn table() -> Table<f64, 2> {
+    let n = Vector2::new(1.0, 0.0);
+    let slope = -(jacobian().try_inverse().unwrap() * n) * 0.02;
+    let mut table = Table::empty();
+    table.units = Units::default();
+    table.paddle = Paddle {
+        index: 3,
+        segment: [Vector2::new(0.2, 0.3), Vector2::new(0.1, 0.4)],
+        max_displacement: 0.05,
+        max_rate: 0.1,
+    };
+    table.needle_axis = Vector2::new(0.0, -1.0);
+    table.orthogonal = n;
+    table.validity = Validity { depth_start: 0.0, depth_end: 0.1, paddle_displacement: 0.05, needle_speed: 0.2 };
+    table.gains = Gains { loop_gain: 0.25, delay_samples: 1, lambda_max: 1.0 };
+    for i in 0..=10 {
+        let depth = 0.01 * f64::from(i);
+        let axial = Vector2::new(0.0, -0.1 * depth);
+        table
+            .knots
+            .push(Knot {
+                depth,
+                jacobian: jacobian(),
+                paddle_path: slope * depth,
+                paddle_path_slope: slope,
+                target_displacement: axial,
+                target_displacement_slope: Vector2::new(0.0, -0.1),
+                static_target_displacement: axial + n * 0.02 * depth,
+            })
+            .unwrap();
+    }
+    table
+}
+
+fn settings() -> Settings {
+    Settings::new(MS, 20 * MS, 20 * MS)
+}
+
+/// Linear tissue under the needle and the paddle, measured; it pushes a little more than the table knows.
+#[derive(Default)]
+struct Plant {
+    tick: u64,
+    depth: f64,
+    paddle: Vector2<f64>,
+    pending: std::collections::VecDeque<TargetSample>,
+    targets: u32,
+}
+
+impl Plant {
+    const SPEED: f64 = 0.1;
+
+    fn error(&self) -> f64 {
+        (jacobian() * self.paddle).x + 0.025 * self.depth
+    }
+
+    fn sense(&mut self) -> Inputs {
+        let (tick, time_ns) = (self.tick, self.tick * MS);
+        if tick.is_multiple_of(20) {
+            let displacement = [self.error(), -0.1 * self.depth];
+            self.pending.push_back(TargetSample {
+                sequence: self.targets,
+                flags: TARGET_VISIBLE,
+                time_ns,
+                displacement,
+            });
+            self.targets += 1;
+        }
+        let arrived = self.pending.front().is_some_and(|sample| sample.time_ns + 20 * MS <= time_ns);
+        let velocity = if self.depth < 0.1 { Self::SPEED } else { 0.0 };
+        let sequence = tick as u32;
+        self.tick += 1;
+        Inputs {
+            tick,
+            time_ns,
+            needle: Some(NeedleSample { sequence, reserved: 0, time_ns, depth: self.depth, velocity }),
+            target: if arrived { self.pending.pop_front() } else { None },
+            paddle: Some(PaddleSample { sequence, paddle_index: 3, time_ns, displacement: self.paddle.into() }),
+        }
+    }
+
+    /// Without a command the actuator keeps its position.
+    fn act(&mut self, command: Option<&PaddleCommand>) {
+        if let Some(command) = command.filter(|command| command.is_valid()) {
+            self.paddle = command.displacement.into();
+        }
+        self.depth = (self.depth + Self::SPEED * 1e-3).min(0.1);
+    }
+}
+
+/// What came of a run.
+#[derive(Debug)]
+struct Outcome {
+    last: PaddleCommand,
+    lost_ticks: u64,
+    worst_error: f64,
+}
+
+/// Runs the loop for so many ticks; both limits must hold on every command that arrives.
+fn drive(device: &mut Device, plant: &mut Plant, ticks: u64) -> Outcome {
+    let table = table();
+    let step = table.paddle.max_rate * 1e-3;
+    let mut outcome = Outcome { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
+    for _ in 0..ticks {
+        let inputs = plant.sense();
+        let answer = device.step(&inputs, PATIENCE).unwrap();
+        plant.act(answer.as_ref().map(|answer| &answer.command));
+        outcome.worst_error = outcome.worst_error.max(plant.error().abs());
+        let Some(answer) = answer else {
+            outcome.lost_ticks += 1;
+            continue;
+        };
+        let (command, last) = (answer.command, outcome.last);
+        let moved = Vector2::from(command.displacement) - Vector2::from(last.displacement);
+        let elapsed = command.sequence.wrapping_sub(last.sequence).max(1);
+        assert!(Vector2::from(command.displacement).norm() <= table.paddle.max_displacement * (1.0 + 1e-12));
+        if last.is_valid() {
+            assert!(moved.norm() <= f64::from(elapsed) * step * (1.0 + 1e-9), "{last:?} → {command:?}");
+        }
+        outcome.last = command;
+    }
+    outcome
+}
+
+#[test]
+fn a_damaged_line_costs_ticks_and_nothing_else() {
+    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    for (i, damage) in Damage::ALL.into_iter().enumerate() {
+        let mut device = thread_device(Tamper::none());
+        device.begin(&bytes, &settings()).unwrap();
+        let mut plant = Plant::default();
+        assert_eq!(drive(&mut device, &mut plant, 100).last.state, Mode::Run as u32);
+        device.set_tamper(Tamper::new(damage, 40, i as u64));
+        let damaged = drive(&mut device, &mut plant, 300);
+        device.set_tamper(Tamper::none());
+        let healed = drive(&mut device, &mut plant, 200);
+        assert_eq!(healed.last.state, Mode::Run as u32, "{damage:?}: {}", Faults::from_bits(healed.last.faults));
+        assert!(healed.worst_error < 1e-3, "{damage:?}: {}", healed.worst_error);
+
+        let account = device.account().unwrap();
+        assert_eq!(account.ledger.unaccounted(), 0, "{damage:?}");
+        assert_eq!(account.ledger.ticks.due, 600, "{damage:?}");
+        // A frame that lost its last delimiter is complete with the first one of the next: its tick comes late.
+        let late = damaged.lost_ticks - account.ledger.ticks.skipped;
+        assert!(late == 0 || damage == Damage::DropByte, "{damage:?}: {late}");
+        let line = &account.line;
+        assert_eq!(line.frames.unaccounted(), 0, "{damage:?}: {line:?}");
+        let noticed = match damage {
+            Damage::DropByte | Damage::CorruptByte | Damage::DoubleByte | Damage::SwapBytes => line.damaged,
+            Damage::DropFrame => line.frames.missed,
+            Damage::DoubleFrame => line.frames.duplicates,
+            Damage::SwapFrames => line.late(),
+        };
+        assert!(noticed > 0, "{damage:?}: {line:?}");
+        if damage == Damage::DoubleFrame {
+            assert_eq!(damaged.lost_ticks, 0, "doubled frames are taken once");
+        }
+    }
+}
+
+#[test]
+fn lost_commands_leave_the_paddle_where_it_is() {
+    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    for damage in [Damage::CorruptByte, Damage::DropFrame, Damage::DoubleFrame] {
+        // Rare enough, with this seed, that every answer to `begin` comes through.
+        let mut device = thread_device(Tamper::new(damage, 60, 5));
+        device.begin(&bytes, &settings()).unwrap();
+        let mut plant = Plant::default();
+        let outcome = drive(&mut device, &mut plant, 600);
+        assert_eq!(outcome.last.state, Mode::Run as u32, "{damage:?}");
+        assert!(outcome.worst_error < 2e-3, "{damage:?}: {}", outcome.worst_error);
+        assert_eq!(outcome.lost_ticks > 0, damage != Damage::DoubleFrame, "{damage:?}");
+    }
+}
+
+#[test]
+fn a_silent_host_leads_to_hold_and_then_to_safe() {
+    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let mut device = thread_device(Tamper::none());
+    device.begin(&bytes, &settings()).unwrap();
+    let mut plant = Plant::default();
+    let before = drive(&mut device, &mut plant, 100).last;
+    let silent = |device: &mut Device, tick: u64| {
+        let inputs = Inputs { tick, time_ns: tick * MS, ..Inputs::default() };
+        device.step(&inputs, PATIENCE).unwrap().unwrap().command
+    };
+    let hold = silent(&mut device, 110);
+    assert_eq!((hold.state, hold.displacement), (Mode::Hold as u32, before.displacement));
+    let safe = silent(&mut device, 800);
+    assert_eq!((safe.state, safe.displacement), (Mode::Safe as u32, before.displacement));
+    device.tell(Request::Rearm).unwrap();
+    plant.tick = 801;
+    let again = drive(&mut device, &mut plant, 100);
+    assert_eq!(again.last.state, Mode::Run as u32, "{}", Faults::from_bits(again.last.faults));
+}
+
+/// The image in QEMU, or `None` and a word about what is missing. In CI nothing may be missing.
+fn image(scalar: ScalarKind) -> Option<Image> {
+    let image = Image::build(scalar, Processor::Double);
+    let missing = match image {
+        Ok(image) if host_sim::board::Qemu::is_installed() => return Some(image),
+        Ok(_) => BoardError::NoQemu,
+        Err(missing @ BoardError::NoTarget) => missing,
+        Err(other) => panic!("{other}"),
+    };
+    assert!(std::env::var_os("CI_NEEDS_QEMU").is_none(), "{missing}");
+    eprintln!("skipped: the controller on a Cortex-M7 in QEMU was not tested: {missing}");
+    None
+}
+
+fn host_sim(arguments: &[&str]) {
+    let output =
+        std::process::Command::new(assert_cmd::cargo::cargo_bin!("host-sim")).args(arguments).output().unwrap();
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_whole_insertion_on_the_cortex_m7_is_bit_identical() {
+    if image(ScalarKind::F64).and(image(ScalarKind::F32)).is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for scalar in ["f64", "f32"] {
+        let recordings = ["native", "qemu"].map(|hardware| {
+            let out = folder.path().join(format!("{scalar}-{hardware}"));
+            let out = out.to_str().unwrap();
+            let world = ["--tissue", "inclusion", "--insertion-time", "0.6", "--duration", "0.8"];
+            let choice = ["--mode", "lockstep", "--controller", hardware, "--scalar", scalar];
+            host_sim(&[&["run", "--quiet", "--out", out][..], &world, &choice].concat());
+            let recording = format!("{out}/inclusion-dynamic.rec");
+            host_sim(&["replay", &recording]);
+            std::fs::read(recording).unwrap()
+        });
+        assert!(recordings[0] == recordings[1], "{scalar}: the recordings differ");
+    }
+}
+
+#[test]
+fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
+    let Some(image) = image(ScalarKind::F64) else { return };
+    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let mut device = Device::emulate(&image).unwrap();
+    device.begin(&bytes, &settings()).unwrap();
+    let mut plant = Plant::default();
+    assert_eq!(drive(&mut device, &mut plant, 200).last.state, Mode::Run as u32);
+
+    device.tell(Request::TestWatchdog).unwrap();
+    let patience = Duration::from_secs(20);
+    let Some(Reply::Command { command, .. }) = device.hear(patience).unwrap() else { panic!("no last word") };
+    assert_eq!((command.state, command.is_valid()), (Mode::Safe as u32, false));
+    assert_eq!(command.faults, Faults::WATCHDOG.bits());
+    let Some(Reply::Hello(identity)) = device.hear(patience).unwrap() else { panic!("no start") };
+    assert_eq!(identity.reset, ResetCause::Watchdog);
+
+    // Nothing but a new run makes it move, and the first command adopts the position that it finds.
+    let inputs = plant.sense();
+    assert_eq!(device.step(&inputs, PATIENCE).unwrap(), None, "samples are not answered without a run");
+    device.begin(&bytes, &settings()).unwrap();
+    let measured = plant.paddle;
+    let first = drive(&mut device, &mut plant, 1);
+    assert_eq!(Vector2::from(first.last.displacement), measured);
+    assert_eq!(first.last.state, Mode::Hold as u32);
+    assert_eq!(drive(&mut device, &mut plant, 200).last.state, Mode::Run as u32);
+}
+
+#[test]
+fn a_stopped_board_skips_ticks_and_comes_back() {
+    let Some(image) = image(ScalarKind::F64) else { return };
+    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let mut device = Device::emulate(&image).unwrap();
+    device.begin(&bytes, &settings()).unwrap();
+    let mut plant = Plant::default();
+    drive(&mut device, &mut plant, 200);
+    let process = rustix::process::Pid::from_raw(device.process().unwrap() as i32).unwrap();
+    rustix::process::kill_process(process, rustix::process::Signal::STOP).unwrap();
+    let stopped = drive(&mut device, &mut plant, 5);
+    assert_eq!(stopped.lost_ticks, 5, "no command while it is stopped: the actuator keeps its position");
+    rustix::process::kill_process(process, rustix::process::Signal::CONT).unwrap();
+    let after = drive(&mut device, &mut plant, 300);
+    assert_eq!(after.last.state, Mode::Run as u32, "{}", Faults::from_bits(after.last.faults));
+    let account = device.account().unwrap();
+    assert_eq!((account.ledger.unaccounted(), account.ledger.ticks.due), (0, 505));
+}
