@@ -1,6 +1,6 @@
 //! The controller at the end of a serial line: frames, messages, and the device that answers them.
 //!
-//! The [device](device) is ordinary code over the [`device::Board`] trait, so that it is tested on the host; an image
+//! The [device] is ordinary code over the [`device::Board`] trait, so that it is tested on the host; an image
 //! for a microcontroller adds nothing but registers. One host, one device, full duplex:
 //!
 //! ```text

@@ -4,7 +4,7 @@
 //! plant ── shared memory ── bridge ── serial line ── image on a Cortex-M7: firmware::serial::serve
 //! ```
 //!
-//! The [bridge](device::Device) takes the controller's place on the link in shared memory and passes every sample and
+//! The [bridge](Device) takes the controller's place on the link in shared memory and passes every sample and
 //! every command on; time comes from the messages. [`measure`] counts the instructions of the image's steps and holds
 //! them against a budget.
 

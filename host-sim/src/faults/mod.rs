@@ -1,6 +1,6 @@
 //! Every fault of the catalogue, injected by name, with accounts from outside of the controller.
 //!
-//! Rows 1 to 32 run in lockstep on a [`bench`] in virtual time: a [`tissue`] that is linear about the controller's own
+//! Rows 1 to 32 run in lockstep on a [`bench`](mod@bench) in virtual time: a [`tissue`] that is linear about the controller's own
 //! table, the sensors and the actuator of the simulator, and a [`seam`] between sensors and controller where faults act.
 //! Rows 33 to 45 need real processes.
 //!
