@@ -10,6 +10,7 @@ use crate::controller::{ControllerArgs, serve};
 use crate::error::SimError;
 use crate::faults::command::{FaultsArgs, faults};
 use crate::run::{RunArgs, run};
+use crate::stability::command::{StabilityArgs, stability};
 use crate::timing::{TimingArgs, timing};
 use crate::{output, replay};
 
@@ -52,6 +53,9 @@ pub enum Command {
         after_help = "Examples:\n  host-sim faults --out faults\n  host-sim faults --only 16,23 --seed 7\n  nice host-sim faults --only 1 --seeds 4000"
     )]
     Faults(FaultsArgs),
+    /// Where the closed loop stops being stable: simulated beside theory
+    #[command(after_help = "Example: host-sim stability --out stability --quick")]
+    Stability(StabilityArgs),
     /// Runs the controller again on recorded inputs and compares bit by bit
     #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
     Replay {
@@ -87,6 +91,7 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
         Some(Command::Controller(args)) => serve(&args),
         Some(Command::Plant(args)) => plant(&args),
         Some(Command::Timing(args)) => timing(&args).map(drop),
+        Some(Command::Stability(args)) => stability(&args).map(drop),
         Some(Command::Faults(args)) => faults(&args).map(drop),
         Some(Command::Board(args)) => board(&args),
         Some(Command::Replay { recording }) => {

@@ -40,6 +40,7 @@ pub mod result;
 pub mod run;
 pub mod sensors;
 pub mod session;
+pub mod stability;
 pub mod statistics;
 pub mod strategy;
 pub mod summary;
