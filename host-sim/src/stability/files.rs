@@ -72,22 +72,24 @@ const MARKERS: [(Marker, bool); 6] = [
 ];
 const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::DashDot, Dash::Dotted];
 
-/// Three panels of theory and simulation, three without a theory.
+/// Theory beside simulation, tables on other tissue, and rate limits.
 pub(super) fn figure(result: &ClosedLoop) -> Figure {
     let mut panels = vec![boundary_panel(result)];
     if !result.mismatches.is_empty() {
+        let allowed =
+            ReferenceLine { label: "allowed for".into(), at: Place::Y(result.lambda_max), dash: Dash::Dashed };
+        let unstable = ReferenceLine { label: "unstable below".into(), at: Place::Y(1.0), dash: Dash::Dashed };
+        let size = "largest |λ| of J·Ĵ⁻¹";
+        let (plain, included) = (Tissue::Homogeneous, Tissue::Inclusion);
+        let sizes = |title, table, line| mismatch_panel(result, title, size, table, line, &|m| m.largest);
+        panels.push(sizes("Table does not know of the inclusion", plain, allowed.clone()));
+        panels.push(sizes("Table believes in an inclusion", included, allowed));
         panels.push(mismatch_panel(
             result,
-            "Table without the inclusion on tissue with it",
-            "|λ| of J·Ĵ⁻¹, largest",
-            ReferenceLine { label: "allowed for".into(), at: Place::Y(result.lambda_max), dash: Dash::Dashed },
-            &|m| m.largest,
-        ));
-        panels.push(mismatch_panel(
-            result,
-            "What it leaves of the margin",
-            "gain limit / gain",
-            ReferenceLine { label: "unstable below".into(), at: Place::Y(1.0), dash: Dash::Dashed },
+            "… and what that leaves of the margin",
+            "gain limit over gain",
+            included,
+            unstable,
             &|m| m.simulated_margin,
         ));
     }
@@ -134,20 +136,20 @@ fn boundary_panel(result: &ClosedLoop) -> Panel {
 
 /// The middle between the last cell that settles and the first that does not.
 fn simulated_limit(result: &ClosedLoop, boundary: &Boundary) -> f64 {
-    let per_boundary = result.gains();
-    let last = per_boundary[boundary.simulated_cells - 1];
-    per_boundary.get(boundary.simulated_cells).map_or(last, |next| (last * next).sqrt())
+    let gains = result.gains();
+    let last = gains[boundary.simulated_cells - 1];
+    gains.get(boundary.simulated_cells).map_or(last, |next| (last * next).sqrt())
 }
 
 fn mismatch_panel(
     result: &ClosedLoop,
     title: &str,
     label: &str,
+    table: Tissue,
     line: ReferenceLine,
     height: &dyn Fn(&Mismatch) -> f64,
 ) -> Panel {
     let mut paddles: Vec<u32> = result.mismatches.iter().map(|m| m.paddle).collect();
-    paddles.dedup();
     paddles.sort_unstable();
     paddles.dedup();
     let series = paddles
@@ -157,7 +159,7 @@ fn mismatch_panel(
             let points = result
                 .mismatches
                 .iter()
-                .filter(|m| m.paddle == paddle && m.table == Tissue::Homogeneous)
+                .filter(|m| m.paddle == paddle && m.table == table)
                 .map(|m| (m.depth, height(m)))
                 .collect();
             let (marker, filled) = MARKERS[(k + 1) % MARKERS.len()];
