@@ -193,7 +193,8 @@ pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
     let mut entries = Vec::new();
     for integration in METHODS {
         for factor in factors {
-            let setting = base(scene, integration, spacing * factor);
+            // 0.15, not 0.15000000000000002.
+            let setting = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
             entries.push(Entry { parameter: Parameter::Spacing, value: setting.spacing, setting });
         }
         if quick {
