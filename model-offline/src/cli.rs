@@ -11,7 +11,7 @@ use crate::placement::{ModelError, Placement, TissueModel, study};
 use crate::scene::schema::{self, Basis, Essential, Integration};
 use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
-use crate::study::{fit, pareto, stability};
+use crate::study::{fit, pareto, stability, sweep};
 use clap::{Args, Parser, Subcommand};
 use nalgebra::Vector2;
 use std::io::IsTerminal as _;
@@ -135,6 +135,20 @@ enum Command {
         /// Fewer settings.
         #[arg(long)]
         quick: bool,
+        /// Leave the inclusions out: homogeneous tissue.
+        #[arg(long)]
+        without_inclusion: bool,
+        #[command(flatten)]
+        common: Common,
+    },
+    /// What the mesh does to the choice of a paddle: both rankings along a refinement, sweep.csv and sweep.svg.
+    #[command(after_help = "Example:\n  model-offline sweep paper --without-inclusion --out charts")]
+    Sweep {
+        /// Scene file, or the name of a bundled scene.
+        scene: PathBuf,
+        /// Folder for the chart, made if need be.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
         /// Leave the inclusions out: homogeneous tissue.
         #[arg(long)]
         without_inclusion: bool,
@@ -377,6 +391,20 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
         Command::Pareto { scene, out, quick, without_inclusion, common } => {
             let scene = common.scene(&scene, without_inclusion)?;
             pareto(&scene, &out, quick, &common)
+        }
+        Command::Sweep { scene, out, without_inclusion, common } => {
+            let scene = common.scene(&scene, without_inclusion)?;
+            output::make_folder(&out)?;
+            let bar = common.progress(sweep::STEPS);
+            let found = sweep::sweep(&scene, common.threads(), &|| bar.inc(1))?;
+            bar.finish_and_clear();
+            let (csv, svg) = (out.join("sweep.csv"), out.join("sweep.svg"));
+            output::write_whole(&csv, found.csv().as_bytes())?;
+            output::write_whole(&svg, found.svg().as_bytes())?;
+            if !common.quiet {
+                println!("{}\n{}\n{}", found.table(), csv.display(), svg.display());
+            }
+            Ok(())
         }
         Command::Fit { scene: path, tolerance, output, json, without_inclusion, threads, quiet } => {
             let mut scene = Scene::read(&path)?;

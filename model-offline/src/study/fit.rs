@@ -109,7 +109,7 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelEr
     let start = Instant::now();
     let mut rejected = Vec::new();
     let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
-    let (candidate, outcome, verified_error) = discretization(scene, tolerance, &reference, &mut rejected)?;
+    let (candidate, outcome, verified_error) = discretization(scene, tolerance, &reference, REPEATS, &mut rejected)?;
     let error_estimate = worst(&outcome, &reference);
     let model = candidate.build(scene)?;
     let (law, plant, plant_depth, step_us) =
@@ -150,8 +150,8 @@ fn worst(outcome: &Outcome, reference: &Reference) -> f64 {
     outcome.errors.0.max(outcome.errors.1) + reference.open
 }
 
-/// The fastest candidate within the tolerance that the next finer one confirms, with what it measured and how far the
-/// finer one is away; fills `rejected`.
+/// The fastest candidate within the tolerance that the next finer one confirms, with what it measured (best of `repeats`
+/// runs) and how far the finer one is away; fills `rejected`.
 ///
 /// # Errors
 /// [`ModelError::ToleranceNotReached`] when no candidate keeps it.
@@ -159,6 +159,7 @@ pub fn discretization(
     scene: &Scene,
     tolerance: f64,
     reference: &Reference,
+    repeats: u32,
     rejected: &mut Vec<Rejected>,
 ) -> Result<(Candidate, Outcome, f64), ModelError> {
     let mut measured: Vec<(Candidate, Outcome)> = Vec::new();
@@ -170,7 +171,7 @@ pub fn discretization(
     families.sort_by_key(|family| !family.first().is_some_and(Candidate::is_element));
     for family in families {
         for candidate in family {
-            let outcome = match candidate.measure(scene, reference, REPEATS) {
+            let outcome = match candidate.measure(scene, reference, repeats) {
                 Ok(outcome) => outcome,
                 Err(error) => {
                     let reason = format!("does not work: {error}");

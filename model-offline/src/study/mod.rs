@@ -5,3 +5,4 @@ pub mod insertion;
 pub mod pareto;
 mod pareto_chart;
 pub mod stability;
+pub mod sweep;

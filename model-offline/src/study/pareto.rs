@@ -128,12 +128,16 @@ pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Par
 
 fn placement_point(candidate: &Candidate, scene: &Scene, reference: &Reference) -> Point {
     let mut point = Point::new(Job::Placement, *candidate, "linear");
+    let start = std::time::Instant::now();
     match candidate.measure(scene, reference, REPEATS) {
         Ok(outcome) => {
             (point.nodes, point.spacing, point.wall_s) = (outcome.nodes, outcome.spacing, outcome.wall_s);
             (point.error_cm, point.error_static) = outcome.errors;
         }
-        Err(error) => point.failure = Some(error.to_string()),
+        Err(error) => {
+            point.wall_s = start.elapsed().as_secs_f64();
+            point.failure = Some(error.to_string());
+        }
     }
     point
 }

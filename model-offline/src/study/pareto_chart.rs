@@ -71,7 +71,7 @@ fn look(point: &Point, filled: bool) -> (String, Marker, bool) {
         (_, true) => format!("{rule}: graded; nonlinear law"),
         (_, false) => format!("{rule}: uniform; linear law"),
     };
-    (label, marker(integration), filled)
+    (label, marker(integration), filled && integration != Integration::Gauss)
 }
 
 fn by_rule(point: &Point) -> (String, Marker, bool) {

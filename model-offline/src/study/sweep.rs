@@ -1,0 +1,195 @@
+//! What the mesh does to the choice of a paddle: both rankings along a refinement, on uniform and on graded nodes.
+
+use super::candidates::{Candidate, Nodes, rule_name};
+use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
+use crate::placement::ModelError;
+use crate::placement::adaptive::Reference;
+use crate::placement::rest::{RestResponse, rest_responses};
+use crate::placement::study::parallel;
+use crate::scene::schema::{Basis, Integration};
+use crate::scene::{Resolution, Scene};
+use std::fmt::Write as _;
+
+/// Uniform spacings over the scene's own.
+const SPACINGS: [f64; 5] = [1.0, 0.7, 0.5, 0.25, 0.125];
+/// Levels of graded nodes.
+const LEVELS: std::ops::RangeInclusive<i32> = -2..=3;
+/// Distance of the reference's two levels.
+const REFERENCE_SHARE: f64 = 2e-3;
+
+/// One mesh.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// The discretization.
+    pub candidate: Candidate,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Responses of all paddles, in the scene's order; or why there are none.
+    pub responses: Result<Vec<RestResponse>, ModelError>,
+}
+
+/// The rankings along a refinement.
+#[derive(Debug, Clone)]
+pub struct Sweep {
+    scene: Scene,
+    /// Every mesh, method by method from coarse to fine.
+    pub steps: Vec<Step>,
+    /// The continuum limit that they go to.
+    pub reference: Reference,
+}
+
+/// Refines uniform nodes with SCNI, the paper's method, and graded nodes with quadratic triangles.
+///
+/// # Errors
+/// [`ModelError`] when the limit cannot be computed.
+pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Result<Sweep, ModelError> {
+    let base = match scene.discretization.resolution {
+        Resolution::Spacing(h) => h,
+        Resolution::Tolerance(_) | Resolution::Level(_) => 0.1 * scene.outline.area().sqrt(),
+    };
+    let candidate = |integration, nodes| Candidate { integration, basis: Basis::Linear, support: 2.0, nodes };
+    let candidates: Vec<Candidate> = [Integration::Dni, Integration::Scni, Integration::FemT3]
+        .into_iter()
+        .flat_map(|rule| SPACINGS.map(|share| candidate(rule, Nodes::Uniform(base * share))))
+        .chain(LEVELS.map(|level| candidate(Integration::FemT6, Nodes::Graded(level))))
+        .collect();
+    let reference = Reference::compute(scene, REFERENCE_SHARE)?;
+    let steps = parallel(candidates.len(), threads, |k| {
+        let candidate = candidates[k];
+        let model = candidate.build(scene);
+        let nodes = model.as_ref().map_or(0, crate::placement::TissueModel::nodes);
+        let responses = model.and_then(|model| rest_responses(&model));
+        progress();
+        Step { candidate, nodes, responses }
+    });
+    Ok(Sweep { scene: scene.clone(), steps, reference })
+}
+
+/// Number of times [`sweep`] calls its progress function.
+pub const STEPS: u64 = 3 * SPACINGS.len() as u64 + 6;
+
+impl Sweep {
+    fn orthogonal(&self, response: &RestResponse) -> f64 {
+        response.target_per_depth.dot(&self.scene.needle.orthogonal())
+    }
+
+    /// Best paddle as a fixture for small depths, and as an actuator.
+    pub fn optima(&self, responses: &[RestResponse]) -> (u32, u32) {
+        let best = |key: &dyn Fn(&RestResponse) -> f64| {
+            let paddles = self.scene.paddles.iter().zip(responses);
+            paddles.min_by(|a, b| key(a.1).total_cmp(&key(b.1))).map_or(0, |best| best.0.index)
+        };
+        (best(&|r| self.orthogonal(r).abs()), best(&|r| r.controllability_measure))
+    }
+
+    fn rows(&self) -> impl Iterator<Item = (String, String, usize, &[RestResponse])> {
+        let meshes = self.steps.iter().filter_map(|step| {
+            let nodes = match step.candidate.nodes {
+                Nodes::Uniform(h) => format!("uniform {h}"),
+                Nodes::Graded(level) => format!("level {level}"),
+            };
+            let rule = rule_name(step.candidate.integration).to_owned();
+            Some((rule, nodes, step.nodes, step.responses.as_deref().ok()?))
+        });
+        let limit = ("limit".to_owned(), "extrapolated".to_owned(), self.reference.nodes, self.reference.responses());
+        meshes.chain([limit])
+    }
+
+    /// One line per mesh and paddle.
+    pub fn csv(&self) -> String {
+        let mut out = String::from(
+            "integration,mesh,nodes,paddle,controllability_measure,orthogonal_per_depth,best_static,best_dynamic\n",
+        );
+        for (rule, mesh, nodes, responses) in self.rows() {
+            let (fixture, dynamic) = self.optima(responses);
+            for (paddle, response) in self.scene.paddles.iter().zip(responses) {
+                let _ = writeln!(
+                    out,
+                    "{rule},{mesh},{nodes},{},{:.6},{:.6},{},{}",
+                    paddle.index,
+                    response.controllability_measure,
+                    self.orthogonal(response),
+                    paddle.index == fixture,
+                    paddle.index == dynamic
+                );
+            }
+        }
+        out
+    }
+
+    /// Best paddles, mesh by mesh.
+    pub fn table(&self) -> String {
+        let mut out =
+            format!("{:<8} {:<16} {:>7} {:>13} {:>14}\n", "method", "mesh", "nodes", "best fixture", "best actuator");
+        for (rule, mesh, nodes, responses) in self.rows() {
+            let (fixture, dynamic) = self.optima(responses);
+            let _ = writeln!(out, "{rule:<8} {mesh:<16} {nodes:>7} {fixture:>13} {dynamic:>14}");
+        }
+        let _ = writeln!(
+            out,
+            "\nbest fixture by |orthogonal target displacement per depth| at small depth; the limit is good to {:.2} %",
+            100.0 * self.reference.open
+        );
+        out
+    }
+
+    /// Both rankings against the number of nodes: one panel per approach, one line per paddle, the limit at the right.
+    pub fn svg(&self) -> String {
+        const MARKERS: [Marker; 6] =
+            [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond, Marker::TriangleDown, Marker::Plus];
+        let rule = Integration::Scni;
+        let panel = |title: &str, y: &str, key: &dyn Fn(&RestResponse) -> f64| {
+            let mut panel = Panel::new(title, Axis::log("nodes"), Axis::linear(y));
+            for (k, paddle) in self.scene.paddles.iter().enumerate() {
+                let mut points: Vec<(f64, f64)> = self
+                    .steps
+                    .iter()
+                    .filter(|step| step.candidate.integration == rule)
+                    .filter_map(|step| Some((step.nodes as f64, key(&step.responses.as_ref().ok()?[k]))))
+                    .collect();
+                let marker = MARKERS[k % MARKERS.len()];
+                let label = format!("paddle {}", paddle.index);
+                let end = points.last().map_or(1.0, |p| p.0) * 3.0;
+                points.sort_by(|a, b| a.0.total_cmp(&b.0));
+                panel.series.push(Series { line: Some(Dash::Solid), ..Series::scatter(&label, marker, false, points) });
+                let limit = vec![(end, key(&self.reference.responses()[k]))];
+                panel.series.push(Series::scatter("continuum limit", marker, true, limit));
+            }
+            panel
+        };
+        Figure {
+            title: format!("What the mesh decides: {}, {} tissue", self.scene.name, self.scene.tissue()),
+            caption:
+                "SCNI on uniform nodes; filled: continuum limit (quadratic triangles, extrapolated). Lowest is best."
+                    .into(),
+            panels: vec![
+                panel("Fixture, small depth", "|orthogonal displacement| per depth", &|r| self.orthogonal(r).abs()),
+                panel("Actuator", "controllability measure", &|r| r.controllability_measure),
+            ],
+            columns: 2,
+        }
+        .svg()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_static_optimum_of_the_paper_moves_with_the_mesh_and_the_dynamic_one_does_not() {
+        let scene = Scene::bundled("paper").unwrap().without_inclusions();
+        let sweep = sweep(&scene, 2, &|| {}).unwrap();
+        assert_eq!(sweep.optima(sweep.reference.responses()), (2, 3));
+        let scni: Vec<(u32, u32)> = sweep
+            .steps
+            .iter()
+            .filter(|s| s.candidate.integration == Integration::Scni)
+            .map(|s| sweep.optima(s.responses.as_ref().unwrap()))
+            .collect();
+        assert_eq!(scni[0], (4, 3), "at the paper's spacing, the paper's optima");
+        assert!(scni.iter().all(|o| o.1 == 3));
+        assert_eq!(sweep.steps.len() as u64, STEPS);
+        assert_eq!(sweep.csv().lines().count(), 1 + 5 * (sweep.steps.len() + 1));
+    }
+}
