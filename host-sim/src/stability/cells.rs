@@ -41,9 +41,10 @@ pub struct Boundary {
 
 /// The gains of the cells: evenly spaced in the logarithm.
 pub fn gains(quick: bool) -> Vec<f64> {
-    let per_decade = if quick { 16 } else { 40 };
-    // From 0.005, below the least limit of all cells but those that no gain makes stable, to 5, above the largest.
-    (0..=3 * per_decade).map(|i| 0.005 * 10f64.powf(f64::from(i) / f64::from(per_decade))).collect()
+    let per_decade = if quick { 15 } else { 40 };
+    // From 0.002, below the least limit of all cells but those that no gain makes stable (0.0042 at 85°, |λ| = 2 and a
+    // delay of 10), to 5, above the largest.
+    (0..=17 * per_decade / 5).map(|i| 0.002 * 10f64.powf(f64::from(i) / f64::from(per_decade))).collect()
 }
 
 /// What the loop does with this gain and delay when the tissue's Jacobian is `truth` and the table's is `table`.
