@@ -11,6 +11,7 @@ use crate::error::SimError;
 use crate::faults::command::{FaultsArgs, faults};
 use crate::run::{RunArgs, run};
 use crate::stability::command::{StabilityArgs, stability};
+use crate::timing::peer::{PeerArgs, peer};
 use crate::timing::{TimingArgs, timing};
 use crate::{output, replay};
 
@@ -46,8 +47,13 @@ pub enum Command {
     )]
     Plant(Box<PlantArgs>),
     /// Checks the fixed-rate loop against an empty one
-    #[command(after_help = "Example: host-sim timing --rate 1000 --seconds 10 --json timing.json")]
+    #[command(
+        after_help = "Examples:\n  host-sim timing --rate 1000 --seconds 10 --out timing\n  host-sim timing --sweep --cpu 0"
+    )]
     Timing(TimingArgs),
+    /// The other process of `timing`
+    #[command(hide = true)]
+    TimingPeer(PeerArgs),
     /// Injects every fault of the catalogue and accounts for everything
     #[command(
         after_help = "Examples:\n  host-sim faults --out faults\n  host-sim faults --only 16,23 --seed 7\n  nice host-sim faults --only 1 --seeds 4000"
@@ -92,6 +98,7 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
         Some(Command::Plant(args)) => plant(&args),
         Some(Command::Timing(args)) => timing(&args).map(drop),
         Some(Command::Stability(args)) => stability(&args).map(drop),
+        Some(Command::TimingPeer(args)) => peer(&args),
         Some(Command::Faults(args)) => faults(&args).map(drop),
         Some(Command::Board(args)) => board(&args),
         Some(Command::Replay { recording }) => {

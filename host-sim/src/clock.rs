@@ -12,7 +12,7 @@ use thread_priority::{
 const NS_PER_S: u64 = 1_000_000_000;
 
 /// Priority asked for: above ordinary real-time work, below the kernel's own threads.
-const FIFO_PRIORITY: u8 = 80;
+pub const FIFO_PRIORITY: u8 = 80;
 
 /// Time on `CLOCK_MONOTONIC`, ns: the same in every process, never set back.
 pub fn now_ns() -> u64 {
@@ -40,9 +40,14 @@ pub struct Scheduling {
 ///
 /// Pages of the future are not locked: under a limit on locked memory that turns later allocations into failures.
 pub fn request_real_time() -> Scheduling {
+    request_real_time_at(FIFO_PRIORITY)
+}
+
+/// As [`request_real_time`], at this priority; 0: the ordinary policy.
+pub fn request_real_time_at(priority: u8) -> Scheduling {
     let memory_locked = mlockall(MlockAllFlags::CURRENT).is_ok();
     // Refused without the right to it; what was obtained is asked for below.
-    if let Ok(priority) = FIFO_PRIORITY.try_into() {
+    if let (1.., Ok(priority)) = (priority, priority.try_into()) {
         let _ = set_thread_priority_and_policy(
             thread_native_id(),
             ThreadPriority::Crossplatform(priority),

@@ -279,3 +279,8 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     }
     pictures
 }
+
+/// Histograms of loops with bins of 1 µs and logarithmic axes, as one picture.
+pub fn timing_histograms(loops: &[(&str, &crate::result::LoopTiming)]) -> String {
+    sheet(&timing::histograms(loops), 3)
+}

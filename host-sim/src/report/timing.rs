@@ -58,6 +58,17 @@ fn histogram(name: &str, what: &str, distribution: &Distribution, period_us: f64
     chart.finish()
 }
 
+/// Three histograms per loop.
+pub(super) fn histograms(loops: &[(&str, &LoopTiming)]) -> Vec<Drawing> {
+    loops
+        .iter()
+        .flat_map(|(name, timing)| {
+            let period_us = 1e6 / timing.rate_hz;
+            distributions(timing).map(|(what, distribution)| histogram(name, what, distribution, period_us))
+        })
+        .collect()
+}
+
 /// Three histograms per controller.
 pub(super) fn charts(run: &RunResult) -> Vec<Drawing> {
     loops(run)

@@ -1,0 +1,7 @@
+//! See `firmware/tests/entries/mod.rs`, which proptest calls with the same bytes.
+#![no_main]
+
+#[path = "../../tests/entries/mod.rs"]
+mod entries;
+
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| entries::sample_decode(bytes));
