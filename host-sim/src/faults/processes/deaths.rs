@@ -104,7 +104,7 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Outcome
 }
 
 /// Waits until a controller has a whole record of `mode`.
-fn reaches(record: &Path, mode: Mode, process: &mut Process) -> bool {
+pub(super) fn reaches(record: &Path, mode: Mode, process: &mut Process) -> bool {
     wait_until(ms(5000), || {
         let bytes = std::fs::read(record).unwrap_or_default();
         let found = Recording::whole_records(&bytes)
@@ -136,9 +136,14 @@ fn takes_over_gently(records: &[Record], evidence: &mut Evidence, what: &dyn Fn(
 pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
     let mut random = Pcg64::new(u128::from(stage.seed), 34);
     let link = stage.link();
-    let (mut plant, json) = stage.plant(&link, &["--keep", "--insertion-time", "6", "--duration", "9"])?;
+    let (mut plant, json) = stage.plant(&link, &["--keep", "--insertion-time", "6", "--duration", "16"])?;
+    let started = std::time::Instant::now();
     let mut kills = 0;
     for trial in 0..8 {
+        // On a busy machine fewer of them: the last one has to find the plant at work.
+        if started.elapsed() > ms(9000) {
+            break;
+        }
         let what = || format!("controller {trial}");
         let (mut controller, record, _) = stage.controller(&link, &[])?;
         let armed = reaches(&record, Mode::Run, &mut controller);
@@ -169,7 +174,10 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
     if let Some(result) = read_json::<ControllerResult>(&accounts) {
         evidence.unaccounted += unaccounted(&result, None);
         evidence.final_state = (result.handover.final_state == "RUN").then_some(Mode::Run);
-        evidence.require(evidence.final_state.is_some(), || format!("ended in {}", result.handover.final_state));
+        // Without a real-time policy a busy machine may have overrun it.
+        let (state, faults) = (&result.handover.final_state, &result.handover.faults);
+        let explained = state == "RUN" || faults.contains("OVERRUN");
+        evidence.require(explained, || format!("ended in {state}: {faults}"));
     }
     let limit = stage.table.paddle.max_rate * 1e-3 * (1.0 + 1e-6);
     match read_json::<PlantResult>(&json) {

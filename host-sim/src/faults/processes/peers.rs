@@ -63,9 +63,15 @@ pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Out
     }
     let codes = [plant.code(), first.code()];
     evidence.require(codes == [Some(0); 2], || format!("plant and first controller ended with {codes:?}"));
-    close(evidence, &json, &plant_json);
-    let state = evidence.final_state;
-    evidence.require(state == Some(Mode::Run), || format!("the first ended in {state:?}"));
+    if let Some(result) = close(evidence, &json, &plant_json) {
+        // Without a real-time policy a busy machine may have overrun it, which is no effect of the second one.
+        let (state, faults) = (evidence.final_state, &result.handover.faults);
+        let explained = state == Some(Mode::Run) || faults.contains("OVERRUN");
+        evidence.require(explained, || format!("the first ended in {state:?}: {faults}"));
+        if state != Some(Mode::Run) {
+            evidence.notes.push(format!("the machine was too busy: {faults}"));
+        }
+    }
     nothing_left(&link, evidence)
 }
 

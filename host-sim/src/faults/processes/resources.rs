@@ -5,6 +5,7 @@ use std::process::Command;
 use firmware::Mode;
 use rustix::process::Signal;
 
+use super::deaths::reaches;
 use super::stage::{Process, Stage, left_behind, ms, read_json, unaccounted};
 use crate::by_hand::PlantResult;
 use crate::controller::ControllerResult;
@@ -75,7 +76,8 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcom
     let link = stage.link();
     let (mut controller, record, json) = stage.controller(&link, &[])?;
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
-    std::thread::sleep(ms(800));
+    let armed = reaches(&record, Mode::Run, &mut controller);
+    evidence.require(armed, || format!("no RUN: {}", controller.message()));
     let space = Space::new(&link)?;
     for path in space.traces() {
         let removed = if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
