@@ -45,6 +45,8 @@ pub struct ControllerCall<'a> {
     pub depth: f64,
     /// Ticks to keep room for.
     pub capacity: u64,
+    /// Seconds of silence after which it gives the plant up.
+    pub patience_s: f64,
 }
 
 impl ControllerProcess {
@@ -62,6 +64,7 @@ impl ControllerProcess {
             .args(["--controller", call.hardware.name()])
             .args(call.loop_args.to_arguments(call.depth))
             .args(["--capacity", &call.capacity.to_string()])
+            .args(["--patience", &call.patience_s.to_string()])
             .args(["--parent", &std::process::id().to_string()])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())

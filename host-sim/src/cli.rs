@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 
 use crate::board::command::{BoardArgs, board};
 use crate::by_hand::{PlantArgs, plant};
 use crate::controller::{ControllerArgs, serve};
 use crate::error::SimError;
+use crate::export::command::{ExportArgs, export};
+use crate::export::schema::{Subject, schema};
 use crate::faults::command::{FaultsArgs, faults};
 use crate::run::{RunArgs, run};
 use crate::stability::command::{StabilityArgs, stability};
@@ -73,6 +75,30 @@ pub enum Command {
         after_help = "Example:\n  host-sim run --tissue inclusion --mode lockstep --insertion-time 1.5 --out short\n  host-sim board short/inclusion-dynamic.rec --budget firmware/image/budget.toml"
     )]
     Board(BoardArgs),
+    /// Writes a recording as MCAP (Foxglove, Lichtblick) or CSV with a time column (PlotJuggler)
+    #[command(
+        after_help = "Example: host-sim export stillpoint-report/inclusion-dynamic.rec --mcap run.mcap --csv run.csv"
+    )]
+    Export(ExportArgs),
+    /// Prints the JSON Schema of what is written as JSON
+    #[command(after_help = "Example: host-sim schema result > result.schema.json")]
+    Schema {
+        /// What the schema is about
+        #[arg(value_enum, default_value_t)]
+        of: Subject,
+    },
+    /// Prints a completion script for a shell
+    #[command(after_help = "Example: host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim")]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Writes manual pages, one for every command
+    #[command(after_help = "Example: host-sim man man1 && man ./man1/host-sim.1")]
+    Man {
+        /// Directory for the pages
+        directory: PathBuf,
+    },
     /// Makes the report of a finished run again
     #[command(
         after_help = "Examples:\n  host-sim report stillpoint-report\n  host-sim report stillpoint-report --svg-dir figures"
@@ -99,6 +125,22 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
         Some(Command::Timing(args)) => timing(&args).map(drop),
         Some(Command::Stability(args)) => stability(&args).map(drop),
         Some(Command::TimingPeer(args)) => peer(&args),
+        Some(Command::Export(args)) => export(&args),
+        Some(Command::Schema { of }) => {
+            println!("{:#}", schema(of));
+            Ok(())
+        }
+        Some(Command::Completions { shell }) => {
+            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut std::io::stdout());
+            Ok(())
+        }
+        Some(Command::Man { directory }) => {
+            let write = |source| SimError::Write { path: directory.clone(), source };
+            std::fs::create_dir_all(&directory).map_err(write)?;
+            clap_mangen::generate_to(Cli::command(), &directory).map_err(write)?;
+            println!("{}", directory.join("host-sim.1").display());
+            Ok(())
+        }
         Some(Command::Faults(args)) => faults(&args).map(drop),
         Some(Command::Board(args)) => board(&args),
         Some(Command::Replay { recording }) => {
@@ -118,4 +160,21 @@ pub fn execute(cli: Cli) -> Result<(), SimError> {
             Ok(())
         }
     }
+}
+
+/// Commands of the other program of this project, for those who mix them up.
+const ELSEWHERE: [&str; 8] = ["place", "solve", "table", "inspect", "new", "fit", "pareto", "stability"];
+
+/// Reads the command line; ends the process with help, or with what is wrong and what was meant.
+pub fn parse() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let wrong = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
+        // `run` is also what happens without a command: a wrong word is then an argument that is not expected.
+        let word = wrong.or_else(|| error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string));
+        let _ = error.print();
+        if let Some(word) = word.filter(|word| ELSEWHERE.contains(&word.as_str())) {
+            eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
+        }
+        std::process::exit(error.exit_code());
+    })
 }

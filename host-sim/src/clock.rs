@@ -3,6 +3,7 @@
 use rustix::mm::{MlockAllFlags, mlockall};
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, Timespec, clock_gettime};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
@@ -28,7 +29,7 @@ pub fn sleep_until(time_ns: u64) {
 }
 
 /// What the operating system granted.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Scheduling {
     /// Scheduling policy actually obtained, e.g. `SCHED_FIFO priority 80`.
     pub policy: String,

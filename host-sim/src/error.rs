@@ -99,6 +99,10 @@ pub enum SimError {
     /// Shared memory failed.
     #[error(transparent)]
     Link(#[from] LinkError),
+    /// The live view cannot be served.
+    #[error("no live view: {0}")]
+    #[diagnostic(help("choose another --view-port, or leave it away for any free one"))]
+    View(String),
     /// The controller process cannot be started.
     #[error("cannot start the controller process: {0}")]
     Spawn(std::io::Error),

@@ -7,6 +7,9 @@
 //! actuator ←──────────── command ─────────────────────────┘
 //! ```
 //!
+//! Where to begin: [run simulations](guide::run_simulations), [check timing](guide::check_timing),
+//! [precompute tables](model_offline::guide::precompute), [how it works](model_offline::guide::how_it_works).
+//!
 //! Two modes of time, never mixed: in [`lockstep`] it comes from the messages, and the same seed gives the same bytes;
 //! in [`free_run`] both processes follow the machine's steady clock with absolute deadlines. Either way every tick is
 //! [recorded](recorder) and every sample accounted for ([`handover`]). [`run`] puts it together, [`result`] is what
@@ -23,8 +26,10 @@ pub mod controller;
 pub mod core;
 pub mod describe;
 pub mod error;
+pub mod export;
 pub mod faults;
 pub mod free_run;
+pub mod guide;
 pub mod handover;
 pub mod interrupt;
 pub mod link;
@@ -46,4 +51,5 @@ pub mod strategy;
 pub mod summary;
 pub mod timing;
 pub mod tissue_solver;
+pub mod view;
 pub mod world;

@@ -2,10 +2,8 @@
 
 use std::process::ExitCode;
 
-use clap::Parser as _;
-
 fn main() -> ExitCode {
-    let cli = host_sim::cli::Cli::parse();
+    let cli = host_sim::cli::parse();
     // Two processes share one terminal: whose error is it?
     let is_controller = matches!(cli.command, Some(host_sim::cli::Command::Controller(_)));
     match host_sim::cli::execute(cli) {

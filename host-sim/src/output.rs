@@ -61,6 +61,14 @@ fn json(value: &impl Serialize) -> Vec<u8> {
     bytes
 }
 
+/// Writes a file.
+///
+/// # Errors
+/// [`SimError::Write`].
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), SimError> {
+    whole(path, bytes)
+}
+
 /// Writes a text file.
 ///
 /// # Errors
@@ -87,7 +95,9 @@ pub fn write_run(directory: &Path, result: &RunResult, artifacts: Vec<Artifact>)
     let new = temporary.path().join("new");
     std::fs::create_dir(&new).map_err(write_error(&new))?;
     let page = Artifact { name: REPORT_FILE.to_owned(), bytes: report::render(result).into_bytes() };
-    let summary = Artifact { name: RESULT_FILE.to_owned(), bytes: json(result) };
+    // Node positions by the thousand: in one line it is half the size.
+    let compact = serde_json::to_vec(result).expect("results have only plain fields");
+    let summary = Artifact { name: RESULT_FILE.to_owned(), bytes: compact };
     for artifact in artifacts.iter().chain([&page, &summary]) {
         let path = new.join(&artifact.name);
         std::fs::write(&path, &artifact.bytes).map_err(write_error(directory))?;
@@ -127,7 +137,7 @@ pub fn read_run(directory: &Path) -> Result<RunResult, SimError> {
 pub fn rebuild_report(directory: &Path) -> Result<(), SimError> {
     let result = read_run(directory)?;
     let path = directory.join(REPORT_FILE);
-    whole(&path, report::render(&result).as_bytes())
+    whole(&path, report::render_with(&result, &report::Attachments::find(directory)).as_bytes())
 }
 
 /// Writes the charts of a finished run as pictures of their own; returns their paths.

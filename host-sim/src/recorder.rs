@@ -18,13 +18,17 @@
 //! The last record is an end mark with the number of ticks: nothing can be changed, dropped, exchanged or cut off
 //! without breaking the chain. Times of a lockstep recording come from its messages: no clock of the machine is in it.
 
+use std::path::Path;
+
 use firmware::Inputs;
 use firmware::Settings;
 use firmware::contract::PaddleCommand;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::bytes::{Reader, Writer};
+use crate::error::SimError;
 
 mod layout;
 pub mod stream;
@@ -41,7 +45,7 @@ const END_MARK: u32 = u32::from_le_bytes(*b"END.");
 const TICK_MARK: u32 = u32::from_le_bytes(*b"TICK");
 
 /// Whether messages or the machine's clock drive time. Never mixed; every output says which it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum RunMode {
     /// Time comes from the messages: deterministic, as fast as it goes.
@@ -72,6 +76,15 @@ pub struct Header {
     pub settings: Settings,
     /// The controller's table, as encoded.
     pub table: Vec<u8>,
+}
+
+/// Reads and checks a recording file.
+///
+/// # Errors
+/// [`SimError::Read`], [`SimError::Recording`].
+pub fn read_recording(path: &Path) -> Result<Recording, SimError> {
+    let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: path.to_owned(), source })?;
+    Recording::decode(&bytes).map_err(|source| SimError::Recording { path: path.to_owned(), source })
 }
 
 /// What the controller saw and answered in one tick.

@@ -6,7 +6,7 @@ use firmware::contract::PaddleCommand;
 
 use crate::core::AnyTable;
 use crate::error::SimError;
-use crate::recorder::{Recording, RunMode};
+use crate::recorder::{Recording, RunMode, read_recording};
 
 /// A replay without differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,10 +24,7 @@ pub struct Replayed {
 /// # Errors
 /// [`SimError::Read`], [`SimError::Recording`], and as [`replay`].
 pub fn replay_file(path: &Path) -> Result<Replayed, SimError> {
-    let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: path.to_owned(), source })?;
-    let recording =
-        Recording::decode(&bytes).map_err(|source| SimError::Recording { path: path.to_owned(), source })?;
-    replay(&recording, path)
+    replay(&read_recording(path)?, path)
 }
 
 /// Replays a recording; `path` is for messages.

@@ -2,6 +2,7 @@
 //!
 //! Lengths are in the scene's unit, times in the unit that the name ends with.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::clock::Scheduling;
@@ -11,7 +12,7 @@ use crate::recorder::RunMode;
 pub const FORMAT: u32 = 1;
 
 /// A whole run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RunResult {
     /// [`FORMAT`].
     pub format: u32,
@@ -44,7 +45,7 @@ pub struct RunResult {
 }
 
 /// Settings of the simulation.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimulationSettings {
     /// Rate of the loop, Hz.
     pub rate_hz: f64,
@@ -73,7 +74,7 @@ pub struct SimulationSettings {
 }
 
 /// The undeformed scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Geometry {
     /// The body's outline.
     pub outline: Vec<[f64; 2]>,
@@ -96,7 +97,7 @@ pub struct Geometry {
 }
 
 /// A paddle position.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaddleGeometry {
     /// Its index in the scene.
     pub index: u32,
@@ -105,7 +106,7 @@ pub struct PaddleGeometry {
 }
 
 /// The placement study of one tissue.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlacementResult {
     /// `homogeneous` or `inclusion`.
     pub tissue: String,
@@ -124,7 +125,7 @@ pub struct PlacementResult {
 }
 
 /// One paddle in a placement study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaddlePlacement {
     /// Its index in the scene.
     pub index: u32,
@@ -147,7 +148,7 @@ pub struct PaddlePlacement {
 }
 
 /// Strategies on one tissue with one table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseResult {
     /// Tissue of the simulation.
     pub tissue: String,
@@ -162,7 +163,7 @@ pub struct CaseResult {
 }
 
 /// A controller table in short.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TableResult {
     /// SHA-256 of its bytes.
     pub hash: String,
@@ -185,7 +186,7 @@ pub struct TableResult {
 }
 
 /// What was compared. Absent strategies were not asked for.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Strategies {
     /// No paddle.
     pub none: Option<StrategyResult>,
@@ -199,7 +200,7 @@ pub struct Strategies {
 }
 
 /// One simulated insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StrategyResult {
     /// What drove time.
     pub mode: RunMode,
@@ -248,7 +249,7 @@ pub struct StrategyResult {
 }
 
 /// The body at one moment of the insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Frame {
     /// Needle depth, length.
     pub depth: f64,
@@ -257,7 +258,7 @@ pub struct Frame {
 }
 
 /// A recording file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct RecordingResult {
     /// File name.
     pub file: String,
@@ -268,7 +269,7 @@ pub struct RecordingResult {
 }
 
 /// A point of a time series.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SeriesPoint {
     /// Time since the start of the needle, s.
     pub time_s: f64,
@@ -283,7 +284,7 @@ pub struct SeriesPoint {
 }
 
 /// All accounts of one run of the controller.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct LedgerResult {
     /// Needle samples.
     pub needle: StreamResult,
@@ -300,7 +301,7 @@ pub struct LedgerResult {
 }
 
 /// One stream: published = consumed + overwritten + discarded + in flight.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct StreamResult {
     /// Counted by the sender.
     pub published: u64,
@@ -319,7 +320,7 @@ pub struct StreamResult {
 }
 
 /// Ticks: due = RUN + HOLD + SAFE + skipped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct TickResult {
     /// Came due.
     pub due: u64,
@@ -336,7 +337,7 @@ pub struct TickResult {
 }
 
 /// Timing of a loop on the machine's clock.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LoopTiming {
     /// Rate, Hz.
     pub rate_hz: f64,
@@ -359,7 +360,7 @@ pub struct LoopTiming {
 }
 
 /// A distribution of durations, ns.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Distribution {
     /// Number of values.
     pub count: u64,

@@ -23,10 +23,11 @@ use crate::interrupt;
 use crate::plant::ActuatorModel;
 use crate::recorder::RunMode;
 use crate::result::{CaseResult, RunResult, Strategies, TableResult};
-use crate::strategy::{Active, Label, Measured, active, hex, passive};
+use crate::strategy::{Active, Extras, Label, Measured, active, hex, passive};
 use crate::tissue_solver::PlantChoice;
+use crate::view::{Basis, View};
 use crate::world::Simulation;
-use crate::{describe, output};
+use crate::{describe, output, view};
 
 /// Time simulated after the needle has arrived, s: long enough for the feedback to remove what is left.
 const SETTLE_S: f64 = 0.5;
@@ -148,6 +149,19 @@ pub struct RunArgs {
     /// Directory for the report, created whole
     #[arg(long, default_value = "stillpoint-report", value_name = "DIR")]
     pub out: PathBuf,
+    /// Serve a page on this machine's loopback that shows the runs with a controller; afterwards go on inserting under
+    /// the page's knobs until it says finish, or Ctrl-C
+    #[arg(long)]
+    pub view: bool,
+    /// Port of the page [default: any free one]
+    #[arg(long, value_name = "PORT", requires = "view", default_value_t = 0, hide_default_value = true)]
+    pub view_port: u16,
+    /// Also write every controlled insertion as MCAP, for Foxglove and Lichtblick
+    #[arg(long)]
+    pub mcap: bool,
+    /// Also write the body along every insertion as a VTU series with a .pvd, for ParaView
+    #[arg(long)]
+    pub vtu: bool,
     /// Also write the result here, as JSON
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
@@ -157,6 +171,12 @@ pub struct RunArgs {
     /// Threads for placement and for strategies without a controller [default: all processors]
     #[arg(long, value_name = "N")]
     pub threads: Option<usize>,
+}
+
+impl RunArgs {
+    fn extras(&self) -> Extras {
+        Extras { mcap: self.mcap, vtu: self.vtu }
+    }
 }
 
 /// A plant, and what its controller believes.
@@ -202,8 +222,10 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
             Ok((table, bytes))
         })
         .collect::<Result<Vec<_>, SimError>>()?;
+    let view = args.view.then(|| live_view(args, &simulation)).transpose()?;
+    let watched = view.as_ref().map(View::shared);
     let mut artifacts = Vec::new();
-    let passive = studies.passive(&cases, &simulation)?;
+    let passive = studies.passive(&cases, &simulation, args.extras())?;
     let mut results = Vec::new();
     for ((case, (none, fixture)), (table, table_bytes)) in cases.iter().zip(passive).zip(&tables) {
         let mut keep = |measured: Measured| {
@@ -218,7 +240,15 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
                 RunMode::FreeRun => "dynamic-free-run",
             };
             studies.say(&format!("{}: dynamic, {mode}", case.tissue.name()));
-            let controller = Active { program: &program, table, table_bytes, mode, hardware: args.hardware };
+            let controller = Active {
+                program: &program,
+                table,
+                table_bytes,
+                mode,
+                hardware: args.hardware,
+                view: watched,
+                extras: args.extras(),
+            };
             let model = studies.model(case.tissue);
             let progress = || studies.bar.inc(1);
             active(model, &controller, &simulation, &case.label(name), &progress)
@@ -260,7 +290,33 @@ pub fn run(args: &RunArgs) -> Result<RunResult, SimError> {
     if !args.quiet {
         print!("{}", crate::summary::summary(&result, &args.out));
     }
+    if let Some((view, (case, (table, table_bytes)))) = view.as_ref().zip(cases.iter().zip(&tables).next_back()) {
+        let scene = studies.model(case.tissue).scene();
+        let mode = args.mode.unwrap_or(RunMode::Lockstep);
+        let hardware = args.hardware;
+        let basis = Basis { program: &program, scene, table, table_bytes, simulation, mode, hardware };
+        let say = |line: &str| {
+            if !args.quiet {
+                println!("{line}");
+            }
+        };
+        say(&format!("\nGoing on under the knobs of {} (its Finish, or Ctrl-C, ends it)", view.address()));
+        view::insertions(view, &basis, &say)?;
+    }
     Ok(result)
+}
+
+/// Starts the page and says where it is.
+fn live_view(args: &RunArgs, simulation: &Simulation) -> Result<View, SimError> {
+    let loop_args = &simulation.loop_args;
+    let (target_rate, latency) = (loop_args.target_rate, loop_args.latency);
+    let view = View::start(
+        args.view_port,
+        view::Knobs { needle_speed: 1.0, target_rate, latency, noise: 1.0, stiffness: 1.0 },
+    )?;
+    // The one line that even a quiet run must say: without it nobody gets in.
+    println!("Live view: {}", view.address());
+    Ok(view)
 }
 
 /// Refuses a table in other units of length and stress than `expected`.
@@ -394,7 +450,7 @@ impl Studies {
     }
 
     /// `none` and `static` of all cases, on all threads: nothing in them runs in real time.
-    fn passive(&self, cases: &[Case], simulation: &Simulation) -> Result<Vec<Passive>, SimError> {
+    fn passive(&self, cases: &[Case], simulation: &Simulation, extras: Extras) -> Result<Vec<Passive>, SimError> {
         self.say("strategies without a controller");
         let jobs: Vec<(usize, Option<u32>, &str)> = cases
             .iter()
@@ -410,7 +466,7 @@ impl Studies {
             let progress = || self.bar.inc(1);
             let label = cases[i].label(strategy);
             let model = self.model(cases[i].tissue);
-            passive(model, paddle, simulation, &label, &progress)
+            passive(model, paddle, simulation, &label, extras, &progress)
         });
         let mut results: Vec<_> = cases.iter().map(|_| (None, None)).collect();
         for ((i, paddle, _), outcome) in jobs.iter().zip(outcomes) {
@@ -473,7 +529,7 @@ fn progress_bar(steps: u64, quiet: bool) -> ProgressBar {
     } else {
         ProgressDrawTarget::stderr() // Hidden by itself where stderr is no terminal.
     };
-    let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed}  {msg}")
+    let style = ProgressStyle::with_template("{bar:30} {percent:>3} %  {elapsed}, {eta} left  {msg}")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(steps), target).with_style(style)
 }

@@ -1,6 +1,8 @@
 //! One strategy on one tissue: simulated, measured, recorded.
 
+use std::cell::RefCell;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 use firmware::contract::Table;
@@ -12,6 +14,7 @@ use sha2::{Digest, Sha256};
 use crate::child::{ControllerCall, ControllerProcess};
 use crate::core::Hardware;
 use crate::error::SimError;
+use crate::export::{mcap, paraview};
 use crate::handover::Handover;
 use crate::interrupt;
 use crate::link::{Departure, PlantPorts, Space};
@@ -20,10 +23,13 @@ use crate::recorder::{Exchange, Header, Record, Recording, RunMode, Truth};
 use crate::result::{Frame, LedgerResult, LoopTiming, RecordingResult, SeriesPoint, StrategyResult};
 use crate::tissue_solver::{PlantChoice, TissueSolver};
 use crate::world::{Simulation, World, published, waiting_command};
-use crate::{free_run, lockstep};
+use crate::{free_run, lockstep, view};
 
 /// How long the other process may be silent before a run is given up.
 pub const PEER_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// The same for a controller whose plant a page may pause.
+const WATCHED_PATIENCE_S: f64 = 24.0 * 3600.0;
 
 /// Points of a time series in the result.
 const SERIES_POINTS: usize = 500;
@@ -57,11 +63,15 @@ pub struct Label<'a> {
 
 impl Label<'_> {
     fn file(&self, extension: &str) -> String {
+        format!("{}.{extension}", self.stem())
+    }
+
+    fn stem(&self) -> String {
         let Self { tissue, table_tissue, strategy } = self;
         if tissue == table_tissue {
-            format!("{tissue}-{strategy}.{extension}")
+            format!("{tissue}-{strategy}")
         } else {
-            format!("{tissue}-with-{table_tissue}-table-{strategy}.{extension}")
+            format!("{tissue}-with-{table_tissue}-table-{strategy}")
         }
     }
 }
@@ -75,6 +85,7 @@ pub fn passive(
     paddle: Option<u32>,
     simulation: &Simulation,
     label: &Label<'_>,
+    extras: Extras,
     progress: &dyn Fn(),
 ) -> Result<Measured, SimError> {
     let mut world = World::new(model, paddle, simulation)?;
@@ -92,7 +103,20 @@ pub fn passive(
     let mut result = measure(model, &mut world, RunMode::Lockstep, paddle, simulation.seed);
     let csv = Artifact { name: label.file("csv"), bytes: csv(model, &world, &[]) };
     result.csv = Some(csv.name.clone());
-    Ok((result, vec![csv]))
+    let mut artifacts = vec![csv];
+    if extras.vtu {
+        artifacts.extend(paraview::series(model, paddle, world.truths(), 0, &label.stem()));
+    }
+    Ok((result, artifacts))
+}
+
+/// Files for other tools that are not always written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extras {
+    /// Controlled insertions as MCAP.
+    pub mcap: bool,
+    /// The body along insertions as VTU series.
+    pub vtu: bool,
 }
 
 /// The controller of an active strategy.
@@ -108,6 +132,10 @@ pub struct Active<'a> {
     pub mode: RunMode,
     /// What computes the controller's steps.
     pub hardware: Hardware,
+    /// A live view that looks on.
+    pub view: Option<&'a Arc<view::Shared>>,
+    /// Files besides recording and table.
+    pub extras: Extras,
 }
 
 /// The insertion with the controller as a process of its own.
@@ -122,7 +150,8 @@ pub fn active(
     progress: &dyn Fn(),
 ) -> Result<Measured, SimError> {
     let space = Space::unique()?;
-    let outcome = in_space(model, controller, simulation, &space, progress);
+    let title = format!("{}, table of {}: {}", label.tissue, label.table_tissue, label.strategy);
+    let outcome = in_space(model, controller, simulation, &space, title, progress);
     space.leave::<ipc::Service>(Departure::Last);
     let mut run = outcome?;
 
@@ -153,8 +182,18 @@ pub fn active(
     result.ledger = Some(run.ledger);
     result.timing = run.handover.timing;
     result.plant_timing = run.plant_timing;
-    let recording = Artifact { name: label.file("rec"), bytes };
-    Ok((result, vec![csv, recording]))
+    let mut artifacts = vec![csv, Artifact { name: label.file("rec"), bytes }];
+    if controller.extras.mcap {
+        let name = label.file("mcap");
+        let bytes = mcap::encode(&recording, controller.table.orthogonal.into())
+            .map_err(|error| SimError::Write { path: name.clone().into(), source: std::io::Error::other(error) })?;
+        artifacts.push(Artifact { name, bytes });
+    }
+    if controller.extras.vtu {
+        let started_ns = run.world.needle_started_ns().unwrap_or(0);
+        artifacts.extend(paraview::series(model, Some(paddle), run.world.truths(), started_ns, &label.stem()));
+    }
+    Ok((result, artifacts))
 }
 
 struct Run<'m> {
@@ -170,6 +209,7 @@ fn in_space<'m>(
     controller: &Active<'_>,
     simulation: &Simulation,
     space: &Space,
+    title: String,
     progress: &dyn Fn(),
 ) -> Result<Run<'m>, SimError> {
     let table = space.root().join("controller.table");
@@ -185,6 +225,8 @@ fn in_space<'m>(
         loop_args: simulation.loop_args,
         depth: simulation.depth,
         capacity: simulation.ticks(),
+        // A page may hold time as long as it likes.
+        patience_s: if controller.view.is_some() { WATCHED_PATIENCE_S } else { PEER_TIMEOUT.as_secs_f64() },
     })?);
     let mut patience = Patience::new(PEER_TIMEOUT);
     while !ports.has_peer() {
@@ -192,9 +234,19 @@ fn in_space<'m>(
     }
     ports.connect()?;
     let period_ns = simulation.loop_args.period_ns();
+    if let Some(shared) = controller.view {
+        world.watch(view::Watch::new(shared, model, controller.table.paddle.index, controller.mode, title));
+    }
+    let pacing = RefCell::new(view::Pacing::new(period_ns));
+    let held = || {
+        progress();
+        if let Some(shared) = controller.view {
+            shared.hold(&mut pacing.borrow_mut());
+        }
+    };
     let (mut commands, plant_timing) = match controller.mode {
         RunMode::Lockstep => {
-            let account = lockstep::run(&mut world, &mut ports, &mut peer, period_ns, PEER_TIMEOUT, progress)?;
+            let account = lockstep::run(&mut world, &mut ports, &mut peer, period_ns, PEER_TIMEOUT, &held)?;
             (account, None)
         }
         RunMode::FreeRun => {

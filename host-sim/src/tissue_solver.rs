@@ -8,6 +8,7 @@ use model_offline::reduction::{Condensed, TrainingOptions, train};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::SimError;
@@ -39,7 +40,7 @@ pub enum PlantChoice {
 }
 
 /// Which model answered, how often it could not, and how far off it was in the end.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlantAccount {
     /// `full`, `reduced`, or `condensed`.
     pub model: String,
@@ -154,6 +155,19 @@ impl<'m> TissueSolver<'m> {
                     drive(body, depth, paddle)
                 }
             },
+        }
+    }
+
+    /// The coefficients behind the present state, where the model has them (the condensed one has not).
+    pub fn copy_coefficients(&self, into: &mut Vec<f64>) {
+        into.clear();
+        match &self.kind {
+            Kind::Full(body) => into.extend_from_slice(body.equilibrium().coefficients()),
+            Kind::Reduced { full: Some(body), full_answers: true, .. } => {
+                into.extend_from_slice(body.equilibrium().coefficients());
+            }
+            Kind::Reduced { body, .. } => into.extend(body.coefficients()),
+            Kind::Condensed(_) => into.resize(self.model.dofs(), 0.0),
         }
     }
 

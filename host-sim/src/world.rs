@@ -8,6 +8,7 @@ use iceoryx2::service::Service;
 use model_offline::placement::TissueModel;
 use nalgebra::Vector2;
 
+use crate::clock::now_ns;
 use crate::control::LoopArgs;
 use crate::error::SimError;
 use crate::link::{LinkError, PlantPorts};
@@ -15,6 +16,7 @@ use crate::plant::{ActuatorModel, Paddle, Trajectory};
 use crate::recorder::Truth;
 use crate::sensors::{Encoders, TargetSensor};
 use crate::tissue_solver::{PlantAccount, PlantChoice, TissueSolver};
+use crate::view::{Moment, Watch};
 
 /// The controller needs one target sample to arrive; everything longer is a fault of the set-up.
 const LONGEST_WAIT_FOR_RUN_NS: u64 = 2_000_000_000;
@@ -65,6 +67,7 @@ pub struct World<'m> {
     needle_started_ns: Option<u64>,
     truths: Vec<Truth>,
     solving: Duration,
+    watch: Option<Watch>,
 }
 
 impl<'m> World<'m> {
@@ -100,7 +103,13 @@ impl<'m> World<'m> {
             needle_started_ns: None,
             truths: Vec::with_capacity(simulation.ticks() as usize),
             solving: Duration::ZERO,
+            watch: None,
         })
+    }
+
+    /// A view looks on from now.
+    pub fn watch(&mut self, watch: Watch) {
+        self.watch = Some(watch);
     }
 
     /// The needle starts now. It waits for the controller's RUN, or for nobody without a controller.
@@ -123,8 +132,15 @@ impl<'m> World<'m> {
             self.needle_started_ns.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9);
         let (depth, velocity) = self.trajectory.at(since_start_s);
         let before = Instant::now();
+        let began_ns = if self.watch.is_some() { now_ns() } else { 0 };
         let target = self.tissue.step(depth, self.paddle.position())?;
         self.solving += before.elapsed();
+        if let Some(watch) = &mut self.watch {
+            let paddle = self.paddle.position().into();
+            let moment =
+                Moment { tick, time_ns, time_s: since_start_s, depth, target: target.into(), paddle, began_ns };
+            watch.offer(&self.tissue, &moment);
+        }
         self.truths.push(Truth { tick, time_ns, depth, target: target.into(), paddle: self.paddle.position().into() });
         Ok((depth, velocity))
     }
@@ -172,6 +188,7 @@ impl<'m> World<'m> {
     /// Whether everything has been simulated.
     pub fn is_over(&self, time_ns: u64) -> bool {
         self.needle_started_ns.is_some_and(|started_ns| time_ns >= started_ns + self.duration_ns)
+            || self.watch.as_ref().is_some_and(Watch::ends_early)
     }
 
     /// What really happened.

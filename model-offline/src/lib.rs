@@ -15,6 +15,9 @@
 //!    static study, refinement to a tolerance, and the controller's table.
 //! 6. [`output`]: JSON, VTU, SVG, tables; every file whole or not at all.
 //!
+//! Where to begin: [precompute tables](guide::precompute), [how it works](guide::how_it_works), a
+//! [worked example](guide::change_a_material).
+//!
 //! # Example
 //! ```
 //! use model_offline::placement::{TissueModel, place};
@@ -30,6 +33,7 @@
 
 pub mod cli;
 pub mod discretization;
+pub mod guide;
 pub mod mechanics;
 pub mod output;
 pub mod placement;

@@ -4,6 +4,7 @@
 //! drawn here, by a small module of axes and marks (`chart`), and styled by the page, so that they follow light, dark
 //! and print.
 
+mod attachments;
 mod axis;
 mod chart;
 mod insertion;
@@ -17,6 +18,9 @@ mod style;
 mod svg;
 mod timing;
 mod view;
+
+pub use self::attachments::Attachments;
+pub(crate) use self::view::mesh;
 
 #[cfg(test)]
 mod tests;
@@ -76,11 +80,9 @@ fn sentence(run: &RunResult) -> String {
         run.cases.iter().filter_map(|case| case.improvement).filter(|factor| factor.is_finite()).collect();
     let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let high = factors.iter().copied().fold(0.0, f64::max);
-    let range = if plain(low.round()) == plain(high.round()) {
-        plain(low.round())
-    } else {
-        format!("{} to {}", plain(low.round()), plain(high.round()))
-    };
+    // Small factors with a digit behind the point: "1 times smaller" says nothing.
+    let factor = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
+    let range = if factor(low) == factor(high) { factor(low) } else { format!("{} to {}", factor(low), factor(high)) };
     let reduction = if factors.is_empty() {
         String::new()
     } else {
@@ -219,6 +221,12 @@ fn insertion_part(run: &RunResult, cases: &[CaseCharts]) -> Markup {
 
 /// The page.
 pub fn render(run: &RunResult) -> String {
+    render_with(run, &Attachments::default())
+}
+
+/// The page with what other commands have left beside it.
+pub fn render_with(run: &RunResult, attachments: &Attachments) -> String {
+    let attached = attachments.section();
     let surface = scene::Surface::new(run);
     let cases: Vec<CaseCharts> = run.cases.iter().enumerate().map(|(i, case)| case_charts(run, i, case)).collect();
     let parts = [
@@ -245,6 +253,9 @@ pub fn render(run: &RunResult) -> String {
                 main {
                     (head(run))
                     @for (i, content) in parts.iter().enumerate() { (part(i, content)) }
+                    @if let Some(attached) = &attached {
+                        section #attached { h2 { (parts.len() + 1) ". From other commands" } (attached) }
+                    }
                 }
                 script type="application/json" #insertion-data { (PreEscaped(slider::data(run, &surface, &cases))) }
                 script { (PreEscaped(SCRIPT)) }

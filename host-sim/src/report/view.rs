@@ -123,7 +123,12 @@ impl HasPosition for Site {
 
 /// Triangles between nodes that cover the body; none when they cannot be formed.
 pub(super) fn triangles(geometry: &Geometry) -> Vec<[usize; 3]> {
-    let sites = geometry.nodes.iter().enumerate();
+    mesh(&geometry.nodes, &geometry.outline)
+}
+
+/// The same for nodes in an outline.
+pub(crate) fn mesh(nodes: &[[f64; 2]], outline: &[[f64; 2]]) -> Vec<[usize; 3]> {
+    let sites = nodes.iter().enumerate();
     let sites = sites.map(|(index, [x, y])| Site { position: Point2::new(*x, *y), index }).collect();
     let Ok(triangulation) = DelaunayTriangulation::<Site>::bulk_load(sites) else {
         return Vec::new();
@@ -133,7 +138,7 @@ pub(super) fn triangles(geometry: &Geometry) -> Vec<[usize; 3]> {
         .inner_faces()
         .filter(|face| face.area() > smallest)
         .map(|face| face.vertices().map(|vertex| vertex.data().index))
-        .filter(|corners| inside(&geometry.outline, middle(&corners.map(|corner| geometry.nodes[corner]))))
+        .filter(|corners| inside(outline, middle(&corners.map(|corner| nodes[corner]))))
         .collect()
 }
 

@@ -1,6 +1,7 @@
 //! Blocks of a periodic loop: measured from the scheduled release, one after the other.
 
 use firmware::schedule::Schedule;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::machine::Disturbance;
@@ -34,7 +35,7 @@ pub(super) struct Blocks {
 pub(super) type Stamps = Option<(u64, u64)>;
 
 /// Everything about one kind of loop.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BlockResult {
     /// Age of the input when the command was there: command minus measurement.
     pub input_age: Option<Distribution>,

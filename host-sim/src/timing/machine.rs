@@ -1,10 +1,11 @@
 //! What the machine did meanwhile: time that the host took away, context switches, processors.
 
 use rustix::thread::{CpuSet, sched_setaffinity};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Counters of the machine and of the calling thread.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub struct Disturbance {
     /// Time that the host took away, all processors, ms; none where the kernel does not say.
     pub steal_ms: Option<u64>,

@@ -18,6 +18,7 @@ use clap::Args;
 use firmware::contract::{PaddleCommand, Table};
 use firmware::{Controller, Inputs, State};
 use model_offline::placement::table::to_bytes;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::blocks::BlockResult;
@@ -70,7 +71,7 @@ pub struct TimingArgs {
 }
 
 /// Result of `timing`.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TimingResult {
     /// The loop that does nothing. Its execution time is what reading the clock twice costs.
     pub empty: LoopTiming,

@@ -1,0 +1,109 @@
+//! Insertions for the page: one after another under its knobs, until it or a signal asks for the end.
+
+use std::path::Path;
+
+use firmware::contract::Table;
+use model_offline::placement::TissueModel;
+use model_offline::scene::Scene;
+
+use super::{Knobs, View};
+use crate::core::Hardware;
+use crate::error::SimError;
+use crate::recorder::RunMode;
+use crate::result::StrategyResult;
+use crate::strategy::{Active, Extras, Label, active};
+use crate::world::Simulation;
+
+/// What the page's insertions start from.
+#[derive(Clone, Copy, Debug)]
+pub struct Basis<'a> {
+    /// This program, which is also the controller.
+    pub program: &'a Path,
+    /// The scene of the simulation, as the knobs find it.
+    pub scene: &'a Scene,
+    /// What the controller believes; the knobs do not change it.
+    pub table: &'a Table<f64, 2>,
+    /// The same as encoded.
+    pub table_bytes: &'a [u8],
+    /// Settings of the command line.
+    pub simulation: Simulation,
+    /// What drives time.
+    pub mode: RunMode,
+    /// What computes the controller's steps.
+    pub hardware: Hardware,
+}
+
+/// Simulates insertions until the page says finish (or a signal ends the program); one line about each goes to `say`.
+///
+/// # Errors
+/// [`SimError`] of the first insertion that cannot be simulated, except for the signal.
+pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<(), SimError> {
+    let shared = view.shared();
+    shared.allow_restarts();
+    for number in 1_u64.. {
+        shared.started();
+        let knobs = shared.knobs();
+        let (scene, simulation) = under(&knobs, basis);
+        let model = TissueModel::new(&scene)?;
+        let controller = Active {
+            program: basis.program,
+            table: basis.table,
+            table_bytes: basis.table_bytes,
+            mode: basis.mode,
+            hardware: basis.hardware,
+            view: Some(shared),
+            extras: Extras::default(),
+        };
+        let label = Label { tissue: scene.tissue(), table_tissue: basis.table.tissue.as_str(), strategy: "live" };
+        match active(&model, &controller, &simulation, &label, &|| {}) {
+            Ok((result, _)) => say(&line(number, &knobs, &result)),
+            Err(SimError::Interrupted { .. }) => return Ok(()),
+            // A tissue that has no equilibrium any more is something to see, not the end of the view.
+            Err(error @ SimError::Tissue { .. }) => {
+                say(&format!("insertion {number}: {error}"));
+                shared.set_paused(true);
+            }
+            Err(error) => return Err(error),
+        }
+        if shared.is_finished() {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// Scene and simulation as the knobs want them.
+fn under(knobs: &Knobs, basis: &Basis<'_>) -> (Scene, Simulation) {
+    let mut scene = basis.scene.clone();
+    for inclusion in &mut scene.inclusions {
+        inclusion.stiffness *= knobs.stiffness;
+    }
+    let mut simulation = basis.simulation;
+    let settle_s = simulation.duration_s - simulation.insertion_s;
+    simulation.insertion_s /= knobs.needle_speed;
+    simulation.duration_s = simulation.insertion_s + settle_s;
+    let loop_args = &mut simulation.loop_args;
+    loop_args.noise = Some(loop_args.noise_for(simulation.depth) * knobs.noise);
+    // The target sensor is never faster than the loop.
+    loop_args.target_rate = knobs.target_rate.min(loop_args.rate);
+    loop_args.latency = knobs.latency;
+    (scene, simulation)
+}
+
+fn line(number: u64, knobs: &Knobs, result: &StrategyResult) -> String {
+    let Knobs { needle_speed, target_rate, latency, noise, stiffness } = knobs;
+    let mut text = format!(
+        "insertion {number} (needle × {needle_speed}, sensor {target_rate} Hz, {latency} ms, noise × {noise}, \
+         stiffness × {stiffness}): largest error {:.3e}, {}",
+        result.max_orthogonal_error, result.final_state
+    );
+    if let Some(timing) = &result.plant_timing {
+        text += &format!(
+            ", plant step p50 {:.1} µs, p99 {:.1} µs, {} skipped",
+            timing.execution_time.p50_ns as f64 * 1e-3,
+            timing.execution_time.p99_ns as f64 * 1e-3,
+            timing.skipped
+        );
+    }
+    text
+}

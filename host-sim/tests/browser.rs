@@ -1,0 +1,172 @@
+//! Report and live view in a real browser. Says "skipped" where none is installed. With `STILLPOINT_SCREENSHOTS=DIR` the
+//! pictures are kept, to be looked at.
+
+mod webdriver;
+
+use std::io::{BufRead as _, BufReader};
+use std::process::{Child, Command, Stdio};
+
+use serde_json::{Value, json};
+use webdriver::Browser;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_host-sim");
+
+#[test]
+fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report");
+    let arguments = ["run", "--quiet", "--insertion-time", "0.5", "--out"];
+    assert!(Command::new(PROGRAM).args(arguments).arg(&report).status().unwrap().success());
+    std::fs::write(report.join("pareto.svg"), "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\"/>")
+        .unwrap();
+    std::fs::write(report.join("faults.csv"), "id,name\n1,step over budget\n").unwrap();
+    assert!(Command::new(PROGRAM).arg("report").arg(&report).status().unwrap().success());
+    browser.look(1280, 1000, "light");
+    browser.open(&format!("file://{}/report.html", report.display()));
+
+    let sections: Vec<String> = browser
+        .run("return [...document.querySelectorAll('section')].map((s) => s.id + ' ' + s.querySelectorAll('svg.chart').length)")
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v.as_str().unwrap().to_owned())
+        .collect();
+    for (section, charts) in [("scene", 5), ("static", 2), ("controllability", 2), ("insertion", 6), ("timing", 3)] {
+        let found =
+            sections.iter().find_map(|s| s.strip_prefix(&format!("{section} "))).map(|n| n.parse::<usize>().unwrap());
+        assert!(found.is_some_and(|found| found >= charts), "{section}: {sections:?}");
+    }
+    assert_eq!(browser.run("return document.querySelector('#pareto-svg img').naturalWidth"), json!(9));
+    assert_eq!(browser.run("return document.querySelectorAll('#faults-csv tbody tr').length"), json!(1));
+
+    // The slider moves bodies, cursors and its own reading.
+    let state = "return [document.querySelector('#depth-reading').textContent, \
+                 document.querySelector('[data-case=\"0\"] .field polygon').getAttribute('points'), \
+                 document.querySelector('.cursor').getAttribute('x1')]";
+    let before = browser.run(state);
+    browser.run("const s = document.querySelector('#depth-slider'); s.value = 60; s.dispatchEvent(new Event('input'))");
+    let after = browser.run(state);
+    for i in 0..3 {
+        assert_ne!(before[i], after[i], "{i}: {before} {after}");
+    }
+    // Nothing is wider than the window, on a phone either; nothing is fetched.
+    for (width, scheme) in [(1280, "light"), (1280, "dark"), (390, "light")] {
+        browser.look(width, 1000, scheme);
+        let wide = browser.run("return document.documentElement.scrollWidth - document.documentElement.clientWidth");
+        assert!(wide.as_i64().unwrap() <= 1, "{width} px: {wide} px too wide");
+        browser.run("window.scrollTo(0, 0)");
+        browser.picture(&format!("report-{width}-{scheme}.png"));
+        browser.run("document.querySelector('#scene h3').scrollIntoView()");
+        browser.picture(&format!("report-{width}-{scheme}-bodies.png"));
+    }
+    assert_eq!(
+        browser
+            .run("return performance.getEntriesByType('resource').filter((e) => !e.name.startsWith('data:')).length"),
+        json!(0)
+    );
+    assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// Ends the simulation, whatever the test does.
+struct Simulation(Child);
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn live(folder: &std::path::Path) -> (Simulation, String, BufReader<std::process::ChildStdout>) {
+    let mut child = Command::new(PROGRAM)
+        .args(["run", "--view", "--tissue", "inclusion", "--mode", "lockstep", "--insertion-time", "2", "--out"])
+        .arg(folder.join("report"))
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(child.stdout.take().unwrap());
+    let simulation = Simulation(child);
+    let mut line = String::new();
+    said.read_line(&mut line).unwrap();
+    let address = line.trim().strip_prefix("Live view: ").unwrap_or_else(|| panic!("{line}")).to_owned();
+    (simulation, address, said)
+}
+
+#[test]
+fn the_live_view_shows_pauses_steps_and_obeys_its_knobs() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let (mut simulation, address, mut said) = live(folder.path());
+    browser.look(1280, 900, "light");
+    browser.open(&address);
+    browser.wait_for("return window.stillpoint.frames > 20");
+    browser.picture("live-light.png");
+    let painted = "const c = document.querySelector('#body'); \
+                   const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; \
+                   let n = 0; for (let i = 3; i < d.length; i += 4) n += d[i] > 0; return n";
+    assert!(browser.run(painted).as_u64().unwrap() > 10_000, "the body is drawn");
+
+    browser.run("document.querySelector('#pause').click()");
+    browser.wait_for("return window.stillpoint.paused === true || (document.querySelector('#step').click(), false)");
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    let tick = || browser.run("return window.stillpoint.tick").as_u64().unwrap();
+    let before = tick();
+    browser.run("document.querySelector('#step').click()");
+    browser.wait_for(&format!("return window.stillpoint.tick === {}", before + 1));
+    std::thread::sleep(std::time::Duration::from_millis(200));
+    assert_eq!(tick(), before + 1, "paused again after one step");
+    browser.look(390, 844, "dark");
+    browser.picture("live-phone-dark.png");
+    browser.run("document.querySelector('#pace').value = '0'; document.querySelector('#pace').dispatchEvent(new Event('change')); document.querySelector('#pause').click()");
+
+    // Knobs act on insertions after the comparison, and start a new one.
+    browser.wait_for("return document.querySelector('#title').textContent.includes('live')");
+    browser.run("const k = document.querySelector('#knob-stiffness'); k.value = 0; k.dispatchEvent(new Event('input')); k.dispatchEvent(new Event('change'))");
+    browser.wait_for("return window.stillpoint.stiffness === 0.01");
+    assert_eq!(browser.run("return window.stillpoint.errors.length"), json!(0));
+    browser.run("document.querySelector('#finish').click()");
+    assert!(simulation.0.wait().unwrap().success());
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut said, &mut rest).unwrap();
+    assert!(rest.contains("stiffness × 0.01"), "{rest}");
+    assert!(folder.path().join("report/report.html").is_file());
+}
+
+/// The same address without a browser: who may come in, and who may not.
+#[test]
+fn other_hosts_other_origins_and_wrong_tokens_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_simulation, address, _said) = live(folder.path());
+    let agent = ureq::Agent::new_with_config(ureq::Agent::config_builder().http_status_as_error(false).build());
+    let get = |url: &str, header: Option<(&str, &str)>| {
+        let mut request = agent.get(url);
+        if let Some((name, value)) = header {
+            request = request.header(name, value);
+        }
+        request.call().unwrap().status().as_u16()
+    };
+    let wish = |body: &Value, origin: Option<&str>| {
+        let mut request = agent.post(format!("{address}wish"));
+        if let Some(origin) = origin {
+            request = request.header("Origin", origin);
+        }
+        request.send_json(body).unwrap().status().as_u16()
+    };
+    let host = address.strip_prefix("http://").unwrap().split('/').next().unwrap();
+    assert!(host.starts_with("127.0.0.1:"));
+    assert_eq!(get(&address, None), 200);
+    assert_eq!(get(&address, Some(("Host", "stillpoint.example"))), 403, "a name that was rebound to loopback");
+    assert_eq!(get(&address, Some(("Origin", "http://stillpoint.example"))), 403);
+    assert_eq!(get(&format!("http://{host}/"), None), 403);
+    assert_eq!(get(&format!("http://{host}/{}/", "0".repeat(32)), None), 403);
+    assert_eq!(get(&format!("{address}absent"), None), 404);
+    assert_eq!(wish(&json!({ "pause": true }), None), 204);
+    assert_eq!(wish(&json!({ "pause": false }), Some(&format!("http://{host}"))), 204);
+    assert_eq!(wish(&json!({ "pause": true }), Some("http://stillpoint.example")), 403);
+    assert_eq!(wish(&json!({ "pause": true }), Some("null")), 403);
+    assert_eq!(wish(&json!({ "step": 0 }), None), 400);
+    assert_eq!(wish(&json!({ "launch": true }), None), 400);
+    let knobs = json!({ "knobs": { "needle_speed": 1.0, "target_rate": 50.0, "latency": -1.0, "noise": 1.0, "stiffness": 1.0 } });
+    assert_eq!(wish(&knobs, None), 400);
+}

@@ -1,0 +1,128 @@
+//! Files for other tools, read back with readers that are not ours: `mcap`, `meshio` and `jsonschema` from PyPI. Where
+//! they are not installed, that part says "skipped".
+
+use std::path::Path;
+use std::process::Command;
+
+use assert_cmd::Command as Checked;
+
+fn host_sim() -> Checked {
+    Checked::new(env!("CARGO_BIN_EXE_host-sim"))
+}
+
+/// Runs a Python program with a module, in a folder; its output, or none without the module.
+fn python(module: &str, folder: &Path, program: &str) -> Option<String> {
+    let has =
+        Command::new("python3").args(["-c", &format!("import {module}")]).output().is_ok_and(|o| o.status.success());
+    if !has {
+        println!("skipped: no python3 with {module}");
+        return None;
+    }
+    let output = Command::new("python3").args(["-c", program]).current_dir(folder).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+#[test]
+fn a_run_can_be_opened_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = folder.path().join("report");
+    host_sim()
+        .args([
+            "run",
+            "--quiet",
+            "--tissue",
+            "inclusion",
+            "--mode",
+            "lockstep",
+            "--insertion-time",
+            "0.4",
+            "--mcap",
+            "--vtu",
+        ])
+        .arg("--json")
+        .arg(folder.path().join("result.json"))
+        .arg("--out")
+        .arg(&report)
+        .assert()
+        .success();
+
+    // The same recording, exported afterwards, gives the same bytes.
+    let again = folder.path().join("again.mcap");
+    let csv = folder.path().join("again.csv");
+    let recording = report.join("inclusion-dynamic.rec");
+    host_sim().arg("export").arg(&recording).arg("--mcap").arg(&again).arg("--csv").arg(&csv).assert().success();
+    assert!(std::fs::read(&again).unwrap() == std::fs::read(report.join("inclusion-dynamic.mcap")).unwrap());
+    let text = std::fs::read_to_string(&csv).unwrap();
+    let times: Vec<f64> = text.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
+    assert!(times.len() > 800 && times.windows(2).all(|pair| pair[0] < pair[1]), "{} rows", times.len());
+    let columns = text.lines().next().unwrap().split(',').count();
+    assert!(text.lines().all(|line| line.split(',').count() == columns));
+
+    // Every file of the series is there, and its time rises.
+    let pvd = std::fs::read_to_string(report.join("inclusion-dynamic.pvd")).unwrap();
+    let pvd = roxmltree::Document::parse(&pvd).unwrap();
+    let sets: Vec<_> = pvd.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
+    assert_eq!(sets.len(), 21);
+    assert!(sets.iter().all(|set| report.join(set.attribute("file").unwrap()).is_file()));
+    let at = |set: &roxmltree::Node<'_, '_>| set.attribute("timestep").unwrap().parse::<f64>().unwrap();
+    assert!(sets.windows(2).all(|pair| at(&pair[0]) < at(&pair[1])));
+
+    if let Some(said) = python(
+        "mcap",
+        &report,
+        "import json\nfrom mcap.reader import make_reader\n\
+         r = make_reader(open('inclusion-dynamic.mcap', 'rb'), validate_crcs=True)\n\
+         n, last, worst = 0, 0, 0.0\n\
+         for schema, channel, message in r.iter_messages():\n\
+         \x20   assert schema.encoding == 'jsonschema' and channel.message_encoding == 'json'\n\
+         \x20   body = json.loads(message.data)\n\
+         \x20   assert set(json.loads(schema.data)['properties']) == set(body), body\n\
+         \x20   n += 1\n\
+         \x20   if channel.topic == '/truth': worst = max(worst, abs(body['orthogonal_error']))\n\
+         print(n, worst)\n",
+    ) {
+        let (count, worst) = said.trim().split_once(' ').unwrap();
+        assert!(count.parse::<usize>().unwrap() > 3 * times.len(), "{said}");
+        let result: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.path().join("result.json")).unwrap()).unwrap();
+        let ours = result["cases"][0]["strategies"]["dynamic"]["max_orthogonal_error"].as_f64().unwrap();
+        assert!((worst.parse::<f64>().unwrap() - ours).abs() <= 1e-12, "{said} {ours}");
+    }
+    if let Some(said) = python(
+        "meshio",
+        &report,
+        "import meshio, numpy as np\n\
+         m = meshio.read('inclusion-dynamic-020.vtu')\n\
+         u = m.point_data['displacement']\n\
+         assert np.isfinite(u).all() and np.concatenate(m.cell_data['det_f']).min() > 0\n\
+         print(len(m.points), float(np.abs(u[:, 1]).max()))\n",
+    ) {
+        let (points, deepest) = said.trim().split_once(' ').unwrap();
+        assert!(points.parse::<usize>().unwrap() > 100);
+        assert!((deepest.parse::<f64>().unwrap() - 0.1).abs() < 2e-3, "the needle is 0.1 deep: {said}");
+    }
+    let schema = host_sim().args(["schema", "result"]).assert().success();
+    std::fs::write(folder.path().join("schema.json"), &schema.get_output().stdout).unwrap();
+    python(
+        "jsonschema",
+        folder.path(),
+        "import json, jsonschema\njsonschema.validate(json.load(open('result.json')), json.load(open('schema.json')))\n",
+    );
+}
+
+#[test]
+fn completions_manuals_and_schemas_can_be_generated() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish"] {
+        let said = host_sim().args(["completions", shell]).assert().success();
+        assert!(String::from_utf8_lossy(&said.get_output().stdout).contains("replay"), "{shell}");
+    }
+    host_sim().arg("man").arg(folder.path().join("man1")).assert().success();
+    let page = std::fs::read_to_string(folder.path().join("man1/host-sim-run.1")).unwrap();
+    assert!(page.contains("table\\-tissue"), "{page}");
+    for of in ["result", "timing", "mcap"] {
+        let said = host_sim().args(["schema", of]).assert().success();
+        serde_json::from_slice::<serde_json::Value>(&said.get_output().stdout).unwrap();
+    }
+}

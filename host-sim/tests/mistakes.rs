@@ -1,0 +1,74 @@
+//! Twenty wrong things that a newcomer does: each ends with the exit code of bad input, says what and where or what to do,
+//! and writes nothing.
+
+use assert_cmd::Command;
+
+#[test]
+fn twenty_mistakes_of_a_first_day() {
+    let folder = tempfile::tempdir().unwrap();
+    let inside = |name: &str| folder.path().join(name);
+    std::fs::write(inside("notes.txt"), "not a scene").unwrap();
+    std::fs::write(inside("empty.toml"), "").unwrap();
+    std::fs::write(inside("random.rec"), [7; 400]).unwrap();
+    std::fs::write(inside("random.table"), [7; 400]).unwrap();
+    std::fs::create_dir(inside("full")).unwrap();
+    std::fs::write(inside("full/thesis.tex"), "years of work").unwrap();
+    let before = entries(folder.path());
+    // What is typed, and words that the answer must have.
+    let mistakes: &[(&[&str], &[&str])] = &[
+        (&["rnu"], &["rnu", "run"]),
+        (&["place", "paper"], &["place", "model-offline"]),
+        (&["run", "--scene", "absent.toml"], &["absent.toml", "bundled"]),
+        (&["run", "--scene", "notes.txt"], &["notes.txt:1:"]),
+        (&["run", "--scene", "empty.toml"], &["empty", "start from"]),
+        (&["run", "--scene", "full"], &["full", "bundled"]),
+        (&["run", "--rate", "fast"], &["fast", "--rate"]),
+        (&["run", "--rate", "0"], &["--rate must be above 0"]),
+        (&["run", "--rate", "-5"], &["-5"]),
+        (&["run", "--tissue", "bone"], &["bone", "homogeneous"]),
+        (&["run", "--tisue", "inclusion"], &["--tissue"]),
+        (&["run", "--out", "full"], &["full", "another directory"]),
+        (&["run", "--out", "absent/deeper"], &["absent", "does not exist"]),
+        (&["run", "--table", "random.table"], &["random.table"]),
+        (&["run", "--table", "absent.table"], &["absent.table"]),
+        (&["run", "--target-rate", "5000"], &["target sensor is faster than the loop"]),
+        (&["run", "--latency", "100000"], &["latency"]),
+        (&["run", "--view-port", "8080"], &["--view"]),
+        (&["replay", "random.rec"], &["random.rec", "not a recording"]),
+        (&["replay"], &["RECORDING"]),
+        (&["report", "full"], &["result.json"]),
+        (&["export", "random.rec"], &["--mcap"]),
+        (&["controller"], &["--table"]),
+        (&["timing", "--seconds", "0"], &["--seconds must be above 0"]),
+    ];
+    for (typed, words) in mistakes {
+        let assert =
+            Command::new(env!("CARGO_BIN_EXE_host-sim")).args(*typed).current_dir(folder.path()).assert().code(2);
+        let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        println!("$ host-sim {}\n{said}", typed.join(" "));
+        // Wrapped to the terminal: spaces may be line breaks.
+        let flat = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        for word in *words {
+            assert!(flat.contains(word), "host-sim {}: {word:?} is not in\n{said}", typed.join(" "));
+        }
+        assert!(!said.contains("panicked") && !said.contains('\u{1b}'), "no panic, no colours in a pipe: {said}");
+    }
+    assert_eq!(entries(folder.path()), before, "nothing was written");
+}
+
+fn entries(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
+    let mut found: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    found.sort();
+    found
+}
+
+#[test]
+fn every_command_has_an_example_in_its_help() {
+    for command in
+        ["run", "controller", "plant", "timing", "faults", "replay", "report", "export", "schema", "completions", "man"]
+    {
+        let assert = Command::new(env!("CARGO_BIN_EXE_host-sim")).args([command, "--help"]).assert().success();
+        let said = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+        assert!(said.contains("Example") && said.contains(&format!("host-sim {command}")), "{said}");
+    }
+}
