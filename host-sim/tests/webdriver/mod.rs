@@ -7,14 +7,14 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 /// A browser with one window; ended when dropped.
-pub struct Browser {
+pub(crate) struct Browser {
     driver: Child,
     session: String,
 }
 
 impl Browser {
     /// Starts it; none, with a word about it, where it is not installed.
-    pub fn start() -> Option<Self> {
+    pub(crate) fn start() -> Option<Self> {
         let installed = |name: &str| {
             Command::new(name)
                 .arg("--version")
@@ -64,17 +64,17 @@ impl Browser {
     }
 
     /// Opens an address.
-    pub fn open(&self, url: &str) {
+    pub(crate) fn open(&self, url: &str) {
         self.post("/url", &json!({ "url": url }));
     }
 
     /// The value of a script's `return`.
-    pub fn run(&self, script: &str) -> Value {
+    pub(crate) fn run(&self, script: &str) -> Value {
         self.post("/execute/sync", &json!({ "script": script, "args": [] }))
     }
 
     /// Waits until a script returns true.
-    pub fn wait_for(&self, script: &str) {
+    pub(crate) fn wait_for(&self, script: &str) {
         let patience = Instant::now() + Duration::from_secs(120);
         while self.run(script) != json!(true) {
             assert!(Instant::now() < patience, "never: {script}");
@@ -83,7 +83,7 @@ impl Browser {
     }
 
     /// Window size and colour scheme.
-    pub fn look(&self, width: u32, height: u32, scheme: &str) {
+    pub(crate) fn look(&self, width: u32, height: u32, scheme: &str) {
         let command = |cmd: &str, params: Value| {
             self.post("/goog/cdp/execute", &json!({ "cmd": cmd, "params": params }));
         };
@@ -94,7 +94,7 @@ impl Browser {
     }
 
     /// Writes a picture of the window into the directory of `STILLPOINT_SCREENSHOTS`, if there is one.
-    pub fn picture(&self, name: &str) {
+    pub(crate) fn picture(&self, name: &str) {
         let Some(directory) = std::env::var_os("STILLPOINT_SCREENSHOTS") else { return };
         let params = json!({ "cmd": "Page.captureScreenshot", "params": { "format": "png" } });
         let encoded = self.post("/goog/cdp/execute", &params);
@@ -103,7 +103,7 @@ impl Browser {
     }
 
     /// What the console has said as an error or a warning since the last look.
-    pub fn complaints(&self) -> Vec<String> {
+    pub(crate) fn complaints(&self) -> Vec<String> {
         let said = self.post("/se/log", &json!({ "type": "browser" }));
         let lines = said.as_array().cloned().unwrap_or_default();
         lines.iter().filter(|line| line["level"] != "INFO" && line["level"] != "DEBUG").map(Value::to_string).collect()
