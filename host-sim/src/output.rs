@@ -61,6 +61,10 @@ fn json(value: &impl Serialize) -> Vec<u8> {
     bytes
 }
 
+fn compact(value: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(value).expect("results have only plain fields")
+}
+
 /// Writes a file.
 ///
 /// # Errors
@@ -96,8 +100,7 @@ pub fn write_run(directory: &Path, result: &RunResult, artifacts: Vec<Artifact>)
     std::fs::create_dir(&new).map_err(write_error(&new))?;
     let page = Artifact { name: REPORT_FILE.to_owned(), bytes: report::render(result).into_bytes() };
     // Node positions by the thousand: in one line it is half the size.
-    let compact = serde_json::to_vec(result).expect("results have only plain fields");
-    let summary = Artifact { name: RESULT_FILE.to_owned(), bytes: compact };
+    let summary = Artifact { name: RESULT_FILE.to_owned(), bytes: compact(result) };
     for artifact in artifacts.iter().chain([&page, &summary]) {
         let path = new.join(&artifact.name);
         std::fs::write(&path, &artifact.bytes).map_err(write_error(directory))?;
