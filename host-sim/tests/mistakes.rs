@@ -16,7 +16,7 @@ fn twenty_mistakes_of_a_first_day() {
     let before = entries(folder.path());
     // What is typed, and words that the answer must have.
     let mistakes: &[(&[&str], &[&str])] = &[
-        (&["rnu"], &["rnu", "run"]),
+        (&["timming"], &["timming", "similar", "timing"]),
         (&["place", "paper"], &["place", "model-offline"]),
         (&["run", "--scene", "absent.toml"], &["absent.toml", "bundled"]),
         (&["run", "--scene", "notes.txt"], &["notes.txt:1:"]),
