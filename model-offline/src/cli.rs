@@ -11,7 +11,7 @@ use crate::placement::{ModelError, Placement, TissueModel, study};
 use crate::scene::schema::{self, Basis, Essential, Integration};
 use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
-use crate::study::{fit, pareto, stability, sweep};
+use crate::study::{fit, pareto, stability, sweep, table_pareto};
 use clap::{Args, Parser, Subcommand};
 use nalgebra::Vector2;
 use std::io::IsTerminal as _;
@@ -440,6 +440,19 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
     }
 }
 
+/// The comparison of tables, on the scene's own model; where the loop cannot be closed on it, says why and goes on.
+fn pareto_tables(scene: &Scene, out: &Path, common: &Common) -> Result<String, CliError> {
+    let model = adaptive::profile_model(&TissueModel::new(scene)?)?;
+    match table_pareto::compare_tables(&model, common.threads()) {
+        Ok(points) => {
+            output::write_whole(&out.join("pareto_table.csv"), table_pareto::csv(&points).as_bytes())?;
+            output::write_whole(&out.join("pareto_table.svg"), table_pareto::svg(&points, &scene.name).as_bytes())?;
+            Ok(table_pareto::table(&points))
+        }
+        Err(error) => Ok(format!("tables were not compared: {error}\n")),
+    }
+}
+
 fn threads_or_all(threads: Option<usize>) -> usize {
     threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get)).max(1)
 }
@@ -458,8 +471,9 @@ fn pareto(scene: &Scene, out: &Path, quick: bool, common: &Common) -> Result<(),
     let (csv, svg) = (out.join("pareto.csv"), out.join("pareto.svg"));
     output::write_whole(&csv, comparison.csv().as_bytes())?;
     output::write_whole(&svg, comparison.svg(&scene.name, scene.tissue()).as_bytes())?;
+    let tables = pareto_tables(scene, out, common)?;
     if !common.quiet {
-        print!("{}", comparison.table());
+        print!("{}{tables}", comparison.table());
         println!("{}\n{}", csv.display(), svg.display());
     }
     Ok(())

@@ -6,3 +6,4 @@ pub mod pareto;
 mod pareto_chart;
 pub mod stability;
 pub mod sweep;
+pub mod table_pareto;

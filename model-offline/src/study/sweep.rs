@@ -85,7 +85,7 @@ impl Sweep {
     fn rows(&self) -> impl Iterator<Item = (String, String, usize, &[RestResponse])> {
         let meshes = self.steps.iter().filter_map(|step| {
             let nodes = match step.candidate.nodes {
-                Nodes::Uniform(h) => format!("uniform {h}"),
+                Nodes::Uniform(h) => format!("uniform {}", (h * 1e6).round() / 1e6),
                 Nodes::Graded(level) => format!("level {level}"),
             };
             let rule = rule_name(step.candidate.integration).to_owned();
@@ -153,7 +153,7 @@ impl Sweep {
                 points.sort_by(|a, b| a.0.total_cmp(&b.0));
                 panel.series.push(Series { line: Some(Dash::Solid), ..Series::scatter(&label, marker, false, points) });
                 let limit = vec![(end, key(&self.reference.responses()[k]))];
-                panel.series.push(Series::scatter("continuum limit", marker, true, limit));
+                panel.series.push(Series::scatter("", marker, true, limit));
             }
             panel
         };
@@ -181,14 +181,16 @@ mod tests {
         let scene = Scene::bundled("paper").unwrap().without_inclusions();
         let sweep = sweep(&scene, 2, &|| {}).unwrap();
         assert_eq!(sweep.optima(sweep.reference.responses()), (2, 3));
-        let scni: Vec<(u32, u32)> = sweep
-            .steps
-            .iter()
-            .filter(|s| s.candidate.integration == Integration::Scni)
-            .map(|s| sweep.optima(s.responses.as_ref().unwrap()))
-            .collect();
-        assert_eq!(scni[0], (4, 3), "at the paper's spacing, the paper's optima");
-        assert!(scni.iter().all(|o| o.1 == 3));
+        for (rule, coarsest) in [(Integration::Dni, 4), (Integration::Scni, 3), (Integration::FemT3, 4)] {
+            let optima: Vec<(u32, u32)> = sweep
+                .steps
+                .iter()
+                .filter(|s| s.candidate.integration == rule)
+                .map(|s| sweep.optima(s.responses.as_ref().unwrap()))
+                .collect();
+            assert_eq!((optima[0].0, optima[optima.len() - 1].0), (coarsest, 2), "{rule:?}: {optima:?}");
+            assert!(optima.iter().all(|o| o.1 == 3), "{rule:?}: {optima:?}");
+        }
         assert_eq!(sweep.steps.len() as u64, STEPS);
         assert_eq!(sweep.csv().lines().count(), 1 + 5 * (sweep.steps.len() + 1));
     }
