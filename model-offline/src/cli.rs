@@ -12,7 +12,7 @@ use crate::scene::schema::{self, Basis, Essential, Integration};
 use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use crate::study::{fit, pareto, stability, sweep, table_pareto};
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use nalgebra::Vector2;
 use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
@@ -184,6 +184,20 @@ enum Command {
         after_help = "Examples:\n  model-offline new -o my.toml\n  model-offline new --svg outline.svg --size 120 -o my.toml\n  model-offline new --msh body.msh -o my.toml"
     )]
     New(new::NewArgs),
+    /// Prints a completion script for a shell.
+    #[command(
+        after_help = "Example:\n  model-offline completions bash > ~/.local/share/bash-completion/completions/model-offline"
+    )]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Writes manual pages, one for every command.
+    #[command(after_help = "Example:\n  model-offline man man1 && man ./man1/model-offline.1")]
+    Man {
+        /// Directory for the pages.
+        directory: PathBuf,
+    },
     /// JSON Schema of the scene file.
     #[command(after_help = "Example:\n  model-offline schema > scene.schema.json")]
     Schema,
@@ -433,6 +447,17 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             Ok(())
         }
         Command::New(args) => new::new(&args),
+        Command::Completions { shell } => {
+            clap_complete::generate(shell, &mut Cli::command(), "model-offline", &mut std::io::stdout());
+            Ok(())
+        }
+        Command::Man { directory } => {
+            let fail = |source| OutputError { path: directory.clone(), source };
+            std::fs::create_dir_all(&directory).map_err(fail)?;
+            clap_mangen::generate_to(Cli::command(), &directory).map_err(fail)?;
+            println!("{}", directory.join("model-offline.1").display());
+            Ok(())
+        }
         Command::Schema => {
             println!("{}", pretty(&schema::json_schema()));
             Ok(())
@@ -684,4 +709,19 @@ fn solve(
         );
     }
     Ok(())
+}
+
+/// Commands of the other program of this project, for those who mix them up.
+const ELSEWHERE: [&str; 8] = ["run", "controller", "plant", "timing", "faults", "replay", "export", "report"];
+
+/// Reads the command line; ends the process with help, or with what is wrong and what was meant.
+pub fn parse() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let word = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
+        let _ = error.print();
+        if let Some(word) = word.filter(|word| ELSEWHERE.contains(&word.as_str())) {
+            eprintln!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help");
+        }
+        std::process::exit(error.exit_code());
+    })
 }

@@ -1,10 +1,9 @@
 //! `model-offline`: see `model-offline --help`.
 
-use clap::Parser as _;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    match model_offline::cli::run(model_offline::cli::Cli::parse()) {
+    match model_offline::cli::run(model_offline::cli::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();
