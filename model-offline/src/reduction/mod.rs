@@ -5,7 +5,7 @@
 //! - [`online`]: the nonlinear model on a few displacement modes (proper orthogonal decomposition), its energy summed
 //!   over a few weighted integration points (energy-conserving sampling and weighting, Farhat, Avery, Chapman & Cortial
 //!   2014), with an error estimate at every step and a domain that it knows.
-//! - [`train`]: makes one from snapshots of the full model, and measures it on states that it was not trained on.
+//! - [`mod@train`]: makes one from snapshots of the full model, and measures it on states that it was not trained on.
 
 pub mod condensed;
 mod lifting;
