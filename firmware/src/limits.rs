@@ -43,25 +43,29 @@ pub struct Limited<T: Scalar, const D: usize> {
 impl<T: Scalar> Limits<T> {
     /// Admissible position for the wish `displacement`.
     pub fn clamp_position<const D: usize>(&self, displacement: &SVector<T, D>) -> SVector<T, D> {
+        self.nearest(displacement).unwrap_or(*displacement)
+    }
+
+    /// The nearest admissible position; `None` for one that is admissible itself.
+    fn nearest<const D: usize>(&self, displacement: &SVector<T, D>) -> Option<SVector<T, D>> {
         match self.shape {
-            PositionLimit::Norm => shorten(displacement, self.max_displacement),
+            PositionLimit::Norm => shortened(displacement, self.max_displacement),
             PositionLimit::Box => {
                 let half_edge = self.max_displacement / T::of(D as f64).sqrt();
-                displacement.map(|component| bounded(component, -half_edge, half_edge))
+                let inside = displacement.map(|component| bounded(component, -half_edge, half_edge));
+                (inside != *displacement).then_some(inside)
             }
         }
     }
 
     /// The command that goes from `previous` towards `wish` as far as one tick allows; keeps the direction.
     pub fn command<const D: usize>(&self, previous: &SVector<T, D>, wish: &SVector<T, D>) -> Limited<T, D> {
-        let admissible = self.clamp_position(wish);
-        let position_limited = admissible != *wish;
-        let step = admissible - previous;
-        let short_step = shorten(&step, self.max_step);
-        let rate_limited = short_step != step;
+        let nearest = self.nearest(wish);
+        let admissible = nearest.unwrap_or(*wish);
+        let short_step = shortened(&(admissible - previous), self.max_step);
         // Without the rate limit, take the position itself: previous + (wish − previous) would round.
-        let displacement = if rate_limited { previous + short_step } else { admissible };
-        Limited { displacement, position_limited, rate_limited }
+        let displacement = short_step.map_or(admissible, |step| previous + step);
+        Limited { displacement, position_limited: nearest.is_some(), rate_limited: short_step.is_some() }
     }
 
     /// Integral feedback after `correction`, without windup.
@@ -79,30 +83,31 @@ impl<T: Scalar> Limits<T> {
         previous: &SVector<T, D>,
     ) -> SVector<T, D> {
         let wish = feed_forward + integral;
-        let reachable = self.clamp_position(&wish);
-        let pending = reachable - previous;
+        let nearest = self.nearest(&wish);
+        let pending = nearest.unwrap_or(wish) - previous;
         if pending.norm_squared() > self.max_step * self.max_step && pending.dot(correction) > T::zero() {
             return *integral;
         }
         let corrected = wish + correction;
-        let admissible = self.clamp_position(&corrected);
-        if admissible == corrected {
-            return integral + correction;
-        }
-        if reachable == wish {
-            admissible - feed_forward
-        } else if (corrected - admissible).norm_squared() < (wish - reachable).norm_squared() {
-            integral + correction
-        } else {
-            *integral
+        match (nearest, self.nearest(&corrected)) {
+            (_, None) => integral + correction,
+            (None, Some(boundary)) => boundary - feed_forward,
+            (Some(before), Some(after)) if (corrected - after).norm_squared() < (wish - before).norm_squared() => {
+                integral + correction
+            }
+            _ => *integral,
         }
     }
 }
 
-/// `vector`, or its direction with norm `limit` if it is longer.
-fn shorten<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> SVector<T, D> {
+/// The direction of `vector` with norm `limit`; `None` for a vector that is no longer than that, or by rounding only.
+fn shortened<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> Option<SVector<T, D>> {
     // Compared in squares: a square root costs more than all the rest on most microcontrollers.
-    if vector.norm_squared() <= limit * limit { *vector } else { vector * (limit / vector.norm()) }
+    if vector.norm_squared() <= limit * limit {
+        return None;
+    }
+    let short = vector * (limit / vector.norm());
+    (short != *vector).then_some(short)
 }
 
 #[cfg(test)]
