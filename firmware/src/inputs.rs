@@ -40,17 +40,8 @@ impl<S: Copy> Stream<S> {
         faults: &mut Faults,
         check: impl FnOnce(Option<&S>) -> Result<(), Discard>,
     ) -> Option<S> {
-        let missed = ledger.missed;
-        match self.sequence.register(sequence, ledger) {
-            Arrival::New => faults.set_if(Faults::SAMPLE_GAP, ledger.missed > missed),
-            Arrival::Late | Arrival::Stray => {
-                *faults |= Faults::OUT_OF_ORDER;
-                return None;
-            }
-            Arrival::Duplicate => {
-                *faults |= Faults::DUPLICATE;
-                return None;
-            }
+        if !is_new(&mut self.sequence, sequence, ledger, faults) {
+            return None;
         }
         match check(self.accepted.as_ref()) {
             Ok(()) => {
@@ -59,12 +50,36 @@ impl<S: Copy> Stream<S> {
                 Some(sample)
             }
             Err(reason) => {
-                ledger.discard(reason);
-                *faults |= fault_of(reason);
+                refuse(reason, ledger, faults);
                 None
             }
         }
     }
+}
+
+// What does not depend on the kind of sample is there once for all streams.
+
+/// Registers a delivery; enters why it is not a new sample.
+#[inline(never)]
+fn is_new(tracker: &mut SequenceTracker, sequence: u32, ledger: &mut StreamLedger, faults: &mut Faults) -> bool {
+    let missed = ledger.missed;
+    let fault = match tracker.register(sequence, ledger) {
+        Arrival::New => {
+            faults.set_if(Faults::SAMPLE_GAP, ledger.missed > missed);
+            return true;
+        }
+        Arrival::Late | Arrival::Stray => Faults::OUT_OF_ORDER,
+        Arrival::Duplicate => Faults::DUPLICATE,
+    };
+    *faults |= fault;
+    false
+}
+
+/// Enters a refusal.
+#[inline(never)]
+fn refuse(reason: Discard, ledger: &mut StreamLedger, faults: &mut Faults) {
+    ledger.discard(reason);
+    *faults |= fault_of(reason);
 }
 
 /// Fault code that goes with a refusal.
