@@ -103,9 +103,13 @@ impl<T: Scalar> Limits<T> {
 /// The direction of `vector` with norm `limit`; `None` for a vector that is no longer than that, or by rounding only.
 fn shortened<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> Option<SVector<T, D>> {
     // Compared in squares: a square root costs more than all the rest on most microcontrollers.
-    if vector.norm_squared() <= limit * limit {
-        return None;
-    }
+    if vector.norm_squared() <= limit * limit { None } else { cut(vector, limit) }
+}
+
+/// The rest of [`shortened`], which most steps do not need: there once, so that the comparison is cheap.
+#[cold]
+#[inline(never)]
+fn cut<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> Option<SVector<T, D>> {
     let short = vector * (limit / vector.norm());
     (short != *vector).then_some(short)
 }

@@ -26,7 +26,7 @@ const COUNTER_MASK: u32 = (1 << COUNTER_BITS) - 1;
 
 /// What a microcontroller has to provide.
 pub trait Board {
-    /// Rate of the counter, Hz.
+    /// Rate of the counter, Hz; at least 65,536.
     const COUNTER_HZ: u32;
 
     /// A byte from the line, if one has arrived.
@@ -294,10 +294,10 @@ fn keep_newest<S>(kept: &mut Option<S>, sample: S, sequence: impl Fn(&S) -> u32)
 /// The host's time, carried on by the board's counter. Never goes back.
 struct Now {
     counter: u32,
-    /// Whole seconds since the start of the run, ns.
-    whole_ns: u64,
-    /// Counts since then, less than a second's.
-    counts: u64,
+    /// Since the start of the run, ns.
+    board_ns: u64,
+    /// What of it is less than 1 ns, in 2^-[`FRACTION_BITS`] ns.
+    fraction: u64,
     /// Host time minus board time, ns; `None` before the first word of the host.
     offset_ns: Option<i64>,
     /// Board time of the last word of the host, ns.
@@ -305,12 +305,14 @@ struct Now {
     last_ns: u64,
 }
 
+/// Of the time that one count takes.
+const FRACTION_BITS: u32 = 24;
 /// Two crystals may drift apart by one part in this many: 122 ppm. A power of two, which costs no division.
 const DRIFT: u64 = 1 << 13;
 
 impl Now {
     fn new(counter: u32) -> Self {
-        Self { counter, whole_ns: 0, counts: 0, offset_ns: None, told_ns: 0, last_ns: 0 }
+        Self { counter, board_ns: 0, fraction: 0, offset_ns: None, told_ns: 0, last_ns: 0 }
     }
 
     /// Must be called at least once per wrap of the counter. `None` until the host has said the time.
@@ -335,18 +337,19 @@ impl Now {
     }
 
     fn board_ns<B: Board>(&mut self, board: &mut B) -> u64 {
-        const SECOND_NS: u64 = 1_000_000_000;
-        let rate = u64::from(B::COUNTER_HZ.max(1));
+        // A constant, so that no pass of the loop divides. For a rate that does not divide 10⁹ it is rounded, up to 1 GHz
+        // by less than 0.1 ppm: a crystal is not that good.
+        let ns_per_count = const {
+            assert!(B::COUNTER_HZ >= 1 << 16, "a wrap of a slower counter would overflow below");
+            (1_000_000_000 << FRACTION_BITS) / B::COUNTER_HZ as u64
+        };
         let counter = board.counter();
-        self.counts += u64::from(counter.wrapping_sub(self.counter) & COUNTER_MASK);
+        let counts = u64::from(counter.wrapping_sub(self.counter) & COUNTER_MASK);
         self.counter = counter;
-        while self.counts >= rate {
-            self.counts -= rate;
-            self.whole_ns += SECOND_NS;
-        }
-        // A constant with 32 fractional bits, so that no pass of the loop divides. A second's counts times it fit.
-        let ns_per_count = (SECOND_NS << 32) / rate;
-        self.whole_ns + ((self.counts * ns_per_count) >> 32)
+        let elapsed = self.fraction + counts * ns_per_count;
+        self.board_ns += elapsed >> FRACTION_BITS;
+        self.fraction = elapsed % (1 << FRACTION_BITS);
+        self.board_ns
     }
 }
 
