@@ -46,16 +46,21 @@ impl<T: Scalar> Limits<T> {
         self.nearest(displacement).unwrap_or(*displacement)
     }
 
-    /// The nearest admissible position; `None` for one that is admissible itself.
+    /// The nearest admissible position; `None` for one that is admissible itself. Inlined, as [`shortened`] is: passing a
+    /// position through memory takes longer than finding that it is admissible.
+    #[inline(always)]
     fn nearest<const D: usize>(&self, displacement: &SVector<T, D>) -> Option<SVector<T, D>> {
         match self.shape {
             PositionLimit::Norm => shortened(displacement, self.max_displacement),
-            PositionLimit::Box => {
-                let half_edge = self.max_displacement / T::of(D as f64).sqrt();
-                let inside = displacement.map(|component| bounded(component, -half_edge, half_edge));
-                (inside != *displacement).then_some(inside)
-            }
+            PositionLimit::Box => self.nearest_in_box(displacement),
         }
+    }
+
+    #[inline(never)]
+    fn nearest_in_box<const D: usize>(&self, displacement: &SVector<T, D>) -> Option<SVector<T, D>> {
+        let half_edge = self.max_displacement / T::of(D as f64).sqrt();
+        let inside = displacement.map(|component| bounded(component, -half_edge, half_edge));
+        (inside != *displacement).then_some(inside)
     }
 
     /// The command that goes from `previous` towards `wish` as far as one tick allows; keeps the direction.
@@ -101,17 +106,21 @@ impl<T: Scalar> Limits<T> {
 }
 
 /// The direction of `vector` with norm `limit`; `None` for a vector that is no longer than that, or by rounding only.
+#[inline(always)]
 fn shortened<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> Option<SVector<T, D>> {
     // Compared in squares: a square root costs more than all the rest on most microcontrollers.
-    if vector.norm_squared() <= limit * limit { None } else { cut(vector, limit) }
+    let squared = vector.norm_squared();
+    if squared <= limit * limit { None } else { cut(vector, squared, limit) }
 }
 
 /// The rest of [`shortened`], which most steps do not need: there once, so that the comparison is cheap.
 #[cold]
 #[inline(never)]
-fn cut<T: Scalar, const D: usize>(vector: &SVector<T, D>, limit: T) -> Option<SVector<T, D>> {
-    let short = vector * (limit / vector.norm());
-    (short != *vector).then_some(short)
+fn cut<T: Scalar, const D: usize>(vector: &SVector<T, D>, squared: T, limit: T) -> Option<SVector<T, D>> {
+    let factor = limit / squared.sqrt();
+    let short = vector.map(|component| component * factor);
+    // As slices: matrices compare with more code than all the rest here.
+    (short.as_slice() != vector.as_slice()).then_some(short)
 }
 
 #[cfg(test)]
