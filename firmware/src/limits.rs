@@ -163,6 +163,16 @@ mod tests {
 
     proptest! {
         #[test]
+        fn what_is_cut_differs_and_the_rest_is_left_alone(angle in 0.0..6.3f64, limit in 0.1..10.0f64, ulps in -9..9i32) {
+            // A few rounding errors around the limit, where a longer vector may be cut to itself.
+            let norm = limit * (1.0 + f64::from(ulps) * f64::EPSILON);
+            let vector = Vector2::new(norm * libm::cos(angle), norm * libm::sin(angle));
+            let longer = vector.norm_squared() > limit * limit;
+            let expected = if longer { vector * (limit / vector.norm()) } else { vector };
+            prop_assert_eq!(shortened(&vector, limit), (expected != vector).then_some(expected));
+        }
+
+        #[test]
         fn both_limits_hold_for_any_wish(
             start in (-0.7..0.7f64, -0.7..0.7f64),
             wishes in prop::collection::vec((-1e3..1e3f64, -1e3..1e3f64), 1..50),
