@@ -3,6 +3,7 @@
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rerun-if-changed=image/memory.x");
+    println!("cargo:rerun-if-changed=image/device.x");
     let is_set = |name: &str| std::env::var_os(name).is_some();
     let bare_metal = std::env::var("CARGO_CFG_TARGET_OS").is_ok_and(|os| os == "none");
     if is_set("CARGO_FEATURE_IMAGE") && bare_metal {

@@ -194,7 +194,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
         faults: &mut Faults,
     ) {
         let runtime = &self.runtime;
-        let (Some(previous), Some(needle)) = (state.displacement, state.needle.accepted) else {
+        let (Some(previous), Some(needle)) = (state.displacement, &state.needle.accepted) else {
             return;
         };
         // Where the needle will be when the command acts.
@@ -210,7 +210,8 @@ impl<'t, T: Scalar> Controller<'t, T> {
             let n = &self.table.orthogonal;
             let error = n.dot(&from_frame(&sample.displacement));
             let direction = runtime.direction.solve(&location.jacobian(), n);
-            let correction = direction * (-runtime.gain * error);
+            let change = -runtime.gain * error;
+            let correction = direction.map(|component| component * change);
             // Measured while the paddle was on its way at full rate: what is asked for once more may be there already.
             let repeats = state.underway.is_some_and(|underway| underway.explains(sample.time_ns, &correction));
             let corrected = if repeats {
@@ -229,7 +230,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
         }
 
         let limited = runtime.limits.command(&previous, &(feed_forward + integral));
-        if !limited.displacement.iter().all(|component| component.to_f64().is_finite()) {
+        if !to_frame(&limited.displacement).iter().all(|component| component.is_finite()) {
             *faults |= Faults::INTERNAL;
             return;
         }

@@ -1,6 +1,7 @@
 //! Settings and table, built once into the numbers that a step uses.
 
 use crate::contract::Table;
+use crate::inputs::seconds;
 use crate::law::Direction;
 use crate::limits::Limits;
 use crate::scalar::Scalar;
@@ -62,6 +63,8 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) following_error: f64,
     /// Rate limit of the paddle, length/s.
     pub(crate) paddle_rate: f64,
+    /// Until a command shows in a measured position, s.
+    pub(crate) unseen_delay: f64,
 }
 
 impl<T: Scalar> Runtime<T> {
@@ -83,7 +86,7 @@ impl<T: Scalar> Runtime<T> {
         let following_error = settings.following_error.unwrap_or(FOLLOWING_FRACTION * max_displacement);
         check("following error", "finite and positive", following_error.is_finite() && following_error > 0.0)?;
 
-        let loop_period = settings.loop_period_ns as f64 * 1e-9;
+        let loop_period = seconds(settings.loop_period_ns);
         let loop_age = AgeLimits {
             hold_ns: TICKS_TO_HOLD * settings.loop_period_ns,
             safe_ns: SAFE_AGE_FLOOR_NS.max(10 * TICKS_TO_HOLD * settings.loop_period_ns),
@@ -107,7 +110,7 @@ impl<T: Scalar> Runtime<T> {
             loop_period_ns: settings.loop_period_ns,
             actuator_delay_ns: settings.actuator_delay_ns,
             delay_samples,
-            target_period: settings.target_period_ns as f64 * 1e-9,
+            target_period: seconds(settings.target_period_ns),
             target_noise: noise,
             needle_age: loop_age,
             target_age,
@@ -121,6 +124,7 @@ impl<T: Scalar> Runtime<T> {
             jacobian_norm: bounds.jacobian_norm,
             following_error,
             paddle_rate: table.paddle.max_rate.to_f64(),
+            unseen_delay: seconds(settings.actuator_delay_ns.saturating_add(settings.loop_period_ns)),
         })
     }
 }
@@ -128,8 +132,7 @@ impl<T: Scalar> Runtime<T> {
 impl<T: Scalar> Runtime<T> {
     /// What the command may have moved since a measured position of this age (s) was asked for, length.
     pub(crate) fn unseen_motion(&self, age: f64) -> f64 {
-        let delay = self.actuator_delay_ns.saturating_add(self.loop_period_ns) as f64 * 1e-9;
-        self.paddle_rate * (age + delay)
+        self.paddle_rate * (age + self.unseen_delay)
     }
 }
 

@@ -6,6 +6,21 @@
 
 use core::num::NonZeroU64;
 
+/// `dividend / divisor`, bit by bit: the compiler's division of 64 bits would take 0.9 KB of a microcontroller's flash.
+/// As many rounds as the quotient has bits, usually none.
+pub(crate) const fn quotient(dividend: u64, divisor: NonZeroU64) -> u64 {
+    let (mut quotient, mut rest) = (0, dividend);
+    let mut bit = (divisor.leading_zeros() + 1).saturating_sub(dividend.leading_zeros());
+    while bit > 0 {
+        bit -= 1;
+        if rest >> bit >= divisor.get() {
+            rest -= divisor.get() << bit;
+            quotient |= 1 << bit;
+        }
+    }
+    quotient
+}
+
 /// Minimum, maximum and mean of a duration, ns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DurationStatistics {
@@ -48,13 +63,61 @@ pub struct Release {
     pub release_lateness_ns: u64,
 }
 
-/// Periodic schedule in absolute time.
+/// Releases of a periodic loop in absolute time, without accounts: what a device needs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Schedule {
-    /// Not zero by type: dividing by it cannot panic.
+pub struct Releases {
     period_ns: NonZeroU64,
     tick: u64,
     next_release_ns: u64,
+}
+
+impl Releases {
+    /// Releases of which the first is due at `first_release_ns`. A period of 0 is taken as 1 ns.
+    pub fn new(first_release_ns: u64, period_ns: u64) -> Self {
+        Self {
+            period_ns: NonZeroU64::new(period_ns).unwrap_or(NonZeroU64::MIN),
+            tick: 0,
+            next_release_ns: first_release_ns,
+        }
+    }
+
+    /// Number of the next release since the start, skipped ones included.
+    pub const fn tick(&self) -> u64 {
+        self.tick
+    }
+
+    /// When to wake up next, ns.
+    pub const fn next_release_ns(&self) -> u64 {
+        self.next_release_ns
+    }
+
+    /// The loop has woken up at `now_ns` and starts its step. Waking up whole periods late (a stopped process) skips
+    /// these; returns how many.
+    pub fn begin(&mut self, now_ns: u64) -> u64 {
+        let late_periods = quotient(now_ns.saturating_sub(self.next_release_ns), self.period_ns);
+        self.advance(late_periods);
+        late_periods
+    }
+
+    /// The step has ended at `now_ns`; returns how many periods are skipped before the next release.
+    pub fn finish(&mut self, now_ns: u64) -> u64 {
+        self.advance(1);
+        let past_ns = now_ns.saturating_sub(self.next_release_ns);
+        let skipped = quotient(past_ns.saturating_add(self.period_ns.get() - 1), self.period_ns);
+        self.advance(skipped);
+        skipped
+    }
+
+    fn advance(&mut self, periods: u64) {
+        self.tick = self.tick.saturating_add(periods);
+        self.next_release_ns = self.next_release_ns.saturating_add(periods.saturating_mul(self.period_ns.get()));
+    }
+}
+
+/// Periodic schedule in absolute time, with accounts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Schedule {
+    releases: Releases,
     started_ns: u64,
     skipped: u64,
     overruns: u64,
@@ -71,9 +134,7 @@ impl Schedule {
     /// A schedule whose tick 0 is due at `first_release_ns`. A period of 0 is taken as 1 ns.
     pub fn new(first_release_ns: u64, period_ns: u64) -> Self {
         Self {
-            period_ns: NonZeroU64::new(period_ns).unwrap_or(NonZeroU64::MIN),
-            tick: 0,
-            next_release_ns: first_release_ns,
+            releases: Releases::new(first_release_ns, period_ns),
             started_ns: first_release_ns,
             skipped: 0,
             overruns: 0,
@@ -86,7 +147,7 @@ impl Schedule {
 
     /// When to wake up next, ns.
     pub const fn next_release_ns(&self) -> u64 {
-        self.next_release_ns
+        self.releases.next_release_ns()
     }
 
     /// Periods that never started.
@@ -107,47 +168,47 @@ impl Schedule {
     /// The loop has woken up at `now_ns` and starts its step. Waking up whole periods late (a stopped process) skips
     /// these.
     pub fn begin(&mut self, now_ns: u64) -> Release {
-        let late_periods = now_ns.saturating_sub(self.next_release_ns) / self.period_ns;
-        if late_periods > 0 {
-            self.overruns += 1;
-            self.skip(late_periods);
-        }
+        let late_periods = self.releases.begin(now_ns);
+        self.count_skipped(late_periods);
         self.started_ns = now_ns;
-        let release_lateness_ns = now_ns.saturating_sub(self.next_release_ns);
+        let release_ns = self.next_release_ns();
+        let release_lateness_ns = now_ns.saturating_sub(release_ns);
         self.release_lateness.record(release_lateness_ns);
-        Release { tick: self.tick, release_ns: self.next_release_ns, release_lateness_ns }
+        Release { tick: self.releases.tick(), release_ns, release_lateness_ns }
     }
 
     /// The step has ended at `now_ns`; returns how many periods are skipped before the next release.
     pub fn finish(&mut self, now_ns: u64) -> u64 {
-        let response_ns = now_ns.saturating_sub(self.next_release_ns);
+        let response_ns = now_ns.saturating_sub(self.next_release_ns());
         self.execution_time.record(now_ns.saturating_sub(self.started_ns));
         self.response_time.record(response_ns);
-        self.deadline_misses += u64::from(response_ns > self.period_ns.get());
-        self.advance(1);
-        let past_ns = now_ns.saturating_sub(self.next_release_ns);
-        let skipped = past_ns.saturating_add(self.period_ns.get() - 1) / self.period_ns;
-        if skipped > 0 {
-            self.overruns += 1;
-            self.skip(skipped);
-        }
+        self.deadline_misses += u64::from(response_ns > self.releases.period_ns.get());
+        let skipped = self.releases.finish(now_ns);
+        self.count_skipped(skipped);
         skipped
     }
 
-    fn skip(&mut self, periods: u64) {
+    fn count_skipped(&mut self, periods: u64) {
+        self.overruns += u64::from(periods > 0);
         self.skipped = self.skipped.saturating_add(periods);
-        self.advance(periods);
-    }
-
-    fn advance(&mut self, periods: u64) {
-        self.tick = self.tick.saturating_add(periods);
-        self.next_release_ns = self.next_release_ns.saturating_add(periods.saturating_mul(self.period_ns.get()));
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn quotients_are_those_of_the_compiler(a: u64, b: u64, right_a in 0..64u32, right_b in 0..64u32) {
+            for (a, b) in [(a >> right_a, b >> right_b), (u64::MAX >> right_a, 1 << right_b), (0, b), (u64::MAX, b)] {
+                let divisor = NonZeroU64::new(b).unwrap_or(NonZeroU64::MIN);
+                prop_assert_eq!(quotient(a, divisor), a / divisor);
+            }
+        }
+    }
 
     const PERIOD: u64 = 1_000_000;
 

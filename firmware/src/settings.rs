@@ -1,11 +1,13 @@
 //! Settings in physical units: everything that the user may choose.
 
 use core::fmt;
+use core::num::NonZeroU64;
 
 use serde::{Deserialize, Serialize};
 
 use crate::law::Direction;
 use crate::limits::PositionLimit;
+use crate::schedule::quotient;
 use crate::stability;
 
 /// What the user may choose. [`Settings::new`] gives defaults that follow from the rates.
@@ -56,10 +58,11 @@ impl Settings {
     /// up to then, ⌊that / target period⌋ of them, do not show it.
     pub const fn delay_samples(&self) -> u32 {
         let late_ns = self.target_latency_ns.saturating_add(self.loop_period_ns).saturating_add(self.actuator_delay_ns);
-        match late_ns.checked_div(self.target_period_ns) {
-            Some(samples) if samples < u32::MAX as u64 => samples as u32,
-            _ => u32::MAX,
-        }
+        let Some(target_period_ns) = NonZeroU64::new(self.target_period_ns) else {
+            return u32::MAX;
+        };
+        let samples = quotient(late_ns, target_period_ns);
+        if samples < u32::MAX as u64 { samples as u32 } else { u32::MAX }
     }
 }
 

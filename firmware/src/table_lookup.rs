@@ -58,7 +58,7 @@ impl<T: Scalar, const D: usize> Location<'_, T, D> {
 
     /// Actuation Jacobian; rows target, columns paddle.
     pub fn jacobian(&self) -> SMatrix<T, D, D> {
-        self.left.jacobian + (self.right.jacobian - self.left.jacobian) * self.fraction
+        self.left.jacobian.zip_map(&self.right.jacobian, |left, right| left + (right - left) * self.fraction)
     }
 
     /// Cubic through values and slopes at both knots, with s the fraction and h the interval:
@@ -70,12 +70,15 @@ impl<T: Scalar, const D: usize> Location<'_, T, D> {
     ) -> SVector<T, D> {
         let s = self.fraction;
         let (two, three) = (T::of(2.0), T::of(3.0));
-        let rise = right - left;
-        let start = left_slope * self.interval;
-        let end = right_slope * self.interval;
-        let quadratic = rise * three - start * two - end;
-        let cubic = start + end - rise * two;
-        left + (start + (quadratic + cubic * s) * s) * s
+        // One component at a time: every operation on vectors would be a loop of its own in code compiled for size.
+        SVector::from_fn(|i, _| {
+            let rise = right[i] - left[i];
+            let start = left_slope[i] * self.interval;
+            let end = right_slope[i] * self.interval;
+            let quadratic = rise * three - start * two - end;
+            let cubic = start + end - rise * two;
+            left[i] + (start + (quadratic + cubic * s) * s) * s
+        })
     }
 }
 

@@ -174,11 +174,19 @@ unsafe fn HardFault(_frame: &ExceptionFrame) -> ! {
 unsafe extern "C" {
     /// Exists nowhere: an image in which a panic can be reached does not link.
     safe fn a_panic_can_be_reached() -> !;
+    /// Of cortex-m-rt: stops, until the watchdog notices.
+    fn DefaultHandler();
     /// Set by the linker: the lowest word of the stack.
     static _stack_end: u32;
     /// Set by the linker: the word above the stack.
     static _stack_start: u32;
 }
+
+/// Vectors of the interrupts, none of which is ever enabled. Left to itself, cortex-m-rt keeps a kilobyte for 240.
+// SAFETY: function pointers where the hardware looks for them, which is what the section is for.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+static __INTERRUPTS: [unsafe extern "C" fn(); 1] = [DefaultHandler];
 
 #[panic_handler]
 fn panic(_: &PanicInfo<'_>) -> ! {

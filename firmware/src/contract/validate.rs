@@ -31,8 +31,10 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     }
 
     fn validate_geometry(&self) -> Result<(), TableError> {
-        finite("target position", self.target_position.iter())?;
-        finite("paddle segment", self.paddle.segment.iter().flat_map(SVector::iter))?;
+        finite("target position", self.target_position.as_slice())?;
+        let [start, end] = &self.paddle.segment;
+        finite("paddle segment", start.as_slice())?;
+        finite("paddle segment", end.as_slice())?;
         unit("needle axis", &self.needle_axis)?;
         unit("orthogonal direction", &self.orthogonal)?;
         let cosine = self.needle_axis.dot(&self.orthogonal).to_f64();
@@ -45,7 +47,7 @@ impl<T: Scalar, const D: usize> Table<T, D> {
         positive("valid paddle displacement", self.validity.paddle_displacement)?;
         positive("needle speed limit", self.validity.needle_speed)?;
         ensure(self.paddle.max_displacement <= self.validity.paddle_displacement, TableError::DisplacementRange)?;
-        finite("gains", [self.gains.loop_gain, self.gains.lambda_max].iter())?;
+        finite("gains", &[self.gains.loop_gain, self.gains.lambda_max])?;
         let gain = self.gains.loop_gain.to_f64();
         ensure(gain > 0.0 && gain < 1.0 && self.gains.lambda_max.to_f64() >= 1.0, TableError::Gains)
     }
@@ -55,7 +57,7 @@ impl<T: Scalar, const D: usize> Table<T, D> {
             return Err(TableError::TooFewKnots { found: 0 });
         };
         ensure(self.knots.len() >= 2, TableError::TooFewKnots { found: self.knots.len() })?;
-        finite("validity depth range", [self.validity.depth_start, self.validity.depth_end].iter())?;
+        finite("validity depth range", &[self.validity.depth_start, self.validity.depth_end])?;
         for knot in &self.knots {
             knot.validate_finite()?;
         }
@@ -81,13 +83,13 @@ impl<T: Scalar, const D: usize> Table<T, D> {
 
 impl<T: Scalar, const D: usize> Knot<T, D> {
     fn validate_finite(&self) -> Result<(), TableError> {
-        finite("knot depth", [self.depth].iter())?;
-        finite("knot Jacobian", self.jacobian.iter())?;
-        finite("knot paddle path", self.paddle_path.iter())?;
-        finite("knot paddle path slope", self.paddle_path_slope.iter())?;
-        finite("knot target displacement", self.target_displacement.iter())?;
-        finite("knot target displacement slope", self.target_displacement_slope.iter())?;
-        finite("knot static target displacement", self.static_target_displacement.iter())
+        finite("knot depth", &[self.depth])?;
+        finite("knot Jacobian", self.jacobian.as_slice())?;
+        finite("knot paddle path", self.paddle_path.as_slice())?;
+        finite("knot paddle path slope", self.paddle_path_slope.as_slice())?;
+        finite("knot target displacement", self.target_displacement.as_slice())?;
+        finite("knot target displacement slope", self.target_displacement_slope.as_slice())?;
+        finite("knot static target displacement", self.static_target_displacement.as_slice())
     }
 }
 
@@ -95,16 +97,19 @@ fn ensure(holds: bool, error: TableError) -> Result<(), TableError> {
     if holds { Ok(()) } else { Err(error) }
 }
 
-fn finite<'a, T: Scalar>(field: &'static str, mut values: impl Iterator<Item = &'a T>) -> Result<(), TableError> {
-    ensure(values.all(|value| value.to_f64().is_finite()), TableError::NotFinite { field })
+/// Not inlined: it is called a dozen times, and speed does not matter here.
+#[inline(never)]
+fn finite<T: Scalar>(field: &'static str, values: &[T]) -> Result<(), TableError> {
+    ensure(values.iter().all(|value| value.to_f64().is_finite()), TableError::NotFinite { field })
 }
 
+#[inline(never)]
 fn positive<T: Scalar>(field: &'static str, value: T) -> Result<(), TableError> {
-    finite(field, [value].iter())?;
+    finite(field, &[value])?;
     ensure(value.to_f64() > 0.0, TableError::NotPositive { field })
 }
 
 fn unit<T: Scalar, const D: usize>(field: &'static str, vector: &SVector<T, D>) -> Result<(), TableError> {
-    finite(field, vector.iter())?;
+    finite(field, vector.as_slice())?;
     ensure((vector.norm().to_f64() - 1.0).abs() <= T::UNIT_TOLERANCE, TableError::NotUnit { field })
 }

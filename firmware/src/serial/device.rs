@@ -12,7 +12,7 @@ use crate::contract::{PaddleCommand, Table, decode_into};
 use crate::controller::{Controller, State};
 use crate::inputs::Inputs;
 use crate::scalar::Scalar;
-use crate::schedule::Schedule;
+use crate::schedule::Releases;
 use crate::sequence::Arrival;
 use crate::settings::Settings;
 use crate::supervisor::{Faults, Mode};
@@ -26,7 +26,7 @@ const COUNTER_MASK: u32 = (1 << COUNTER_BITS) - 1;
 
 /// What a microcontroller has to provide.
 pub trait Board {
-    /// Rate of the counter, Hz.
+    /// Rate of the counter, Hz; at least 65,536.
     const COUNTER_HZ: u32;
 
     /// A byte from the line, if one has arrived.
@@ -178,7 +178,7 @@ fn run<T: Scalar, B: Board>(
         clock,
         now: Now::new(board.counter()),
         period_ns: settings.loop_period_ns,
-        schedule: Schedule::new(0, settings.loop_period_ns),
+        releases: Releases::new(0, settings.loop_period_ns),
     }
     .serve(board, line);
     Ok(())
@@ -193,8 +193,8 @@ struct Run<'r, T: Scalar> {
     clock: ClockSource,
     now: Now,
     period_ns: u64,
-    /// Releases on the board's clock, in the host's time.
-    schedule: Schedule,
+    /// Those of the board's clock, in the host's time.
+    releases: Releases,
 }
 
 impl<T: Scalar> Run<'_, T> {
@@ -204,12 +204,12 @@ impl<T: Scalar> Run<'_, T> {
             board.alive();
             let now_ns = self.now.read(board);
             if let (ClockSource::Board, Some(now_ns)) = (self.clock, now_ns)
-                && now_ns >= self.schedule.next_release_ns()
+                && now_ns >= self.releases.next_release_ns()
             {
-                let release = self.schedule.begin(now_ns);
-                self.step(board, line, release.tick, now_ns);
+                self.releases.begin(now_ns);
+                self.step(board, line, self.releases.tick(), now_ns);
                 if let Some(end_ns) = self.now.read(board) {
-                    self.schedule.finish(end_ns);
+                    self.releases.finish(end_ns);
                 }
             }
             let Some(arrival) = line.poll(board) else { continue };
@@ -248,7 +248,7 @@ impl<T: Scalar> Run<'_, T> {
     /// The host's clock shows `time_ns` now. The first time, the next release is one period ahead.
     fn set_clock<B: Board>(&mut self, board: &mut B, time_ns: u64) {
         if self.now.offset_ns.is_none() {
-            self.schedule = Schedule::new(time_ns.saturating_add(self.period_ns), self.period_ns);
+            self.releases = Releases::new(time_ns.saturating_add(self.period_ns), self.period_ns);
         }
         self.now.set(board, time_ns);
     }
@@ -294,8 +294,10 @@ fn keep_newest<S>(kept: &mut Option<S>, sample: S, sequence: impl Fn(&S) -> u32)
 /// The host's time, carried on by the board's counter. Never goes back.
 struct Now {
     counter: u32,
-    /// Counts since the start of the run.
-    elapsed: u64,
+    /// Since the start of the run, ns.
+    board_ns: u64,
+    /// What of it is less than 1 ns, in 2^-[`FRACTION_BITS`] ns.
+    fraction: u64,
     /// Host time minus board time, ns; `None` before the first word of the host.
     offset_ns: Option<i64>,
     /// Board time of the last word of the host, ns.
@@ -303,12 +305,14 @@ struct Now {
     last_ns: u64,
 }
 
-/// Two crystals may drift apart by one part in this many: 100 ppm.
-const DRIFT: u64 = 10_000;
+/// Of the time that one count takes.
+const FRACTION_BITS: u32 = 24;
+/// Two crystals may drift apart by one part in this many: 122 ppm. A power of two, which costs no division.
+const DRIFT: u64 = 1 << 13;
 
 impl Now {
     fn new(counter: u32) -> Self {
-        Self { counter, elapsed: 0, offset_ns: None, told_ns: 0, last_ns: 0 }
+        Self { counter, board_ns: 0, fraction: 0, offset_ns: None, told_ns: 0, last_ns: 0 }
     }
 
     /// Must be called at least once per wrap of the counter. `None` until the host has said the time.
@@ -333,13 +337,19 @@ impl Now {
     }
 
     fn board_ns<B: Board>(&mut self, board: &mut B) -> u64 {
-        const SECOND_NS: u64 = 1_000_000_000;
+        // A constant, so that no pass of the loop divides. For a rate that does not divide 10⁹ it is rounded, up to 1 GHz
+        // by less than 0.1 ppm: a crystal is not that good.
+        let ns_per_count = const {
+            assert!(B::COUNTER_HZ >= 1 << 16, "a wrap of a slower counter would overflow below");
+            (1_000_000_000 << FRACTION_BITS) / B::COUNTER_HZ as u64
+        };
         let counter = board.counter();
-        self.elapsed += u64::from(counter.wrapping_sub(self.counter) & COUNTER_MASK);
+        let counts = u64::from(counter.wrapping_sub(self.counter) & COUNTER_MASK);
         self.counter = counter;
-        // In two parts: the product of all counts with 10⁹ would overflow after ten minutes.
-        let rate = u64::from(B::COUNTER_HZ.max(1));
-        (self.elapsed / rate) * SECOND_NS + (self.elapsed % rate) * SECOND_NS / rate
+        let elapsed = self.fraction + counts * ns_per_count;
+        self.board_ns += elapsed >> FRACTION_BITS;
+        self.fraction = elapsed % (1 << FRACTION_BITS);
+        self.board_ns
     }
 }
 
@@ -364,7 +374,9 @@ impl Line {
 
     #[inline(never)]
     fn send_ready<B: Board>(&mut self, board: &mut B) {
-        self.send(board, &Reply::Ready);
+        // Not `&Reply::Ready`, which would be a constant of half a kilobyte: as large as the largest reply.
+        let ready = Reply::Ready;
+        self.send(board, &ready);
     }
 
     #[inline(never)]

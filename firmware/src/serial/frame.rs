@@ -6,7 +6,7 @@
 //! frames. It starts at 0, which tells the reader that the sender has started anew, and wraps to 1.
 
 use cobs::{CobsEncoder, DecodeResult, DecoderState};
-use crc::{CRC_32_ISO_HDLC, Crc};
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
 use crate::ledger::{Discard, StreamLedger};
@@ -18,7 +18,8 @@ pub const MAX_CONTENT_BYTES: usize = 640;
 pub const MAX_FRAME_BYTES: usize = MAX_CONTENT_BYTES + MAX_CONTENT_BYTES / 254 + 4;
 
 const CHECKSUM_BYTES: usize = 4;
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// Bit by bit: a table would take 1 KB of a microcontroller's flash.
+const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// What became of the frames that a reader was sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

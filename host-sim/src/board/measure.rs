@@ -235,3 +235,50 @@ pub fn exceeded(measured: &Figures, budget: &Figures, image: &str) -> Vec<String
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures() -> Figures {
+        let run = Instructions { min: 100, median: 200, max: 300 };
+        Figures { flash: 1000, ram: 2000, stack: 500, steps: 9, instructions: [("run".to_owned(), run)].into() }
+    }
+
+    /// The complaints about figures that differ from the budget in this.
+    fn complaints(change: impl FnOnce(&mut Figures)) -> Vec<String> {
+        let mut measured = figures();
+        change(&mut measured);
+        exceeded(&measured, &figures(), "image")
+    }
+
+    #[test]
+    fn what_is_within_the_tolerance_is_within_the_budget() {
+        assert_eq!(complaints(|_| {}), [""; 0]);
+        assert_eq!(complaints(|f| f.flash = 1020), [""; 0]);
+        assert_eq!(complaints(|f| (f.flash, f.ram, f.stack) = (1, 1, 1)), [""; 0], "less is welcome");
+    }
+
+    #[test]
+    fn every_figure_above_its_budget_is_named_with_both_numbers() {
+        assert_eq!(complaints(|f| f.flash = 1021), ["image: flash is 1021, the budget 1000"]);
+        assert_eq!(complaints(|f| f.ram = 2041), ["image: RAM is 2041, the budget 2000"]);
+        assert_eq!(complaints(|f| f.stack = 511), ["image: stack is 511, the budget 500"]);
+        let all = complaints(|f| {
+            f.instructions.insert("run".to_owned(), Instructions { min: 103, median: 205, max: 307 });
+        });
+        let expected =
+            ["run min is 103, the budget 100", "run median is 205, the budget 200", "run max is 307, the budget 300"];
+        assert_eq!(all, expected.map(|complaint| format!("image: {complaint}")));
+    }
+
+    #[test]
+    fn both_know_the_same_branches() {
+        let more = complaints(|f| {
+            f.instructions.insert("safe".to_owned(), Instructions { min: 1, median: 1, max: 1 });
+        });
+        assert_eq!(more, ["image: safe, which the budget lacks, is 1, the budget 0"]);
+        let fewer = complaints(|f| f.instructions.clear());
+        assert_eq!(fewer, ["image: no step took the branch run: the corpus does not reach it"]);
+    }
+}

@@ -38,6 +38,22 @@ fn round_trip_in_both_precisions() {
 }
 
 #[test]
+fn payloads_are_read_as_derived_decoders_would() {
+    let bytes = encoded(&test_support::table());
+    let payload = &bytes[HEADER_BYTES..bytes.len() - CHECKSUM_BYTES];
+    let derived = Table { scene_hash: test_support::table().scene_hash, ..postcard::from_bytes(payload).unwrap() };
+    assert_eq!(decode::<f64, 2>(&bytes).unwrap(), derived);
+}
+
+#[test]
+fn a_table_read_in_place_has_everything_but_labels() {
+    let mut table = std::boxed::Box::new(Table::empty());
+    decode_into::<f64, 2>(&encoded(&test_support::table()), &mut table).unwrap();
+    let Table { units, tissue, .. } = Table::<f64, 2>::empty();
+    assert_eq!(*table, Table { units, tissue, ..test_support::table() });
+}
+
+#[test]
 fn the_largest_table_fits() {
     let mut table = test_support::table();
     let last = table.knots.last().unwrap().clone();
