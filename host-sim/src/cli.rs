@@ -172,8 +172,12 @@ pub fn parse() -> Cli {
         // `run` is also what happens without a command: a wrong word is then an argument that is not expected.
         let word = wrong.or_else(|| error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string));
         let _ = error.print();
-        if let Some(word) = word.filter(|word| ELSEWHERE.contains(&word.as_str())) {
-            eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
+        if let Some(word) = word {
+            if ELSEWHERE.contains(&word.as_str()) {
+                eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
+            } else {
+                model_offline::cli::suggest(&error, &word, &Cli::command());
+            }
         }
         std::process::exit(error.exit_code());
     })

@@ -17,6 +17,7 @@ fn twenty_mistakes_of_a_first_day() {
     // What is typed, and words that the answer must have.
     let mistakes: &[(&[&str], &[&str])] = &[
         (&["timming"], &["timming", "similar", "timing"]),
+        (&["rnu"], &["rnu", "did you mean `run`"]),
         (&["place", "paper"], &["place", "model-offline"]),
         (&["run", "--scene", "absent.toml"], &["absent.toml", "bundled"]),
         (&["run", "--scene", "notes.txt"], &["notes.txt:1:"]),

@@ -719,9 +719,26 @@ pub fn parse() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         let word = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
         let _ = error.print();
-        if let Some(word) = word.filter(|word| ELSEWHERE.contains(&word.as_str())) {
-            eprintln!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help");
+        if let Some(word) = word {
+            if ELSEWHERE.contains(&word.as_str()) {
+                eprintln!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help");
+            } else {
+                suggest(&error, &word, &Cli::command());
+            }
         }
         std::process::exit(error.exit_code());
     })
+}
+
+/// Names the command that a word was meant for where clap does not: it counts letters near their places, and finds
+/// nothing in common between `rnu` and `run`.
+pub fn suggest(error: &clap::Error, word: &str, command: &clap::Command) {
+    let suggested = error.get(clap::error::ContextKind::SuggestedSubcommand).is_some();
+    let nearest = command
+        .get_subcommands()
+        .map(|known| (strsim::osa_distance(word, known.get_name()), known.get_name()))
+        .min_by_key(|(distance, _)| *distance);
+    if let Some((1, name)) = nearest.filter(|_| !suggested) {
+        eprintln!("\n  tip: did you mean `{name}`?");
+    }
 }

@@ -118,9 +118,9 @@ impl Chart {
         }
     }
 
-    /// A vertical line with words at its upper end, in this row.
+    /// A vertical line with words at its upper end, in this row; at the end of the axis for what lies beyond.
     pub(super) fn mark(&mut self, class: &'static str, x: f64, words: &str, row: u32) {
-        let at = self.px([x, self.y.range[0]])[0];
+        let at = self.px([x, self.y.range[0]])[0].clamp(LEFT, SIZE[0] - RIGHT);
         self.drawing.line(class, [at, TOP], [at, SIZE[1] - BOTTOM]);
         let left = at > 0.7 * SIZE[0];
         let (anchor, shift) = if left { (Anchor::End, -4.0) } else { (Anchor::Start, 4.0) };
