@@ -93,8 +93,8 @@ fn main() {
         let (nodes, time) = newton(Integration::Scni, spacing);
         row(&format!("Newton iteration, {nodes} nodes, SCNI, support 2"), time, goal, stretch);
     }
-    let fine = Grading { coarsest: 0.1, finest: 0.002, slope: 0.4, interface: 1.0, fit: InterfaceFit::Between };
-    let (time, error, nodes) = five_jacobians(Integration::Scni, fine, 1.5);
+    let fine = Grading::level(&homogeneous(), 2, InterfaceFit::Between);
+    let (time, error, nodes) = five_jacobians(Integration::Scni, fine, 2.0);
     row(&format!("five Jacobians, SCNI, graded, {nodes} nodes, worst error {error:.2} %"), time, 50.0, 10.0);
     let coarse = Grading { coarsest: 0.2, finest: 0.015, slope: 0.55, interface: 1.0, fit: InterfaceFit::On };
     let (time, error, nodes) = five_jacobians(Integration::FemT6, coarse, 2.0);
