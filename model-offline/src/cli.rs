@@ -5,6 +5,7 @@ mod new;
 use crate::discretization::DiscretizationError;
 use crate::output::{self, OutputError};
 use crate::placement::adaptive::{self, ErrorEstimate};
+use crate::placement::cross_check::cross_check;
 use crate::placement::table::{self, TableBuildError, TableOptions};
 use crate::placement::verdict::verdict;
 use crate::placement::{ModelError, Placement, TissueModel, study};
@@ -540,6 +541,8 @@ fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_
         output::write_whole(path, &table::to_bytes(&built)?)?;
     }
     let wall_s = start.elapsed().as_secs_f64();
+    // Comes on top of the study, and only where the study does not judge itself.
+    let check = if estimate.is_none() { cross_check(scene, &placement.paddles) } else { None };
     let document = serde_json::json!({
         "scene": scene.name,
         "tissue": scene.tissue(),
@@ -548,11 +551,17 @@ fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_
         "integration": scene.discretization.integration,
         "wall_s": wall_s,
         "error_estimate": estimate,
+        "cross_check": check,
         "static_nodes": profile.nodes(),
         "paddles": placement.paddles,
         "optimum": placement.optimum,
     });
-    Ok((document, summary(scene, &model, &placement, estimate, wall_s)))
+    let mut text = summary(scene, &model, &placement, estimate, wall_s);
+    if let Some(check) = check {
+        text.push_str(&check.line());
+        text.push('\n');
+    }
+    Ok((document, text))
 }
 
 fn summary(

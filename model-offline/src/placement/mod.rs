@@ -2,6 +2,7 @@
 //! study, and the rankings for the static and the dynamic approach.
 
 pub mod adaptive;
+pub mod cross_check;
 pub mod model;
 pub mod rest;
 pub mod study;
