@@ -8,6 +8,9 @@
 //! The crate is `no_std`, allocates nothing, has no `unsafe` and no panic path, and computes in `f32` or `f64`. The
 //! same code runs in the simulator and on the microcontroller.
 //!
+//! Where to begin: [precompute tables](../model_offline/guide/precompute/index.html),
+//! [run simulations](../host_sim/guide/run_simulations/index.html), [check timing](../host_sim/guide/check_timing/index.html).
+//!
 //! # Control law
 //! With the needle depth z extrapolated by its velocity to the time when the command acts:
 //!
