@@ -149,7 +149,7 @@ fn first_level(tolerance: f64) -> i32 {
 fn refine_elements(scene: &Scene, method: Method, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
     let mut levels = Levels::default();
     let mut reached = f64::INFINITY;
-    for level in first_level(tolerance) - 1..=MAX_LEVEL {
+    for level in (first_level(tolerance) - 1).max(MIN_LEVEL)..=MAX_LEVEL {
         let model = match graded_model(scene, method, level) {
             Ok(model) => model,
             Err(ModelError::TooManyNodes { .. }) => break,
