@@ -55,9 +55,10 @@ pub fn run_tick<T: Scalar, L: SampleSource + CommandSink>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contract::Mode;
+    use crate::contract::example::table;
+    use crate::controller::plant::{MS, Plant};
     use crate::settings::Settings;
-    use crate::supervisor::Mode;
-    use crate::test_support::{MS, Plant, table};
 
     /// The plant of the tests behind the traits.
     struct Link {

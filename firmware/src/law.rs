@@ -62,7 +62,7 @@ mod tests {
     use nalgebra::{Matrix2, Vector2};
 
     use super::*;
-    use crate::test_support::jacobian;
+    use crate::contract::example::jacobian;
 
     #[test]
     fn the_inverse_leaves_the_axis_alone() {

@@ -42,7 +42,7 @@
 //! - **Sample**: one measurement in a frame, stamped with sequence number and the time of the measurement.
 //! - **Tick**: one release of the loop. **Knot**: one depth of the table.
 //! - **RUN, HOLD, SAFE**: the paddle is controlled; keeps its position until the reason is gone; keeps its position
-//!   until somebody [re-arms](controller::State::rearm). See [`supervisor`].
+//!   until somebody [re-arms](controller::State::rearm). See [`Faults`].
 //! - **Adopt**: take the measured paddle position as the first command, so that starting moves nothing.
 //!
 //! # Example
@@ -73,29 +73,36 @@
 #[cfg(test)]
 extern crate std;
 
-pub mod contract;
-pub mod controller;
-pub mod detection;
-pub mod inputs;
-pub mod io;
-pub mod law;
-pub mod ledger;
-pub mod limits;
-mod monitor;
-mod runtime;
+// In the order of use: a module uses only what stands above it.
 pub mod scalar;
+mod units;
+
+pub mod contract;
+
+pub mod detection;
 pub mod schedule;
-pub mod sequence;
-pub mod serial;
-pub mod settings;
+
+pub mod law;
+pub mod limits;
 pub mod stability;
-pub mod supervisor;
 pub mod table_lookup;
 
-pub use controller::{Controller, State};
-pub use inputs::Inputs;
-pub use settings::{Settings, SettingsError};
-pub use supervisor::{Faults, Mode};
+pub mod settings;
 
-#[cfg(test)]
-mod test_support;
+pub mod inputs;
+
+pub mod controller;
+pub mod io;
+pub mod serial;
+
+pub use contract::{
+    Faults, Mode, NeedleSample, PaddleCommand, PaddleSample, Table, TableError, TargetSample, decode, encode,
+};
+pub use controller::{Controller, State};
+pub use inputs::{Discard, Inputs, Ledger, StreamLedger};
+pub use io::{CommandSink, MonotonicClock, SampleSource, run_tick};
+pub use law::Direction;
+pub use limits::PositionLimit;
+pub use scalar::{Scalar, ScalarKind};
+pub use schedule::Schedule;
+pub use settings::{Settings, SettingsError};

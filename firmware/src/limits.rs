@@ -34,14 +34,14 @@ pub struct Limits<T: Scalar> {
 pub struct Limited<T: Scalar, const D: usize> {
     /// The admissible displacement nearest along the way, length.
     pub displacement: SVector<T, D>,
-    /// The wish was outside the admissible positions.
+    /// The setpoint was outside the admissible positions.
     pub position_limited: bool,
-    /// The wish was further than one tick's step.
+    /// The setpoint was further than one tick's step.
     pub rate_limited: bool,
 }
 
 impl<T: Scalar> Limits<T> {
-    /// Admissible position for the wish `displacement`.
+    /// Admissible position for the setpoint `displacement`.
     pub fn clamp_position<const D: usize>(&self, displacement: &SVector<T, D>) -> SVector<T, D> {
         self.nearest(displacement).unwrap_or(*displacement)
     }
@@ -63,19 +63,19 @@ impl<T: Scalar> Limits<T> {
         (inside != *displacement).then_some(inside)
     }
 
-    /// The command that goes from `previous` towards `wish` as far as one tick allows; keeps the direction.
-    pub fn command<const D: usize>(&self, previous: &SVector<T, D>, wish: &SVector<T, D>) -> Limited<T, D> {
-        let nearest = self.nearest(wish);
-        let admissible = nearest.unwrap_or(*wish);
+    /// The command that goes from `previous` towards `setpoint` as far as one tick allows; keeps the direction.
+    pub fn command<const D: usize>(&self, previous: &SVector<T, D>, setpoint: &SVector<T, D>) -> Limited<T, D> {
+        let nearest = self.nearest(setpoint);
+        let admissible = nearest.unwrap_or(*setpoint);
         let short_step = shortened(&(admissible - previous), self.max_step);
-        // Without the rate limit, take the position itself: previous + (wish − previous) would round.
+        // Without the rate limit, take the position itself: previous + (setpoint − previous) would round.
         let displacement = short_step.map_or(admissible, |step| previous + step);
         Limited { displacement, position_limited: nearest.is_some(), rate_limited: short_step.is_some() }
     }
 
     /// Integral feedback after `correction`, without windup.
     ///
-    /// The wish is `feed_forward + integral`, the command before this tick `previous`.
+    /// The setpoint is `feed_forward + integral`, the command before this tick `previous`.
     /// - A correction that would leave the admissible positions is taken up to their boundary; once outside
     ///   (the feed-forward may push there), only corrections that lead back are taken.
     /// - While the paddle is still on its way at full rate, corrections that ask for more of the same are not taken:
@@ -87,17 +87,17 @@ impl<T: Scalar> Limits<T> {
         feed_forward: &SVector<T, D>,
         previous: &SVector<T, D>,
     ) -> SVector<T, D> {
-        let wish = feed_forward + integral;
-        let nearest = self.nearest(&wish);
-        let pending = nearest.unwrap_or(wish) - previous;
+        let setpoint = feed_forward + integral;
+        let nearest = self.nearest(&setpoint);
+        let pending = nearest.unwrap_or(setpoint) - previous;
         if pending.norm_squared() > self.max_step * self.max_step && pending.dot(correction) > T::zero() {
             return *integral;
         }
-        let corrected = wish + correction;
+        let corrected = setpoint + correction;
         match (nearest, self.nearest(&corrected)) {
             (_, None) => integral + correction,
             (None, Some(boundary)) => boundary - feed_forward,
-            (Some(before), Some(after)) if (corrected - after).norm_squared() < (wish - before).norm_squared() => {
+            (Some(before), Some(after)) if (corrected - after).norm_squared() < (setpoint - before).norm_squared() => {
                 integral + correction
             }
             _ => *integral,
@@ -173,12 +173,12 @@ mod tests {
         }
 
         #[test]
-        fn both_limits_hold_for_any_wish(
+        fn both_limits_hold_for_any_setpoint(
             start in (-0.7..0.7f64, -0.7..0.7f64),
-            wishes in prop::collection::vec((-1e3..1e3f64, -1e3..1e3f64), 1..50),
+            setpoints in prop::collection::vec((-1e3..1e3f64, -1e3..1e3f64), 1..50),
         ) {
             let mut previous = Vector2::new(start.0, start.1);
-            for (x, y) in wishes {
+            for (x, y) in setpoints {
                 let next = LIMITS.command(&previous, &Vector2::new(x, y)).displacement;
                 prop_assert!(next.norm() <= 1.0 + 1e-14);
                 prop_assert!((next - previous).norm() <= 0.1 + 1e-14);

@@ -86,7 +86,7 @@ impl<T: Scalar, const D: usize> Location<'_, T, D> {
 mod tests {
     use nalgebra::Vector2;
 
-    use crate::test_support::table;
+    use crate::contract::example::table;
 
     #[test]
     fn hermite_reproduces_a_cubic_and_its_knots() {

@@ -4,7 +4,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use firmware::Mode;
 use firmware::contract::{Table, decode};
 use iceoryx2::service::ipc;
 use serde::{Deserialize, Serialize};
@@ -144,13 +143,4 @@ fn serve_in(mut session: Session<'_>, space: &Space, args: &ControllerArgs) -> R
     };
     let (handover, exchanges) = session.end(&mut ports)?;
     Ok((handover, exchanges, ended))
-}
-
-/// Name of a state, as reports show it.
-pub const fn mode_name(mode: Mode) -> &'static str {
-    match mode {
-        Mode::Run => "RUN",
-        Mode::Hold => "HOLD",
-        Mode::Safe => "SAFE",
-    }
 }

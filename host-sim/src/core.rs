@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 use firmware::contract::{PaddleCommand, Table, decode, encode};
-use firmware::ledger::Ledger;
+use firmware::inputs::Ledger;
 use firmware::scalar::{Scalar, ScalarKind};
 use firmware::{Controller, Inputs, Settings, State};
 

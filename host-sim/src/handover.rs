@@ -1,6 +1,6 @@
 //! What the controller process tells the plant when all is over: a line of JSON, then everything that it saw.
 
-use firmware::ledger::{DISCARD_REASONS, StreamLedger};
+use firmware::{Discard, StreamLedger};
 use serde::{Deserialize, Serialize};
 
 use crate::bytes::{Reader, Writer};
@@ -16,7 +16,7 @@ pub struct StreamAccount {
     /// Gaps in the sequence: overwritten before the controller looked.
     pub overwritten: u64,
     /// Refused, by reason.
-    pub discarded: [u64; DISCARD_REASONS],
+    pub discarded: [u64; Discard::ALL.len()],
     /// Waiting when the controller stopped.
     pub in_flight: u64,
     /// What the controller's own ledger cannot account for.
@@ -94,10 +94,6 @@ impl Handover {
     }
 }
 
-/// Names of [`firmware::ledger::Discard`], in its order.
-const REASONS: [&str; DISCARD_REASONS] =
-    ["late", "not finite", "out of range", "time", "innovation", "not visible", "frozen", "identity"];
-
 /// The sender's count against the receiver's accounts.
 fn stream(account: &StreamAccount, published: u64) -> StreamResult {
     let discarded = account.discarded.iter().sum::<u64>();
@@ -107,11 +103,11 @@ fn stream(account: &StreamAccount, published: u64) -> StreamResult {
         consumed: account.consumed,
         overwritten: account.overwritten,
         discarded,
-        discarded_for: REASONS
+        discarded_for: Discard::ALL
             .iter()
             .zip(account.discarded)
             .filter(|(_, count)| *count > 0)
-            .map(|(reason, count)| ((*reason).to_owned(), count))
+            .map(|(reason, count)| (reason.name().to_owned(), count))
             .collect(),
         in_flight: account.in_flight,
         unaccounted: published.abs_diff(entries) + account.unaccounted,
@@ -137,7 +133,7 @@ impl SequenceSpan {
         };
         StreamAccount {
             consumed: ledger.consumed,
-            overwritten: ledger.missed + u64::from(before_first),
+            overwritten: ledger.lost + u64::from(before_first),
             discarded: ledger.discarded,
             in_flight: u64::from(after_last),
             unaccounted: ledger.unaccounted(),

@@ -11,7 +11,6 @@ use iceoryx2::service::Service;
 
 use crate::clock::{now_ns, release_real_time, request_real_time, sleep_until};
 use crate::control::LoopArgs;
-use crate::controller::mode_name;
 use crate::core::Core;
 use crate::error::SimError;
 use crate::handover::{Handover, SequenceSpan};
@@ -282,7 +281,7 @@ impl<'c> Session<'c> {
             paddle: paddle.account(&ledger.paddle, waiting.2.map(|sample| sample.sequence)),
             ticks: TickResult { due, run, hold, safe, skipped, unaccounted: due.abs_diff(entries) + own },
             commands: ports.command.published(),
-            final_state: Mode::from_wire(self.last.state).map_or("HOLD", mode_name).to_owned(),
+            final_state: Mode::from_wire(self.last.state).map_or("HOLD", Mode::name).to_owned(),
             faults: self.faults.to_string(),
             timing: self.timing,
             exchanges: self.exchanges.len() as u64,

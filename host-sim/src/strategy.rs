@@ -404,7 +404,7 @@ fn csv(model: &TissueModel, world: &World<'_>, records: &[Record]) -> Vec<u8> {
                 } else {
                     text.push(',');
                 }
-                let state = firmware::Mode::from_wire(command.state).map_or("?", crate::controller::mode_name);
+                let state = firmware::Mode::from_wire(command.state).map_or("?", firmware::Mode::name);
                 let faults = firmware::Faults::from_bits(command.faults);
                 let _ = writeln!(text, ",{state},{faults}");
             }

@@ -222,7 +222,7 @@ fn a_damaged_line_costs_ticks_and_nothing_else() {
         assert_eq!(line.frames.unaccounted(), 0, "{damage:?}: {line:?}");
         let noticed = match damage {
             Damage::DropByte | Damage::CorruptByte | Damage::DoubleByte | Damage::SwapBytes => line.damaged,
-            Damage::DropFrame => line.frames.missed,
+            Damage::DropFrame => line.frames.lost,
             Damage::DoubleFrame => line.frames.duplicates,
             Damage::SwapFrames => line.late(),
         };

@@ -1,6 +1,6 @@
 //! Sample frames: what crosses the boundary of the controller, byte for byte.
 //!
-//! Every frame is `repr(C)`, all-`f64`, and without padding (checked at compile time), so that it can lie in shared
+//! Every frame is `repr(C)`, has `u32`, `u64` and `f64` fields whatever the controller computes in, and no padding (checked at compile time), so that it can lie in shared
 //! memory, and derives serde, so that postcard can put it on a serial line. Lengths are in the scene's length unit,
 //! times in nanoseconds of one monotonic clock shared by all frames of a run.
 //!
@@ -77,13 +77,13 @@ pub struct PaddleSample {
 pub struct PaddleCommand {
     /// Publication counter, wraps.
     pub sequence: u32,
-    /// [`crate::supervisor::Mode`] as a number: 1 HOLD, 2 RUN, 3 SAFE.
+    /// [`super::Mode`] as a number: 1 HOLD, 2 RUN, 3 SAFE.
     pub state: u32,
     /// Number of the release that this command belongs to; skipped periods leave gaps.
     pub tick: u64,
     /// Time of the tick, ns.
     pub time_ns: u64,
-    /// Bit set of [`crate::supervisor::Faults`].
+    /// Bit set of [`super::Faults`].
     pub faults: u64,
     /// Displacement x, y of the paddle, length.
     pub displacement: [f64; 2],

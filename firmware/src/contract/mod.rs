@@ -1,16 +1,20 @@
-//! What the controller shares with everyone else: sample frames and the table format.
+//! What the controller shares with everyone else: sample frames, states and fault codes, and the table format.
 //!
 //! The constrained side owns the contract. A change of a frame's layout bumps [`frames::LAYOUT_VERSION`], a change
 //! of the table's payload bumps [`codec::FORMAT_VERSION`]; readers refuse versions that they do not know.
 
 pub mod codec;
 pub mod error;
+#[cfg(test)]
+pub(crate) mod example;
+pub mod faults;
 pub mod frames;
 pub mod table;
 mod validate;
 
 pub use codec::{Header, MAX_TABLE_BYTES, decode, decode_into, encode};
 pub use error::TableError;
+pub use faults::{Faults, Mode};
 pub use frames::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 pub use table::{Gains, Knot, MAX_KNOTS, Paddle, Table, Units, Validity};
 pub use validate::{CONDITION_LIMIT, condition_number};

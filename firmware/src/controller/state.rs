@@ -3,16 +3,13 @@
 use nalgebra::SVector;
 
 use super::D;
-use crate::contract::{NeedleSample, PaddleSample, TargetSample};
-use crate::inputs::{Inputs, Stream};
-use crate::ledger::Ledger;
-use crate::monitor::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, FrozenPaddle, InnovationGate};
+use crate::contract::{Faults, Mode, NeedleSample, PaddleSample, TargetSample};
+use crate::detection::MAX_SUCCESSIVE_OVERRUNS;
+use crate::inputs::monitors::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, FrozenPaddle, InnovationGate};
+use crate::inputs::stream::Stream;
+use crate::inputs::supervisor::Supervisor;
+use crate::inputs::{Inputs, Ledger};
 use crate::scalar::Scalar;
-use crate::supervisor::{Faults, Mode, Supervisor};
-
-/// Successive ticks with skipped periods before them that are tolerated: a loop that skips every second period no
-/// longer runs at the rate that its gain was chosen for.
-pub const MAX_SUCCESSIVE_OVERRUNS: u32 = 10;
 
 /// Everything that changes from tick to tick. Equal states and inputs give equal commands, bit by bit.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -3,10 +3,12 @@
 use nalgebra::{Matrix2, Vector2};
 use proptest::prelude::*;
 
+use super::plant::{MS, Plant};
 use super::*;
-use crate::ledger::Discard;
+use crate::contract::example::{jacobian, table};
+use crate::detection::MAX_SUCCESSIVE_OVERRUNS;
+use crate::inputs::Discard;
 use crate::stability;
-use crate::test_support::{MS, Plant, jacobian, table};
 
 fn settings() -> Settings {
     Settings::new(MS, 20 * MS, 20 * MS)
@@ -186,7 +188,7 @@ fn a_pause_of_100_ms_is_one_gap_and_resumes() {
     assert_eq!(closed.state.mode(), Mode::Hold);
     closed.run(100);
     assert_eq!(closed.state.mode(), Mode::Run, "{}", closed.state.faults());
-    assert_eq!(closed.state.ledger().needle.missed, 100);
+    assert_eq!(closed.state.ledger().needle.lost, 100);
 }
 
 #[test]
@@ -410,7 +412,7 @@ fn counters_may_start_anywhere() {
     for _ in 0..500 {
         assert_eq!(zero.tick(|_| {}).displacement, wrapping.tick(|_| {}).displacement);
     }
-    assert_eq!(wrapping.state.ledger().needle.missed, 0);
+    assert_eq!(wrapping.state.ledger().needle.lost, 0);
 }
 
 #[test]

@@ -8,14 +8,14 @@ use super::frame::{FrameReader, FrameWriter};
 use super::message::{Account, ClockSource, Identity, PROTOCOL_VERSION, Refusal, Reply, Request, ResetCause};
 use crate::contract::codec::FORMAT_VERSION;
 use crate::contract::frames::LAYOUT_VERSION;
+use crate::contract::{Faults, Mode};
 use crate::contract::{PaddleCommand, Table, decode_into};
 use crate::controller::{Controller, State};
+use crate::inputs::Arrival;
 use crate::inputs::Inputs;
 use crate::scalar::Scalar;
 use crate::schedule::Releases;
-use crate::sequence::Arrival;
 use crate::settings::Settings;
-use crate::supervisor::{Faults, Mode};
 
 /// Room for an encoded table: 256 knots in f64 with two paddle degrees of freedom take 31 KB.
 pub const TABLE_BYTES: usize = 32 * 1024;

@@ -9,8 +9,8 @@ use cobs::{CobsEncoder, DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
 use serde::{Deserialize, Serialize};
 
-use crate::ledger::{Discard, StreamLedger};
-use crate::sequence::{Arrival, SequenceTracker};
+use crate::inputs::{Arrival, SequenceTracker};
+use crate::inputs::{Discard, StreamLedger};
 
 /// Largest content of a frame, bytes: an account with every counter full fits.
 pub const MAX_CONTENT_BYTES: usize = 640;
@@ -262,7 +262,7 @@ mod tests {
         let f = frames(6);
         let (numbers, ledger) = read([&f[0], &f[2], &f[2], &f[1], &f[5]].into_iter().flatten().copied());
         assert_eq!(numbers, [0, 2, 1, 5]);
-        assert_eq!((ledger.frames.duplicates, ledger.late(), ledger.frames.missed), (1, 1, 2));
+        assert_eq!((ledger.frames.duplicates, ledger.late(), ledger.frames.lost), (1, 1, 2));
         assert_eq!((ledger.frames.unaccounted(), ledger.starts), (0, 1));
     }
 

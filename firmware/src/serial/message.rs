@@ -4,10 +4,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::frame::LineLedger;
+use crate::contract::Faults;
 use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
-use crate::ledger::Ledger;
+use crate::inputs::Ledger;
 use crate::settings::Settings;
-use crate::supervisor::Faults;
 
 /// Version of the messages; the host refuses a device of another one.
 pub const PROTOCOL_VERSION: u32 = 1;

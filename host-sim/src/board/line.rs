@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use firmware::sequence::Arrival;
+use firmware::inputs::Arrival;
 use firmware::serial::{FrameReader, FrameWriter, LineLedger, Reply, Request};
 
 use super::error::BoardError;

@@ -8,7 +8,6 @@ use firmware::{Faults, Mode};
 use nalgebra::Vector2;
 
 use super::mcap;
-use crate::controller::mode_name;
 use crate::error::SimError;
 use crate::output::write_bytes;
 use crate::recorder::{Recording, read_recording};
@@ -72,7 +71,7 @@ fn csv(recording: &Recording, normal: &Vector2<f64>) -> String {
             pair(inputs.target.map(|s| s.displacement)),
             pair(inputs.paddle.map(|s| s.displacement)),
             pair(command.is_valid().then_some(command.displacement)),
-            Mode::from_wire(command.state).map_or("?", mode_name),
+            Mode::from_wire(command.state).map_or("?", Mode::name),
             Faults::from_bits(command.faults),
             truth.map_or_else(|| ",,,".to_owned(), |(depth, [x, y], error)| format!("{depth},{x},{y},{error}")),
         );

@@ -21,7 +21,6 @@ use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::controller::mode_name;
 use crate::recorder::{Recording, RunMode};
 use crate::strategy::hex;
 
@@ -194,7 +193,7 @@ pub fn encode(recording: &Recording, orthogonal: [f64; 2]) -> Result<Vec<u8>, Mc
         let place = command.is_valid().then_some(command.displacement);
         let message = CommandMessage {
             tick: inputs.tick,
-            state: Mode::from_wire(command.state).map_or("?", mode_name).to_owned(),
+            state: Mode::from_wire(command.state).map_or("?", Mode::name).to_owned(),
             faults: Faults::from_bits(command.faults).to_string(),
             x: place.map(|place| place[0]),
             y: place.map(|place| place[1]),

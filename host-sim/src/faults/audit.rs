@@ -1,7 +1,7 @@
 //! What became of every sample, known from outside of the controller: its ledger has to agree.
 
 use firmware::State;
-use firmware::ledger::StreamLedger;
+use firmware::inputs::StreamLedger;
 
 use super::fault::Stream;
 
@@ -150,7 +150,7 @@ impl StreamAudit {
         let deliveries = ledger.consumed + ledger.discarded.iter().sum::<u64>() + ledger.duplicates + ledger.strays;
         ledger.unaccounted()
             + deliveries.abs_diff(tally.read + tally.strays + tally.repeated)
-            + ledger.missed.abs_diff(self.gaps())
+            + ledger.lost.abs_diff(self.gaps())
     }
 }
 

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::catalogue::Row;
 use super::evidence::{Evidence, Verdict};
 use super::random::Composed;
-use crate::controller::mode_name;
 
 /// One row of `faults.csv`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -43,7 +42,7 @@ impl RowResult {
             detected: evidence.detected,
             ticks_to_detect: evidence.ticks_to_detect,
             max_error: evidence.max_error,
-            final_state: evidence.final_state.map(|mode| mode_name(mode).to_owned()),
+            final_state: evidence.final_state.map(|mode| mode.name().to_owned()),
             unaccounted: evidence.unaccounted,
             result: evidence.verdict().to_string(),
             notes: notes.cloned().collect(),

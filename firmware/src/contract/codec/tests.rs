@@ -4,8 +4,8 @@ use std::{string::ToString, vec::Vec};
 
 use nalgebra::Matrix2;
 
+use super::super::example;
 use super::*;
-use crate::test_support;
 
 fn encoded<T: Scalar>(table: &Table<T, 2>) -> Vec<u8> {
     let mut buffer = std::vec![0; MAX_TABLE_BYTES];
@@ -28,7 +28,7 @@ fn refusal(bytes: &[u8]) -> TableError {
 
 #[test]
 fn round_trip_in_both_precisions() {
-    let table = test_support::table();
+    let table = example::table();
     let single = table.cast::<f32>();
     assert_eq!(decode::<f64, 2>(&encoded(&table)).unwrap(), table);
     assert_eq!(decode::<f32, 2>(&encoded(&single)).unwrap(), single);
@@ -39,23 +39,23 @@ fn round_trip_in_both_precisions() {
 
 #[test]
 fn payloads_are_read_as_derived_decoders_would() {
-    let bytes = encoded(&test_support::table());
+    let bytes = encoded(&example::table());
     let payload = &bytes[HEADER_BYTES..bytes.len() - CHECKSUM_BYTES];
-    let derived = Table { scene_hash: test_support::table().scene_hash, ..postcard::from_bytes(payload).unwrap() };
+    let derived = Table { scene_hash: example::table().scene_hash, ..postcard::from_bytes(payload).unwrap() };
     assert_eq!(decode::<f64, 2>(&bytes).unwrap(), derived);
 }
 
 #[test]
 fn a_table_read_in_place_has_everything_but_labels() {
     let mut table = std::boxed::Box::new(Table::empty());
-    decode_into::<f64, 2>(&encoded(&test_support::table()), &mut table).unwrap();
+    decode_into::<f64, 2>(&encoded(&example::table()), &mut table).unwrap();
     let Table { units, tissue, .. } = Table::<f64, 2>::empty();
-    assert_eq!(*table, Table { units, tissue, ..test_support::table() });
+    assert_eq!(*table, Table { units, tissue, ..example::table() });
 }
 
 #[test]
 fn the_largest_table_fits() {
-    let mut table = test_support::table();
+    let mut table = example::table();
     let last = table.knots.last().unwrap().clone();
     while let Ok(()) = table.knots.push(last.clone()) {}
     for (index, knot) in table.knots.iter_mut().enumerate() {
@@ -67,7 +67,7 @@ fn the_largest_table_fits() {
 
 #[test]
 fn every_single_bit_flip_is_refused() {
-    let mut bytes = encoded(&test_support::table());
+    let mut bytes = encoded(&example::table());
     for bit in 0..8 * bytes.len() {
         bytes[bit / 8] ^= 1 << (bit % 8);
         assert!(decode::<f64, 2>(&bytes).is_err(), "bit {bit}");
@@ -77,7 +77,7 @@ fn every_single_bit_flip_is_refused() {
 
 #[test]
 fn a_flipped_payload_with_a_right_checksum_never_panics() {
-    let bytes = encoded(&test_support::table());
+    let bytes = encoded(&example::table());
     for bit in 8 * HEADER_BYTES..8 * (bytes.len() - CHECKSUM_BYTES) {
         let mut flipped = bytes.clone();
         flipped[bit / 8] ^= 1 << (bit % 8);
@@ -89,7 +89,7 @@ fn a_flipped_payload_with_a_right_checksum_never_panics() {
 
 #[test]
 fn every_truncation_and_any_tail_is_refused() {
-    let bytes = encoded(&test_support::table());
+    let bytes = encoded(&example::table());
     for length in 0..bytes.len() {
         assert!(decode::<f64, 2>(&bytes[..length]).is_err(), "length {length}");
     }
@@ -106,7 +106,7 @@ fn every_truncation_and_any_tail_is_refused() {
 
 #[test]
 fn header_refusals_are_typed() {
-    let bytes = encoded(&test_support::table());
+    let bytes = encoded(&example::table());
     let with = |offset: usize, value: u8| {
         let mut changed = bytes.clone();
         changed[offset] = value;
@@ -125,13 +125,13 @@ fn header_refusals_are_typed() {
 
 /// The table after `change` in place of a good one: what the writer says.
 fn invariant(change: impl FnOnce(&mut Table<f64, 2>)) -> TableError {
-    let mut table = test_support::table();
+    let mut table = example::table();
     change(&mut table);
     let mut buffer = std::vec![0; MAX_TABLE_BYTES];
     let refused = encode(&table, &mut buffer).unwrap_err();
     // A writer that does not validate is caught by the reader.
     let payload = postcard::to_slice(&table, &mut buffer[HEADER_BYTES..]).unwrap().len();
-    let good = encoded(&test_support::table());
+    let good = encoded(&example::table());
     let mut forged = good[..HEADER_BYTES].to_vec();
     forged[48..52].copy_from_slice(&(payload as u32).to_le_bytes());
     forged.extend_from_slice(&buffer[HEADER_BYTES..HEADER_BYTES + payload]);
@@ -165,7 +165,7 @@ fn invariants_are_checked_by_writer_and_reader() {
 
 #[test]
 fn a_small_buffer_is_an_error() {
-    let table = test_support::table();
+    let table = example::table();
     let length = encoded(&table).len();
     for bytes in 0..length {
         let mut buffer = std::vec![0; bytes];

@@ -5,8 +5,9 @@ use std::vec::Vec;
 
 use super::super::message::TABLE_CHUNK_BYTES;
 use super::*;
+use crate::contract::example::table;
 use crate::contract::{MAX_TABLE_BYTES, encode};
-use crate::test_support::{MS, Plant, table};
+use crate::controller::plant::{MS, Plant};
 
 /// A board whose line is closed once the host has nothing left to say.
 #[derive(Default)]

@@ -40,9 +40,8 @@ fn close(evidence: &mut Evidence, controller: &std::path::Path, plant: &std::pat
     evidence.unaccounted += unaccounted;
     evidence.require(unaccounted == 0, || format!("{unaccounted} unaccounted"));
     evidence.max_error = Some(evidence.max_error.unwrap_or(0.0).max(plant.largest_error));
-    evidence.final_state = [Mode::Run, Mode::Hold, Mode::Safe]
-        .into_iter()
-        .find(|mode| crate::controller::mode_name(*mode) == result.handover.final_state);
+    evidence.final_state =
+        [Mode::Run, Mode::Hold, Mode::Safe].into_iter().find(|mode| mode.name() == result.handover.final_state);
     Some(result)
 }
 

@@ -3,7 +3,7 @@
 use firmware::detection::{
     FROZEN_SAMPLES, FROZEN_TRAVEL, SAFE_AGE_FLOOR_NS, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
 };
-use firmware::ledger::{Discard, StreamLedger};
+use firmware::inputs::{Discard, StreamLedger};
 use firmware::{Faults, Mode, Settings};
 
 use super::{FOR_EVER, Outcome, Trial, comes_back, during, same_motion, stays_safe_until_rearmed};
@@ -87,12 +87,12 @@ pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
                 after_a_target_sample(&mut bench);
                 ticks = gap * bench.setup().settings.target_period_ns / bench.setup().settings.loop_period_ns;
             }
-            let missed = ledger(&bench, stream).missed;
+            let missed = ledger(&bench, stream).lost;
             during(&mut bench, Fault::Lost(stream), ticks);
             let found = bench.until(40, carries(Faults::SAMPLE_GAP)).map(|after| after + ticks);
             evidence.detect(found, ticks + 20, what);
             bench.run(100);
-            let counted = ledger(&bench, stream).missed - missed;
+            let counted = ledger(&bench, stream).lost - missed;
             evidence.require(counted == gap, || format!("{}: {counted} counted", what()));
             evidence.close(&bench, what);
         }

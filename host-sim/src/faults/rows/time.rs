@@ -63,7 +63,7 @@ pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
         } else {
             bench.inject(Fault::PeerStopped, 100);
         }
-        let missed = bench.state.ledger().needle.missed;
+        let missed = bench.state.ledger().needle.lost;
         evidence.detect(bench.until(100, is_in(Mode::Hold)), TICKS_TO_HOLD + 1, what);
         let (hold, run) = (bench.audit.modes[0], bench.audit.modes[1]);
         bench.run(100 - TICKS_TO_HOLD - 1);
@@ -72,7 +72,7 @@ pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
         bench.run(300);
         let held = bench.audit.modes[0] - hold;
         evidence.require(held < 200, || format!("{}: {held} ticks in HOLD: more than one gap", what()));
-        let gap = bench.state.ledger().needle.missed - missed;
+        let gap = bench.state.ledger().needle.lost - missed;
         let expected = if lost { 100 } else { 0 };
         evidence.require(gap == expected, || format!("{}: {gap} samples missed instead of {expected}", what()));
         evidence.expect_mode(&bench, Mode::Run, what);
@@ -159,7 +159,7 @@ pub(crate) fn counter_wrap(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
         let [zero, wrapping] = &twins;
         evidence
             .require(zero.state.ledger() == wrapping.state.ledger(), || format!("start at {start}: other accounts"));
-        let missed = wrapping.state.ledger().needle.missed;
+        let missed = wrapping.state.ledger().needle.lost;
         evidence.require(missed == 10, || format!("start at {start}: {missed} missed instead of 10"));
         evidence.detected += u64::from(missed == 10 && same);
         evidence.expect_mode(wrapping, Mode::Run, || format!("start at {start}"));

@@ -1,6 +1,6 @@
 //! Rows 13 to 15, 17 and 18: numbers that are no measurement, wrong units, jumps, noise.
 
-use firmware::ledger::Discard;
+use firmware::inputs::Discard;
 use firmware::{Faults, Mode};
 
 use super::{Outcome, Trial, integral_bits, same_motion};

@@ -1,4 +1,4 @@
-//! States, fault codes, and the rule that leads from one to the other.
+//! States and fault codes, as every command carries them.
 
 use core::fmt;
 use core::ops::{BitOr, BitOrAssign};
@@ -27,6 +27,22 @@ impl Mode {
             3 => Some(Self::Safe),
             _ => None,
         }
+    }
+
+    /// Name as reports show it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Hold => "HOLD",
+            Self::Run => "RUN",
+            Self::Safe => "SAFE",
+        }
+    }
+}
+
+/// [`Mode::name`].
+impl fmt::Display for Mode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
     }
 }
 
@@ -179,31 +195,6 @@ impl fmt::Debug for Faults {
     }
 }
 
-/// Remembers what SAFE was entered for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Supervisor {
-    latched: Faults,
-}
-
-impl Supervisor {
-    /// Mode for the faults of this tick; latching ones stay.
-    pub(crate) fn decide(&mut self, faults: Faults) -> Mode {
-        self.latched |= faults.intersection(Faults::LATCHING);
-        if !self.latched.is_empty() {
-            Mode::Safe
-        } else if !faults.intersection(Faults::HOLDING).is_empty() {
-            Mode::Hold
-        } else {
-            Mode::Run
-        }
-    }
-
-    /// The codes that SAFE was entered for.
-    pub const fn latched(&self) -> Faults {
-        self.latched
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::string::ToString;
@@ -219,15 +210,5 @@ mod tests {
         }
         assert_eq!((Faults::TARGET_LOST | Faults::OVERRUN).to_string(), "TARGET_LOST | OVERRUN");
         assert_eq!(Faults::NONE.to_string(), "NONE");
-    }
-
-    #[test]
-    fn safe_is_latched_and_hold_is_not() {
-        let mut supervisor = Supervisor::default();
-        assert_eq!(supervisor.decide(Faults::TARGET_STALE), Mode::Hold);
-        assert_eq!(supervisor.decide(Faults::RATE_LIMITED), Mode::Run);
-        assert_eq!(supervisor.decide(Faults::DIVERGENCE), Mode::Safe);
-        assert_eq!(supervisor.decide(Faults::NONE), Mode::Safe);
-        assert_eq!(supervisor.latched(), Faults::DIVERGENCE);
     }
 }

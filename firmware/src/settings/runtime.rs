@@ -1,29 +1,16 @@
 //! Settings and table, built once into the numbers that a step uses.
 
+use super::{Settings, SettingsError, check, check_periods};
 use crate::contract::Table;
-use crate::inputs::seconds;
+use crate::detection::{
+    DEPTH_MARGIN, FOLLOWING_FRACTION, PADDLE_MARGIN, SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD,
+    TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
+};
 use crate::law::Direction;
 use crate::limits::Limits;
 use crate::scalar::Scalar;
-use crate::settings::{Settings, SettingsError, check, check_periods};
 use crate::stability;
-
-/// Lost target samples that do not interrupt RUN: two in a row happen to every camera, three are an outage.
-pub const TARGET_SAMPLES_TO_HOLD: u64 = 3;
-/// Missing target samples after which the situation must be looked at.
-pub const TARGET_SAMPLES_TO_SAFE: u64 = 15;
-/// Loop-rate inputs older than this many ticks lead to HOLD: scheduling hiccups of a few ticks are normal.
-pub const TICKS_TO_HOLD: u64 = 5;
-/// Nothing goes to SAFE by age sooner: a peer stopped for 100 ms must be able to come back.
-pub const SAFE_AGE_FLOOR_NS: u64 = 250_000_000;
-/// Depths this far outside the table, as a part of its range, are plausible (clamped); further ones are wrong units.
-pub const DEPTH_MARGIN: f64 = 1.0;
-/// Target displacements up to this multiple of the table's largest are plausible.
-pub const TARGET_MARGIN: f64 = 3.0;
-/// Measured paddle positions this far outside the limit are still noise.
-pub const PADDLE_MARGIN: f64 = 1.1;
-/// Following error at rest, part of the paddle's range: ten times the resolution of ordinary actuators.
-pub const FOLLOWING_FRACTION: f64 = 0.02;
+use crate::units::seconds;
 
 /// Limits of the age of an input, ns.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +25,8 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) limits: Limits<T>,
     pub(crate) gain: T,
     pub(crate) direction: Direction,
+    /// Identity of the table's paddle.
+    pub(crate) paddle_index: u32,
     pub(crate) loop_period_ns: u64,
     pub(crate) actuator_delay_ns: u64,
     pub(crate) delay_samples: u32,
@@ -107,6 +96,7 @@ impl<T: Scalar> Runtime<T> {
             },
             gain: T::of(gain),
             direction: settings.direction,
+            paddle_index: table.paddle.index,
             loop_period_ns: settings.loop_period_ns,
             actuator_delay_ns: settings.actuator_delay_ns,
             delay_samples,
@@ -167,7 +157,7 @@ impl TableBounds {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_support::table;
+    use crate::contract::example::table;
 
     const MS: u64 = 1_000_000;
 

@@ -10,6 +10,10 @@ use crate::limits::PositionLimit;
 use crate::schedule::quotient;
 use crate::stability;
 
+mod runtime;
+
+pub(crate) use runtime::{AgeLimits, Runtime};
+
 /// What the user may choose. [`Settings::new`] gives defaults that follow from the rates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -112,7 +116,8 @@ impl core::error::Error for SettingsError {}
 
 /// Longest period of loop and sensor: slower is a wrong unit.
 pub const LONGEST_PERIOD_NS: u64 = 10_000_000_000;
-pub(crate) fn check_periods(settings: &Settings) -> Result<(), SettingsError> {
+
+fn check_periods(settings: &Settings) -> Result<(), SettingsError> {
     let admitted = 1..=LONGEST_PERIOD_NS;
     if !admitted.contains(&settings.loop_period_ns) {
         return Err(SettingsError::Period { field: "loop period" });
@@ -129,6 +134,6 @@ pub(crate) fn check_periods(settings: &Settings) -> Result<(), SettingsError> {
     Ok(())
 }
 
-pub(crate) fn check(field: &'static str, admitted: &'static str, holds: bool) -> Result<(), SettingsError> {
+fn check(field: &'static str, admitted: &'static str, holds: bool) -> Result<(), SettingsError> {
     if holds { Ok(()) } else { Err(SettingsError::Range { field, admitted }) }
 }

@@ -1,6 +1,6 @@
 //! Sequence numbers that wrap: what is new, late, or a duplicate.
 
-use crate::ledger::{Discard, StreamLedger};
+use super::ledger::{Discard, StreamLedger};
 
 /// How far back a late sample is still told from a duplicate.
 const WINDOW: u32 = u64::BITS;
@@ -53,7 +53,7 @@ impl SequenceTracker {
             self.arrived = self.arrived.checked_shl(ahead).unwrap_or(0) | 1;
             self.known = self.known.saturating_add(ahead).min(WINDOW);
             ledger.published += u64::from(ahead);
-            ledger.missed += u64::from(ahead - 1);
+            ledger.lost += u64::from(ahead - 1);
             return Arrival::New;
         }
         let behind = newest.wrapping_sub(sequence);
@@ -62,12 +62,12 @@ impl SequenceTracker {
             return Arrival::Stray;
         }
         let bit = 1u64 << behind;
-        if self.arrived & bit != 0 || ledger.missed == 0 {
+        if self.arrived & bit != 0 || ledger.lost == 0 {
             ledger.duplicates += 1;
             return Arrival::Duplicate;
         }
         self.arrived |= bit;
-        ledger.missed -= 1;
+        ledger.lost -= 1;
         ledger.discard(Discard::Late);
         Arrival::Late
     }
@@ -93,7 +93,7 @@ mod tests {
     fn gaps_are_counted_exactly() {
         for gap in [1, 10, 1000] {
             let ledger = deliver(&[5, 6, 7 + gap, 8 + gap]);
-            assert_eq!((ledger.missed, ledger.published), (u64::from(gap), 4 + u64::from(gap)));
+            assert_eq!((ledger.lost, ledger.published), (u64::from(gap), 4 + u64::from(gap)));
         }
     }
 
@@ -102,7 +102,7 @@ mod tests {
         let start = u32::MAX - 5;
         let sequences: std::vec::Vec<u32> = (0..20).map(|i| start.wrapping_add(i)).collect();
         let ledger = deliver(&sequences);
-        assert_eq!((ledger.consumed, ledger.missed), (20, 0));
+        assert_eq!((ledger.consumed, ledger.lost), (20, 0));
     }
 
     #[test]
@@ -110,7 +110,7 @@ mod tests {
         let ledger = deliver(&[1, 4, 2, 2, 4, 3, 5]);
         assert_eq!(ledger.consumed, 3);
         assert_eq!(ledger.discarded_for(Discard::Late), 2);
-        assert_eq!((ledger.duplicates, ledger.missed), (2, 0));
+        assert_eq!((ledger.duplicates, ledger.lost), (2, 0));
         assert_eq!(deliver(&[100, 1]).strays, 1);
     }
 }

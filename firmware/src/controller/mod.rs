@@ -1,18 +1,20 @@
 //! The control law, one tick at a time.
 
 use crate::contract::frames::COMMAND_VALID;
-use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
-use crate::inputs::{Inputs, check_needle, check_paddle, check_target, seconds};
-use crate::runtime::{AgeLimits, Runtime};
+use crate::contract::{Faults, Mode, NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
+use crate::inputs::Inputs;
+use crate::inputs::checks::Checks;
 use crate::scalar::Scalar;
-use crate::settings::{Settings, SettingsError};
-use crate::supervisor::{Faults, Mode};
+use crate::settings::{AgeLimits, Runtime, Settings, SettingsError};
+use crate::units::seconds;
 
+#[cfg(test)]
+pub(crate) mod plant;
 mod state;
 #[cfg(test)]
 mod tests;
 
-pub use state::{MAX_SUCCESSIVE_OVERRUNS, State};
+pub use state::State;
 use state::{Underway, from_frame, start_tick, to_frame};
 
 /// Planar tissue: displacements have two components.
@@ -49,7 +51,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
         let mut faults = Faults::NONE;
         let fresh_target =
             if start_tick(state, inputs, &mut faults) { self.read_inputs(state, inputs, &mut faults) } else { None };
-        self.forget_the_dead(state);
+        self.expire_before_arming(state);
         self.check_ages(state, &mut faults);
         let mut mode = state.supervisor.decide(faults);
         if mode == Mode::Run {
@@ -76,11 +78,15 @@ impl<'t, T: Scalar> Controller<'t, T> {
         target.and_then(|sample| self.read_target(state, inputs.time_ns, sample, faults))
     }
 
+    fn checks(&self, now_ns: u64) -> Checks<'_, T> {
+        Checks { runtime: &self.runtime, now_ns }
+    }
+
     fn read_needle(&self, state: &mut State<T>, now_ns: u64, sample: &NeedleSample, faults: &mut Faults) {
         let before = state.needle.accepted;
         let ledger = &mut state.ledger.needle;
         let accepted = state.needle.offer(*sample, sample.sequence, ledger, faults, |previous| {
-            check_needle(&self.runtime, now_ns, sample, previous, &mut state.needle_frozen)
+            self.checks(now_ns).needle(sample, previous, &mut state.needle_frozen)
         });
         if let (Some(now), Some(before)) = (accepted, before) {
             state.gate.travel.needle += (now.depth - before.depth).abs();
@@ -94,12 +100,10 @@ impl<'t, T: Scalar> Controller<'t, T> {
         sample: &TargetSample,
         faults: &mut Faults,
     ) -> Option<TargetSample> {
-        let travel = state.gate.needle_travel();
         let ledger = &mut state.ledger.target;
         let mut found = Faults::NONE;
         let accepted = state.target.offer(*sample, sample.sequence, ledger, &mut found, |previous| {
-            let frozen = &mut state.target_frozen;
-            check_target(&self.runtime, now_ns, sample, previous, &state.gate, frozen, travel)
+            self.checks(now_ns).target(sample, previous, &state.gate, &mut state.target_frozen)
         });
         *faults |= found;
         state.target_lost |= found.contains(Faults::TARGET_LOST);
@@ -111,12 +115,10 @@ impl<'t, T: Scalar> Controller<'t, T> {
     }
 
     fn read_paddle(&self, state: &mut State<T>, now_ns: u64, sample: &PaddleSample, faults: &mut Faults) {
-        let index = self.table.paddle.index;
         let ledger = &mut state.ledger.paddle;
         let commanded = state.displacement.as_ref().map(to_frame);
         let accepted = state.paddle.offer(*sample, sample.sequence, ledger, faults, |previous| {
-            let frozen = &mut state.paddle_frozen;
-            check_paddle(&self.runtime, now_ns, index, sample, previous, commanded.as_ref(), frozen)
+            self.checks(now_ns).paddle(sample, previous, commanded.as_ref(), &mut state.paddle_frozen)
         });
         let Some(sample) = accepted else { return };
         match &state.displacement {
@@ -138,20 +140,20 @@ impl<'t, T: Scalar> Controller<'t, T> {
 
     /// Before RUN, nothing accepted long ago may stand in the way of what arrives now: a first sample that was wrong
     /// would have every right one after it refused as a jump. Once armed, the age leads to SAFE instead.
-    fn forget_the_dead(&self, state: &mut State<T>) {
+    fn expire_before_arming(&self, state: &mut State<T>) {
         let Some((_, now_ns)) = state.last_tick.filter(|_| !state.armed) else {
             return;
         };
-        let dead = |time_ns: Option<u64>, limits: AgeLimits| {
+        let expired = |time_ns: Option<u64>, limits: AgeLimits| {
             time_ns.is_some_and(|time_ns| now_ns.saturating_sub(time_ns) > limits.safe_ns)
         };
-        if dead(state.needle.accepted.map(|sample| sample.time_ns), self.runtime.needle_age) {
+        if expired(state.needle.accepted.map(|sample| sample.time_ns), self.runtime.needle_age) {
             state.needle.accepted = None;
         }
-        if dead(state.target.accepted.map(|sample| sample.time_ns), self.runtime.target_age) {
+        if expired(state.target.accepted.map(|sample| sample.time_ns), self.runtime.target_age) {
             state.target.accepted = None;
         }
-        if dead(state.paddle.accepted.map(|sample| sample.time_ns), self.runtime.paddle_age) {
+        if expired(state.paddle.accepted.map(|sample| sample.time_ns), self.runtime.paddle_age) {
             state.paddle.accepted = None;
         }
     }

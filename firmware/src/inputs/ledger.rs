@@ -1,12 +1,12 @@
 //! Accounts: nothing that reaches the controller disappears without a count.
 //!
-//! For each input stream: published = consumed + missed + discarded (by reason), where `published` is what the
-//! sequence numbers say and `missed` are the gaps (overwritten by newer samples, or lost). For the loop:
+//! For each input stream: published = consumed + lost + discarded (by reason), where `published` is what the
+//! sequence numbers say and `lost` are the gaps (overwritten by newer samples, or lost). For the loop:
 //! due ticks = RUN + HOLD + SAFE + skipped.
 
 use serde::{Deserialize, Serialize};
 
-use crate::supervisor::Mode;
+use crate::contract::Mode;
 
 /// Why a received sample was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,8 +29,33 @@ pub enum Discard {
     Identity = 7,
 }
 
-/// Number of [`Discard`] reasons.
-pub const DISCARD_REASONS: usize = 8;
+impl Discard {
+    /// Every reason, in the order of their numbers.
+    pub const ALL: [Self; 8] = [
+        Self::Late,
+        Self::NotFinite,
+        Self::OutOfRange,
+        Self::Time,
+        Self::Innovation,
+        Self::NotVisible,
+        Self::Frozen,
+        Self::Identity,
+    ];
+
+    /// Name as reports show it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Late => "late",
+            Self::NotFinite => "not finite",
+            Self::OutOfRange => "out of range",
+            Self::Time => "time",
+            Self::Innovation => "innovation",
+            Self::NotVisible => "not visible",
+            Self::Frozen => "frozen",
+            Self::Identity => "identity",
+        }
+    }
+}
 
 /// Account of one input stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,9 +65,9 @@ pub struct StreamLedger {
     /// Samples accepted.
     pub consumed: u64,
     /// Samples that never arrived: overwritten by newer ones, or lost.
-    pub missed: u64,
+    pub lost: u64,
     /// Samples refused, by [`Discard`] as index.
-    pub discarded: [u64; DISCARD_REASONS],
+    pub discarded: [u64; Discard::ALL.len()],
     /// Deliveries of a sample that had arrived before; not publications of their own.
     pub duplicates: u64,
     /// Deliveries too old to be matched with a publication.
@@ -52,7 +77,7 @@ pub struct StreamLedger {
 impl StreamLedger {
     /// An account without entries.
     pub const fn new() -> Self {
-        Self { published: 0, consumed: 0, missed: 0, discarded: [0; DISCARD_REASONS], duplicates: 0, strays: 0 }
+        Self { published: 0, consumed: 0, lost: 0, discarded: [0; Discard::ALL.len()], duplicates: 0, strays: 0 }
     }
 
     /// Counts one refusal.
@@ -69,7 +94,7 @@ impl StreamLedger {
 
     /// Publications without an entry: 0 unless the controller is wrong.
     pub fn unaccounted(&self) -> u64 {
-        let entries = self.consumed + self.missed + self.discarded.iter().sum::<u64>();
+        let entries = self.consumed + self.lost + self.discarded.iter().sum::<u64>();
         self.published.abs_diff(entries)
     }
 }

@@ -1,0 +1,67 @@
+//! Targets that jump: a wrong association.
+
+use crate::detection::{GATE_FLOOR, GATE_FLOOR_STATED, GATE_MOTION, GATE_SIGMAS};
+use crate::inputs::ledger::Discard;
+use crate::scalar::Scalar;
+use crate::settings::Runtime;
+
+/// Cumulated motion of needle and paddle, length.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Travel {
+    pub(crate) needle: f64,
+    pub(crate) paddle: f64,
+}
+
+/// Accepted samples that are remembered; the motion since the oldest one may show in the newest measurement.
+const GATE_HISTORY: usize = 8;
+// Indices of the ring wrap with those of the machine.
+const _: () = assert!(GATE_HISTORY.is_power_of_two());
+
+/// Refuses target samples that jump further than motion and noise can explain (wrong association).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct InnovationGate {
+    /// Motion so far.
+    pub(crate) travel: Travel,
+    /// Motion at the arrival of the last accepted samples: a ring, from `newest` on ever older.
+    at_arrival: [Travel; GATE_HISTORY],
+    newest: usize,
+}
+
+impl InnovationGate {
+    /// A target sample has been accepted now.
+    pub(crate) fn accept(&mut self) {
+        self.newest = self.newest.wrapping_sub(1) % GATE_HISTORY;
+        if let Some(oldest) = self.at_arrival.get_mut(self.newest) {
+            *oldest = self.travel;
+        }
+    }
+
+    /// Motion at the arrival of the accepted sample so many before the newest.
+    fn at_arrival(&self, samples_ago: usize) -> Travel {
+        self.at_arrival.get(self.newest.wrapping_add(samples_ago) % GATE_HISTORY).copied().unwrap_or_default()
+    }
+
+    /// Needle travel since the last accepted sample, length.
+    pub(crate) fn needle_travel(&self) -> f64 {
+        self.travel.needle - self.at_arrival(0).needle
+    }
+
+    /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + ‖J‖·paddle travel) + floor, where the travel reaches back
+    /// to everything that can lie between the two measurements.
+    pub(crate) fn check<T: Scalar>(
+        &self,
+        runtime: &Runtime<T>,
+        previous: &[f64; 2],
+        current: &[f64; 2],
+    ) -> Result<(), Discard> {
+        let reach = (runtime.delay_samples as usize + 1).min(GATE_HISTORY - 1);
+        let oldest = self.at_arrival(reach);
+        let motion = runtime.target_slope * (self.travel.needle - oldest.needle)
+            + runtime.jacobian_norm * (self.travel.paddle - oldest.paddle);
+        let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;
+        let floor = if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR };
+        let gate = noise + GATE_MOTION * motion + floor * runtime.target_range;
+        let (dx, dy) = (current[0] - previous[0], current[1] - previous[1]);
+        if dx * dx + dy * dy > gate * gate { Err(Discard::Innovation) } else { Ok(()) }
+    }
+}
