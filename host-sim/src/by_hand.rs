@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use clap::Args;
 use iceoryx2::service::ipc;
-use model_offline::placement::{TissueModel, place};
+use model_offline::model::TissueModel;
+use model_offline::placement::place;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
@@ -62,7 +63,7 @@ pub fn plant(args: &PlantArgs) -> Result<(), SimError> {
         scene = scene.without_inclusions();
     }
     let simulation = args.world.simulation(&scene)?;
-    let model = TissueModel::new(&scene)?;
+    let (model, _) = model_offline::placement::discretise(&scene)?;
     let paddle = match args.paddle {
         Some(index) => index,
         None => place(&model, NewtonSettings::default(), 1, &|| {})?.optimum.dynamic,

@@ -176,7 +176,7 @@ pub fn parse() -> Cli {
             if ELSEWHERE.contains(&word.as_str()) {
                 eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
             } else {
-                model_offline::cli::suggest(&error, &word, &Cli::command());
+                model_offline::output::terminal::suggest(&error, &word, &Cli::command());
             }
         }
         std::process::exit(error.exit_code());

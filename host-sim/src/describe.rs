@@ -1,7 +1,9 @@
 //! Scene, model and placement study in the words of the result.
 
-use model_offline::placement::{Placement, TissueModel};
-use model_offline::scene::{Point2, Scene};
+use model_offline::geometry::Point2;
+use model_offline::model::TissueModel;
+use model_offline::placement::Placement;
+use model_offline::scene::Scene;
 
 use crate::result::{Geometry, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
 use crate::world::Simulation;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use firmware::contract::TableError;
 use firmware::{Faults, SettingsError};
-use model_offline::placement::ModelError;
+use model_offline::model::ModelError;
 use model_offline::scene::SceneError;
 use model_offline::solver::equilibrium::Failure;
 
@@ -83,7 +83,7 @@ pub enum SimError {
     Model(#[from] ModelError),
     /// The table cannot be computed.
     #[error("the controller table cannot be computed")]
-    TableBuild(#[from] model_offline::placement::table::TableBuildError),
+    TableBuild(#[from] model_offline::table::TableBuildError),
     /// The tissue of the simulation has no equilibrium any more.
     #[error("the simulated tissue failed at depth {depth:.4}")]
     Tissue {

@@ -7,11 +7,12 @@ use clap::{Args, ValueEnum};
 use firmware::Controller;
 use firmware::contract::Table;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use model_offline::model::TissueModel;
 use model_offline::placement::study::{parallel, progress_steps};
-use model_offline::placement::table::{TableOptions, build, to_bytes};
-use model_offline::placement::{Placement, TissueModel, place};
+use model_offline::placement::{Placement, place};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::table::{TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
 
 use crate::board::{Image, Processor};
@@ -389,7 +390,7 @@ impl Studies {
                     Tissue::Homogeneous => scene.without_inclusions(),
                     Tissue::Inclusion => scene.clone(),
                 };
-                models.push((tissue, TissueModel::new(&scene)?));
+                models.push((tissue, model_offline::placement::discretise(&scene)?.0));
             }
         }
         let threads =

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use firmware::contract::Table;
 use iceoryx2::service::ipc;
-use model_offline::placement::TissueModel;
+use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 use sha2::{Digest, Sha256};
 

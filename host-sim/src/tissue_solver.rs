@@ -2,7 +2,7 @@
 //! condensed linear one.
 
 use clap::ValueEnum;
-use model_offline::placement::{Body, TissueModel};
+use model_offline::model::{Body, TissueModel};
 use model_offline::reduction::online::ReducedBody;
 use model_offline::reduction::{Condensed, TrainingOptions, train};
 use model_offline::scene::PlantModel;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use firmware::contract::PaddleCommand;
 use firmware::{Faults, Mode};
 use iceoryx2::service::Service;
-use model_offline::placement::TissueModel;
+use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
 use crate::clock::now_ns;

@@ -1,7 +1,8 @@
 //! `cargo bench -p model-offline`: the placement study, and one Newton iteration.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use model_offline::placement::{TissueModel, place};
+use model_offline::model::TissueModel;
+use model_offline::placement::place;
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;

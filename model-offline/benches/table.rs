@@ -5,11 +5,12 @@
 //! `STILLPOINT_PEER=1 cargo bench -p model-offline --bench table`; it runs `benches/peer_dolfinx.py` on one thread.
 
 use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::discretization::{Basis, Integration};
 use model_offline::discretization::{Method, Planar};
+use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::discretise;
 use model_offline::placement::rest::rest_responses;
-use model_offline::placement::{TissueModel, study};
-use model_offline::scene::schema::{Basis, Integration};
+use model_offline::placement::study;
 use model_offline::scene::{Resolution, Scene};
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
@@ -73,8 +74,8 @@ fn five_jacobians(integration: Integration, grading: Grading, support: f64) -> (
     let scene = homogeneous();
     let method = Method { integration, basis: Basis::Linear, support, consistent: true };
     let build = || {
-        let planar =
-            Planar::new(&scene.outline, &[], graded_nodes(&scene, &grading), None, method).expect("graded nodes");
+        let planar = Planar::new(&scene.outline, &[], graded_nodes(&scene.features(), &grading), None, method)
+            .expect("graded nodes");
         TissueModel::on(&scene, planar, grading.finest).expect("features have nodes")
     };
     let time = milliseconds(|| drop(rest_responses(&build()).expect("held")), 5);
@@ -93,7 +94,7 @@ fn main() {
         let (nodes, time) = newton(Integration::Scni, spacing);
         row(&format!("Newton iteration, {nodes} nodes, SCNI, support 2"), time, goal, stretch);
     }
-    let fine = Grading::level(&homogeneous(), 2, InterfaceFit::Between);
+    let fine = Grading::level(&homogeneous().features(), 2, InterfaceFit::Between);
     let (time, error, nodes) = five_jacobians(Integration::Scni, fine, 2.0);
     row(&format!("five Jacobians, SCNI, graded, {nodes} nodes, worst error {error:.2} %"), time, 50.0, 10.0);
     let coarse = Grading { coarsest: 0.2, finest: 0.015, slope: 0.55, interface: 1.0, fit: InterfaceFit::On };

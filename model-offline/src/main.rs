@@ -1,9 +1,11 @@
 //! `model-offline`: see `model-offline --help`.
 
+mod commands;
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    match model_offline::cli::run(model_offline::cli::parse()) {
+    match commands::run(commands::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();

@@ -1,7 +1,8 @@
 //! The gallery, scenes in other units, and starter scenes, as a user runs them.
 
 use assert_cmd::Command;
-use model_offline::placement::{TissueModel, place};
+use model_offline::model::TissueModel;
+use model_offline::placement::place;
 use model_offline::scene::{BUNDLED, Scene};
 use model_offline::solver::equilibrium::NewtonSettings;
 use std::path::Path;

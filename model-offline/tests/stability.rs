@@ -1,8 +1,8 @@
 //! The stability study: depths of an independent implementation, typed reasons, and the files as a user gets them.
 
 use assert_cmd::Command;
+use model_offline::discretization::Integration;
 use model_offline::scene::Scene;
-use model_offline::scene::schema::Integration;
 use model_offline::solver::equilibrium::FailureReason;
 use model_offline::study::stability::plan::{Setting, base};
 use model_offline::study::stability::probe::{Outcome, Reason, run};

@@ -1,10 +1,10 @@
 //! Scenes that nobody would write, and some that somebody will: solved, or refused with a typed error. Never a panic, a
 //! hang or unbounded memory.
 
+use model_offline::discretization::Integration;
 use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::model::{ModelError, TissueModel};
 use model_offline::placement::rest::rest_responses;
-use model_offline::placement::{ModelError, TissueModel};
-use model_offline::scene::schema::Integration;
 use model_offline::scene::{BUNDLED, Resolution, Scene};
 use proptest::prelude::*;
 
@@ -163,7 +163,7 @@ proptest! {
         let scene = Scene::bundled("paper").unwrap();
         let fit = if on { InterfaceFit::On } else { InterfaceFit::Between };
         let grading = Grading { coarsest, finest: coarsest * ratio, slope, interface: interface.min(coarsest), fit };
-        let nodes = graded_nodes(&scene, &grading);
+        let nodes = graded_nodes(&scene.features(), &grading);
         prop_assert!(nodes.len() < 200_000);
         let cells = model_offline::discretization::nodal_cells::clipped_voronoi(&nodes, &scene.outline).unwrap();
         let area: f64 = cells.iter().map(|c| c.area).sum();

@@ -1,12 +1,14 @@
 //! Published benchmark problems, solved through the library: tests are named after their source.
 
+use model_offline::discretization::{Basis, Integration};
 use model_offline::discretization::{Method, Planar};
+use model_offline::geometry::{Point2, Polygon};
+use model_offline::material::Material;
+use model_offline::mechanics::HeldRows;
+use model_offline::mechanics::Tissue;
+use model_offline::mechanics::WeaklyHeld;
 use model_offline::mechanics::nitsche::Nitsche;
-use model_offline::mechanics::{Material, Tissue};
-use model_offline::scene::schema::{Basis, Integration};
-use model_offline::scene::{Point2, Polygon};
-use model_offline::solver::constrained::HeldRows;
-use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings, WeaklyHeld};
+use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};
 

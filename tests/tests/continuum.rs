@@ -4,9 +4,9 @@
 //! 90,000 degrees of freedom, by an independent implementation, good to about 0.1 %.
 
 use model_offline::discretization::Method;
+use model_offline::discretization::{Basis, Integration};
 use model_offline::placement::adaptive::{discretise, graded_model};
 use model_offline::placement::rest::rest_responses;
-use model_offline::scene::schema::{Basis, Integration};
 use model_offline::scene::{Resolution, Scene};
 
 struct Limit {

@@ -1,7 +1,8 @@
 //! The equilibrium solver on the paper's scene: Newton's tail, Jacobians, invariances, typed failures.
 
-use model_offline::placement::{TissueModel, place};
-use model_offline::scene::schema::Integration;
+use model_offline::discretization::Integration;
+use model_offline::model::TissueModel;
+use model_offline::placement::place;
 use model_offline::scene::{Resolution, Scene};
 use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
@@ -94,10 +95,10 @@ fn the_answer_turns_with_the_scene() {
     let turn = |p: Vector2<f64>| Vector2::new(-p.y, p.x);
     let mut turned = straight.clone();
     turned.outline =
-        model_offline::scene::Polygon::new(straight.outline.vertices().iter().map(|p| turn(*p)).collect()).unwrap();
+        model_offline::geometry::Polygon::new(straight.outline.vertices().iter().map(|p| turn(*p)).collect()).unwrap();
     for inclusion in &mut turned.inclusions {
         inclusion.outline =
-            model_offline::scene::Polygon::new(inclusion.outline.vertices().iter().map(|p| turn(*p)).collect())
+            model_offline::geometry::Polygon::new(inclusion.outline.vertices().iter().map(|p| turn(*p)).collect())
                 .unwrap();
     }
     turned.immobile.iter_mut().flatten().for_each(|p| *p = turn(*p));

@@ -1,7 +1,7 @@
 //! The choice of `model-offline fit` against the continuum limits of `golden/continuum.json`: an independent
 //! implementation, good to about 0.1 %.
 
-use model_offline::placement::TissueModel;
+use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::Reference;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::schema::PlantModel;

@@ -1,6 +1,6 @@
 //! Stress and tangent of every law against closed forms, finite differences and frame invariance.
 
-use model_offline::mechanics::material::{FungTensors, Material, Matrix, determinant};
+use model_offline::material::{FungTensors, Material, Matrix, determinant};
 use nalgebra::{Matrix2, Matrix3};
 use tests::Scatter;
 

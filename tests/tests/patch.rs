@@ -4,10 +4,11 @@
 //! between boundary nodes, so even SCNI leaves a small error there. The expected sizes are an independent
 //! implementation's: SCNI 9e-4 on a regular lattice and 8e-4 at 40 % jitter, DNI 7e-4 and 4e-2.
 
+use model_offline::discretization::{Basis, Integration};
 use model_offline::discretization::{Method, Planar};
-use model_offline::mechanics::{Material, Tissue};
-use model_offline::scene::schema::{Basis, Integration};
-use model_offline::solver::constrained::HeldRows;
+use model_offline::material::Material;
+use model_offline::mechanics::HeldRows;
+use model_offline::mechanics::Tissue;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};

@@ -2,10 +2,10 @@
 //! fails and small errors weigh much. There is no outside source for it; methods are held against each other, and
 //! against quadratic triangles on nodes fine enough for their levels to agree to a fraction of a per cent.
 
-use model_offline::placement::TissueModel;
+use model_offline::discretization::Integration;
+use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::{Reference, discretise};
 use model_offline::placement::rest::rest_responses;
-use model_offline::scene::schema::Integration;
 use model_offline::scene::{Resolution, Scene};
 
 const SLAB: &str = r#"

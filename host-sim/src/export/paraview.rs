@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use model_offline::model::TissueModel;
 use model_offline::output::vtu::vtu;
-use model_offline::placement::TissueModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 

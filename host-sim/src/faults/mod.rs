@@ -24,9 +24,9 @@ pub mod tissue;
 use std::path::Path;
 
 use firmware::contract::Table;
-use model_offline::placement::TissueModel;
-use model_offline::placement::table::{TableOptions, build};
+use model_offline::model::TissueModel;
 use model_offline::scene::Scene;
+use model_offline::table::{TableOptions, build};
 
 use crate::error::SimError;
 

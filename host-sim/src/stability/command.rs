@@ -4,12 +4,12 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use model_offline::model::{ModelError, TissueModel};
 use model_offline::output::write_whole;
 use model_offline::placement::study::best_dynamic;
-use model_offline::placement::table::TableOptions;
-use model_offline::placement::{ModelError, TissueModel};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::table::TableOptions;
 use nalgebra::Matrix2;
 
 use super::cells::{self, Boundary, boundaries};
@@ -97,7 +97,7 @@ pub fn stability(args: &StabilityArgs) -> Result<ClosedLoop, SimError> {
 
 fn simulate(scene: &Scene, quick: bool, threads: usize, progress: &dyn Fn()) -> Result<ClosedLoop, SimError> {
     let plain = scene.without_inclusions();
-    let model = TissueModel::new(&plain)?;
+    let (model, _) = model_offline::placement::discretise(&plain)?;
     let paddle = best_dynamic(&model)?;
     let place = model.paddle_position(paddle);
     let jacobian = model

@@ -3,10 +3,11 @@
 
 use firmware::contract::{Knot, Table};
 use firmware::stability::gain_limit;
+use model_offline::model::{ModelError, TissueModel};
+use model_offline::placement::discretise;
 use model_offline::placement::study::parallel;
-use model_offline::placement::table::{TableBuildError, TableOptions, build};
-use model_offline::placement::{ModelError, TissueModel};
 use model_offline::scene::Scene;
+use model_offline::table::{TableBuildError, TableOptions, build};
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::Behaviour;
@@ -74,7 +75,7 @@ pub type Refused = (u32, TableBuildError);
 /// # Errors
 /// [`ModelError`] when the tissue cannot be modelled.
 pub fn mismatches(scene: &Scene, knots: usize, threads: usize) -> Result<(Vec<Mismatch>, Vec<Refused>), ModelError> {
-    let models = [TissueModel::new(&scene.without_inclusions())?, TissueModel::new(scene)?];
+    let models = [discretise(&scene.without_inclusions())?.0, discretise(scene)?.0];
     let options = TableOptions { knots, ..TableOptions::default() };
     let paddles = &scene.paddles;
     let tables = parallel(2 * paddles.len(), threads, |i| build(&models[i % 2], paddles[i / 2].index, &options));

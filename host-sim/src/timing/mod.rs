@@ -17,7 +17,7 @@ use std::path::PathBuf;
 use clap::Args;
 use firmware::contract::{PaddleCommand, Table};
 use firmware::{Controller, Inputs, State};
-use model_offline::placement::table::to_bytes;
+use model_offline::table::to_bytes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,7 @@ use crate::report::mesh;
 /// One file: no network but the events of its own address.
 pub(super) const PAGE: &str = include_str!("page.html");
 
-fn path(points: &[model_offline::scene::Point2]) -> Vec<[f64; 2]> {
+fn path(points: &[model_offline::geometry::Point2]) -> Vec<[f64; 2]> {
     points.iter().map(|point| [point.x, point.y]).collect()
 }
 

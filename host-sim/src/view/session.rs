@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use firmware::contract::Table;
-use model_offline::placement::TissueModel;
+use model_offline::model::TissueModel;
 use model_offline::scene::Scene;
 
 use super::{Knobs, View};
@@ -44,7 +44,7 @@ pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<
         shared.started();
         let knobs = shared.knobs();
         let (scene, simulation) = under(&knobs, basis);
-        let model = TissueModel::new(&scene)?;
+        let (model, _) = model_offline::placement::discretise(&scene)?;
         let controller = Active {
             program: basis.program,
             table: basis.table,

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use model_offline::placement::TissueModel;
+use model_offline::model::TissueModel;
 use serde::{Deserialize, Serialize};
 
 use crate::clock::now_ns;

@@ -1,8 +1,8 @@
 //! Integration points on the boundary of the body: for tractions, and for Nitsche's method.
 
 use super::nodal_cells::Across;
-use super::{Planar, Point, ShapeError, Stencil};
-use crate::scene::Point2;
+use super::{Planar, ShapeError, Stencil};
+use crate::geometry::{Point, Point2};
 
 /// An integration point on the boundary.
 #[derive(Debug, Clone)]
@@ -110,7 +110,7 @@ impl Planar {
         for cell in self.cells() {
             let centre = cell.centroid();
             for (a, b, _) in cell.edges() {
-                let area = 0.5 * crate::scene::geometry::cross(a - centre, b - centre);
+                let area = 0.5 * crate::geometry::cross(a - centre, b - centre);
                 for (l, weight) in super::integration::TRIANGLE_6 {
                     visit(centre * l[0] + a * l[1] + b * l[2], weight * area, self)?;
                 }
@@ -134,7 +134,7 @@ fn overlap(a: Point2, b: Point2, c: Point2, d: Point2) -> Option<(Point2, Point2
     if length == 0.0 {
         return None;
     }
-    let off = |p: Point2| (crate::scene::geometry::cross(along, p - a) / length).abs();
+    let off = |p: Point2| (crate::geometry::cross(along, p - a) / length).abs();
     if off(c) > 1e-9 * length.max((d - c).norm()) || off(d) > 1e-9 * length.max((d - c).norm()) {
         return None;
     }

@@ -1,8 +1,8 @@
 //! Finite-element baselines on the same nodes, integrated by the same assembly: linear and quadratic triangles.
 
 use super::nodal_cells::{Across, NodalCell};
-use super::{Point, Quadrature, Stencil};
-use crate::scene::geometry::{Point2, cross};
+use super::{Quadrature, Stencil};
+use crate::geometry::{Point, Point2, cross};
 use std::collections::BTreeMap;
 
 /// Triangles with their nodes: three corners, or also the middles of the edges 01, 12, 20.

@@ -5,11 +5,14 @@
 //! nodes the error falls only linearly. A spacing that grows in proportion to the distance from such points spends the
 //! same number of nodes on every octave of r.
 
-use super::Point;
-use super::lattice::feature_points;
-use crate::scene::Scene;
-use crate::scene::geometry::{Location, Point2, distance_to_segment};
+use super::features::Features;
+use crate::geometry::{Location, Point2, Polygon, cross, distance_to_segment};
 use rstar::RTree;
+
+/// The coarsest refinement level there is.
+pub const MIN_LEVEL: i32 = -2;
+/// The finest refinement level there is; nodes grow about 1.7-fold per level.
+pub const MAX_LEVEL: i32 = 9;
 
 /// How nodes are graded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,19 +44,19 @@ const CLEARANCE: f64 = 0.55;
 const COINCIDENT: f64 = 1e-9;
 
 impl Grading {
-    /// Refinement level of a scene: the finest spacing and the interface spacing halve from level to level, the coarsest
+    /// Grading of a refinement level: the finest spacing and the interface spacing halve from level to level, the coarsest
     /// falls by √2 and the slope by 2^¼, so that all sources of error shrink together.
-    pub fn level(scene: &Scene, level: i32, fit: InterfaceFit) -> Self {
+    pub fn level(features: &Features, level: i32, fit: InterfaceFit) -> Self {
         let halved = 0.5_f64.powi(level);
-        let paddle = scene.paddles.iter().map(|p| (p.segment[1] - p.segment[0]).norm()).fold(f64::INFINITY, f64::min);
-        let contact: f64 = scene.needle.contact.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
-        let edge = scene
+        let paddle = features.paddles.iter().map(|p| (p[1] - p[0]).norm()).fold(f64::INFINITY, f64::min);
+        let contact: f64 = features.contact.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
+        let edge = features
             .inclusions
             .iter()
-            .flat_map(|i| i.outline.edges())
+            .flat_map(Polygon::edges)
             .map(|(a, b)| (b - a).norm())
             .fold(f64::INFINITY, f64::min);
-        let coarsest = 0.2 * scene.outline.area().sqrt() * halved.sqrt();
+        let coarsest = 0.2 * features.outline.area().sqrt() * halved.sqrt();
         Self {
             coarsest,
             finest: (0.2 * paddle.min(contact) * halved).min(coarsest),
@@ -83,62 +86,62 @@ impl Field<'_> {
 
 /// Points where the solution, or its adjoint, is singular, each with a factor on the finest spacing: 1 where the type of
 /// boundary condition changes, more where the singularity is weaker.
-fn singular_points(scene: &Scene) -> Vec<(Point2, f64)> {
-    let mut points: Vec<(Point2, f64)> = scene.paddles.iter().flat_map(|p| p.segment).map(|p| (p, 1.0)).collect();
-    points.extend(scene.needle.contact.first().map(|p| (*p, 1.0)));
-    points.extend(scene.needle.contact.last().map(|p| (*p, 1.0)));
+fn singular_points(features: &Features) -> Vec<(Point2, f64)> {
+    let mut points: Vec<(Point2, f64)> = features.paddles.iter().flatten().map(|p| (*p, 1.0)).collect();
+    points.extend(features.contact.first().map(|p| (*p, 1.0)));
+    points.extend(features.contact.last().map(|p| (*p, 1.0)));
     // What is asked for is the displacement of one point: its adjoint is the field of a point load there. Nodal
     // integration answers that load with its modes of little energy, which small cells around it hold back (SCNI at 1 %
     // on `paper-hull` with the inclusion: 3,188 nodes instead of 31,189).
-    points.push((scene.target, 2.0));
-    for path in &scene.immobile {
+    points.push((features.target, 2.0));
+    for path in &features.immobile {
         points.extend(path.first().map(|p| (*p, 2.0)));
         points.extend(path.last().map(|p| (*p, 2.0)));
     }
     // Corners of the outline that turn inwards are singular too.
-    let v = scene.outline.vertices();
+    let v = features.outline.vertices();
     for i in 0..v.len() {
         let (a, b, c) = (v[(i + v.len() - 1) % v.len()], v[i], v[(i + 1) % v.len()]);
-        if crate::scene::geometry::cross(b - a, c - b) < -1e-9 * (b - a).norm() * (c - b).norm() {
+        if cross(b - a, c - b) < -1e-9 * (b - a).norm() * (c - b).norm() {
             points.push((b, 2.0));
         }
     }
     points
 }
 
-/// Generates graded nodes for a scene.
-pub fn graded_nodes(scene: &Scene, grading: &Grading) -> Vec<Point<2>> {
-    let outline = &scene.outline;
+/// Generates graded nodes.
+pub fn graded_nodes(features: &Features, grading: &Grading) -> Vec<Point2> {
+    let outline = &features.outline;
     let tolerance = COINCIDENT * outline.size();
-    let interfaces: Vec<(Point2, Point2)> = scene.inclusions.iter().flat_map(|i| i.outline.edges()).collect();
-    let field = Field { grading, singular: singular_points(scene), interfaces };
+    let interfaces: Vec<(Point2, Point2)> = features.inclusions.iter().flat_map(Polygon::edges).collect();
+    let field = Field { grading, singular: singular_points(features), interfaces };
 
     // Features first, then nodes along outline and needle contact between them.
     let mut positions: Vec<Point2> = Vec::new();
-    let mut features = feature_points(scene);
+    let mut fixed = features.points();
     if grading.fit == InterfaceFit::On {
-        let corners = scene.inclusions.iter().flat_map(|i| i.outline.vertices()).copied();
-        features.extend(corners.filter(|v| outline.locate(*v, tolerance) != Location::Outside));
+        let corners = features.inclusions.iter().flat_map(Polygon::vertices).copied();
+        fixed.extend(corners.filter(|v| outline.locate(*v, tolerance) != Location::Outside));
     }
-    for p in features {
+    for p in fixed {
         if positions.iter().all(|x| (x - p).norm() > tolerance) {
             positions.push(p);
         }
     }
     let mut lines: Vec<(Point2, Point2)> = outline.edges().collect();
     // A contact on the boundary is part of an outline edge already.
-    let contact = scene.needle.contact.windows(2).map(|s| (s[0], s[1]));
+    let contact = features.contact.windows(2).map(|s| (s[0], s[1]));
     lines.extend(contact.filter(|(a, b)| !outline.segment_on_boundary(*a, *b, tolerance)));
-    let features = positions.clone();
+    let fixed = positions.clone();
     for (a, b) in lines {
-        for (p, q) in pieces(a, b, &features, tolerance) {
+        for (p, q) in pieces(a, b, &fixed, tolerance) {
             positions.extend(graded_line(p, q, &|x| field.spacing(x)));
         }
     }
     // Then the edges of inclusions, which give way to all of these.
     let mut taken = Taken::new(&positions);
-    for inclusion in &scene.inclusions {
-        for (x, size) in interface_nodes(inclusion.outline.vertices(), &field, grading.fit) {
+    for inclusion in &features.inclusions {
+        for (x, size) in interface_nodes(inclusion.vertices(), &field, grading.fit) {
             let inside = outline.contains(x) && outline.distance_to_boundary(x) >= CLEARANCE * size;
             if inside && taken.is_free(x, CLEARANCE * size) {
                 taken.insert(x);
@@ -208,7 +211,7 @@ fn interface_nodes(vertices: &[Point2], field: &Field<'_>, fit: InterfaceFit) ->
                 // Round a convex corner outside, so that the four cells at the corner meet in it.
                 let before = vertices[(i + n - 1) % n];
                 let ahead = (b - a).normalize() - (a - before).normalize();
-                if crate::scene::geometry::cross(a - before, b - a) > 0.0 {
+                if cross(a - before, b - a) > 0.0 {
                     let gap = (stations[1] - a).norm();
                     nodes.push((a - ahead * (0.5 * gap), gap));
                 }
@@ -259,30 +262,5 @@ fn subdivide(low: Point2, side: f64, spacing: &impl Fn(Point2) -> f64, out: &mut
     let half = 0.5 * side;
     for (sx, sy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
         subdivide(low + Point2::new(sx, sy) * half, half, spacing, out);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn nodes_follow_the_outline_and_gather_at_the_paddles() {
-        let scene = Scene::bundled("paper").unwrap();
-        let nodes = graded_nodes(
-            &scene,
-            &Grading { coarsest: 0.1, finest: 0.005, slope: 0.3, interface: 0.05, fit: InterfaceFit::Between },
-        );
-        assert!(scene.outline.vertices().iter().all(|v| nodes.contains(v)));
-        assert!(nodes.contains(&scene.target));
-        for paddle in &scene.paddles {
-            assert!(
-                nodes.iter().filter(|x| distance_to_segment(**x, paddle.segment[0], paddle.segment[1]) < 1e-9).count()
-                    > 5
-            );
-            let nearest =
-                |p: Point2| nodes.iter().filter(|x| **x != p).map(|x| (x - p).norm()).fold(f64::INFINITY, f64::min);
-            assert!(nearest(paddle.segment[0]) < 0.008);
-        }
     }
 }

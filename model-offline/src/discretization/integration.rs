@@ -3,8 +3,8 @@
 
 use super::nodal_cells::NodalCell;
 use super::shape_functions::Reproduce;
-use super::{Point, ShapeError, ShapeFunctions, Stencil};
-use crate::scene::geometry::Point2;
+use super::{ShapeError, ShapeFunctions, Stencil};
+use crate::geometry::{Point, Point2};
 
 /// Integration points with the gradients of the shape functions that are not zero there (compressed rows).
 #[derive(Debug, Clone, Default)]
@@ -265,7 +265,7 @@ fn add_scaled(
 fn second_moments(cell: &NodalCell, about: Point2) -> Point2 {
     cell.edges().fold(Point2::zeros(), |sum, (a, b, _)| {
         let (a, b) = (a - about, b - about);
-        let twice = crate::scene::geometry::cross(a, b);
+        let twice = crate::geometry::cross(a, b);
         sum + (a.component_mul(&a) + a.component_mul(&b) + b.component_mul(&b)) * (twice / 12.0)
     })
 }

@@ -1,6 +1,6 @@
 //! The kernel: a product of cubic B-splines, one per axis (rectangular support).
 
-use super::Point;
+use crate::geometry::Point;
 
 /// Cubic B-spline of z = |x − x_I| / a: value and derivative with respect to z; zero for z ≥ 1, C² everywhere.
 ///

@@ -1,8 +1,7 @@
-//! Nodes on a lattice, fitted to the outline and to every feature of a scene.
+//! Nodes on a lattice, fitted to the outline and to every feature.
 
-use super::Point;
-use crate::scene::Scene;
-use crate::scene::geometry::{Location, Point2, distance_to_segment};
+use super::features::Features;
+use crate::geometry::{Location, Point2, distance_to_segment};
 
 /// Lattice nodes nearer to a feature point than this fraction of the spacing give way to it: two kernels almost on
 /// top of each other add cost and ill-conditioning, and nothing else.
@@ -11,27 +10,10 @@ const CLEARANCE: f64 = 0.25;
 /// lattice square is √2 spacings: lattice diagonals are left as they are.
 const MAX_GAP: f64 = 1.5;
 
-/// Points that must be nodes: outline corners, ends of paddles and of the needle contact, corners of the immobile
-/// part, and the target.
-pub fn feature_points(scene: &Scene) -> Vec<Point2> {
-    let mut points = scene.outline.vertices().to_vec();
-    points.extend(scene.paddles.iter().flat_map(|p| p.segment));
-    points.extend(&scene.needle.contact);
-    points.extend(scene.immobile.iter().flatten());
-    points.push(scene.target);
-    points
-}
-
-/// Straight pieces that nodes must follow: outline edges and needle contact.
-fn feature_segments(scene: &Scene) -> Vec<(Point2, Point2)> {
-    let contact = scene.needle.contact.windows(2).map(|s| (s[0], s[1]));
-    scene.outline.edges().chain(contact).collect()
-}
-
 /// Nodes of the given spacing: lattice points inside or on the outline (the lattice starts at the lower left corner of
 /// the bounding box), feature points that the lattice misses, and nodes along outline edges that it does not follow.
-pub fn lattice_nodes(scene: &Scene, spacing: f64) -> Vec<Point<2>> {
-    let outline = &scene.outline;
+pub fn lattice_nodes(features: &Features, spacing: f64) -> Vec<Point2> {
+    let outline = &features.outline;
     let tolerance = 1e-9 * outline.size();
     let (low, high) = outline.bounds();
     let count = |extent: f64| (extent / spacing + 1e-9).floor() as usize + 1;
@@ -42,7 +24,8 @@ pub fn lattice_nodes(scene: &Scene, spacing: f64) -> Vec<Point<2>> {
         .collect();
 
     let mut fixed: Vec<Point2> = Vec::new();
-    for p in feature_points(scene) {
+    let points = features.points();
+    for &p in &points {
         let snap = |nodes: &mut [Point2]| match nodes.iter_mut().find(|x| (**x - p).norm() <= tolerance) {
             // The feature's own digits, not the lattice's: 3 × 0.1 is not 0.3.
             Some(x) => {
@@ -55,12 +38,11 @@ pub fn lattice_nodes(scene: &Scene, spacing: f64) -> Vec<Point<2>> {
             fixed.push(p);
         }
     }
-    for (a, b) in feature_segments(scene) {
+    for (a, b) in features.segments() {
         fill_gaps(a, b, spacing, tolerance, &nodes, &mut fixed);
     }
-    let features = feature_points(scene);
     nodes.retain(|x| {
-        let is_feature = features.iter().any(|f| (f - x).norm() <= tolerance);
+        let is_feature = points.iter().any(|f| (f - x).norm() <= tolerance);
         is_feature || fixed.iter().all(|f| (f - x).norm() >= CLEARANCE * spacing)
     });
     nodes.extend(fixed);
@@ -83,21 +65,6 @@ fn fill_gaps(a: Point2, b: Point2, spacing: f64, tolerance: f64, nodes: &[Point2
         if gap > MAX_GAP * spacing {
             let pieces = (gap / spacing).round().max(2.0);
             fixed.extend((1..pieces as usize).map(|k| a + direction * (pair[0] + gap * k as f64 / pieces)));
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_papers_scenes_have_the_published_node_counts() {
-        for (name, spacing, expected) in
-            [("paper", 0.1, 106), ("paper-hull", 0.1, 126), ("paper", 0.05, 386), ("paper", 0.025, 1471)]
-        {
-            let scene = Scene::bundled(name).unwrap();
-            assert_eq!(lattice_nodes(&scene, spacing).len(), expected, "{name} at {spacing}");
         }
     }
 }

@@ -6,22 +6,23 @@
 //! Everything here is written for D dimensions; only the construction of nodes and cells is planar.
 
 pub mod boundary;
+pub mod features;
 pub mod finite_element;
 pub mod graded;
 pub mod integration;
 pub mod kernel;
 pub mod lattice;
+pub mod method;
 pub mod nodal_cells;
 pub mod node_cloud;
 pub mod planar;
 pub mod shape_functions;
 pub mod triangulation;
 
+pub use features::Features;
 pub use integration::Quadrature;
+pub use method::{Basis, Essential, Integration, Method};
 pub use nodal_cells::NodalCell;
 pub use node_cloud::NodeCloud;
-pub use planar::{DiscretizationError, Method, Planar};
+pub use planar::{DiscretizationError, Planar};
 pub use shape_functions::{ShapeError, ShapeFunctions, Stencil};
-
-/// A point or vector in D dimensions, in scene length units.
-pub type Point<const D: usize> = nalgebra::SVector<f64, D>;

@@ -1,6 +1,6 @@
 //! The nodes, with their supports, and the search for those whose kernel covers a region.
 
-use super::Point;
+use crate::geometry::Point;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
 

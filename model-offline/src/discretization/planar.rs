@@ -1,26 +1,13 @@
 //! A planar body discretised: nodes, cells and an integration rule, from nodes that are given.
 
 use super::finite_element::Elements;
+use super::method::{Basis, Integration, Method};
 use super::nodal_cells::clipped_voronoi;
 use super::triangulation::{TriangulationError, triangulate};
-use super::{NodalCell, NodeCloud, Point, Quadrature, ShapeError, ShapeFunctions, Stencil, integration};
-use crate::scene::schema::{Basis, Integration};
-use crate::scene::{Point2, Polygon};
+use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, integration};
+use crate::geometry::{Point, Point2, Polygon};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// How the displacement is approximated and the weak form integrated.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Method {
-    /// Integration rule.
-    pub integration: Integration,
-    /// Basis of the shape functions.
-    pub basis: Basis,
-    /// Kernel support over local spacing.
-    pub support: f64,
-    /// Whether `nsni` and `gauss` are corrected to be variationally consistent; SCNI and the elements are by nature.
-    pub consistent: bool,
-}
 
 /// Why a body cannot be discretised.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,8 +1,9 @@
 //! Shape functions Ψ_I and their gradients from the moment matrix.
 
+use super::NodeCloud;
 use super::kernel::product_kernel;
-use super::{NodeCloud, Point};
-use crate::scene::Basis;
+use super::method::Basis;
+use crate::geometry::Point;
 use nalgebra::{SMatrix, SVector};
 
 /// Above this condition number (1-norm, of the scaled moment matrix) shape functions have lost too many digits.

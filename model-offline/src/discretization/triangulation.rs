@@ -1,7 +1,7 @@
 //! Constrained Delaunay triangulation of the nodes inside the outline: elements of the baselines, background cells of
 //! the Gauss rule.
 
-use crate::scene::geometry::{Point2, Polygon, cross, distance_to_segment};
+use crate::geometry::{Point2, Polygon, cross, distance_to_segment};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
 

@@ -3,10 +3,9 @@
 //! With F_q = I + Σ_I d_I ⊗ g_I(q): internal force `f_I = Σ_q w_q P(F_q) g_I` and tangent stiffness
 //! `(K_IJ)_ik = Σ_q w_q g_I,j A_ijkl(F_q) g_J,l`, total Lagrangian throughout.
 
-use super::Material;
-use super::material::{Matrix, determinant};
 use crate::discretization::Quadrature;
-use crate::solver::linear::Pattern;
+use crate::linalg::Pattern;
+use crate::material::{Material, MaterialError, Matrix, determinant};
 
 /// The materials of a tissue, and how much of each every cell contains.
 #[derive(Debug, Clone)]
@@ -50,7 +49,7 @@ impl Tissue {
     ///
     /// # Errors
     /// Never for the laws there are; the signature leaves room for one without a linear limit.
-    pub fn linearised(&self) -> Result<Self, super::MaterialError> {
+    pub fn linearised(&self) -> Result<Self, MaterialError> {
         let materials = self.materials.iter().map(Material::linearised).collect::<Result<_, _>>()?;
         Ok(Self { materials, ..self.clone() })
     }

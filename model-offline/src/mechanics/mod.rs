@@ -1,8 +1,8 @@
-//! Kinematics, materials, and the assembly of internal force and tangent stiffness.
+//! Internal force and tangent stiffness of a body, and the essential boundary conditions on it.
 
 pub mod assembly;
-pub mod material;
+pub mod constraints;
 pub mod nitsche;
-pub use assembly::Tissue;
 
-pub use material::{FungTensors, Material, MaterialError};
+pub use assembly::Tissue;
+pub use constraints::{HeldRows, WeaklyHeld};

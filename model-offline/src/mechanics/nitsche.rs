@@ -6,11 +6,12 @@
 //! to rounding. The term of the tangent with ∂²P/∂F² (u − g) is left out: it vanishes with the gap.
 
 use super::assembly::Tissue;
-use super::material::{Matrix, Tensor4};
+use super::constraints::WeaklyHeld;
+use crate::discretization::Planar;
 use crate::discretization::boundary::BoundaryPoint;
-use crate::discretization::{Planar, Point};
-use crate::solver::equilibrium::WeaklyHeld;
-use crate::solver::linear::Pattern;
+use crate::geometry::Point;
+use crate::linalg::Pattern;
+use crate::material::{Matrix, Tensor4};
 
 /// Penalty β over (stiffness / cell size).
 const PENALTY: f64 = 40.0;

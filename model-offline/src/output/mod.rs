@@ -3,6 +3,7 @@
 pub mod chart;
 pub mod svg;
 pub mod table_text;
+pub mod terminal;
 pub mod vtu;
 
 use std::io::Write as _;

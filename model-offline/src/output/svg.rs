@@ -1,9 +1,9 @@
 //! The body drawn: cells in their deformed place, coloured by strain, with needle, paddle and target.
 
 use super::vtu::cell_gradients;
-use crate::mechanics::material::green_lagrange;
-use crate::placement::{Body, TissueModel};
-use crate::scene::Point2;
+use crate::geometry::Point2;
+use crate::material::green_lagrange;
+use crate::model::{Body, TissueModel};
 use std::fmt::Write as _;
 
 /// A picture of a body in its present state, width 720 px, self-contained.

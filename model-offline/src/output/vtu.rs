@@ -1,8 +1,8 @@
 //! ParaView's unstructured grid, one file.
 
+use crate::material::{Matrix, determinant, green_lagrange};
 use crate::mechanics::assembly::displacement_gradient;
-use crate::mechanics::material::{Matrix, determinant, green_lagrange};
-use crate::placement::{Body, TissueModel};
+use crate::model::{Body, TissueModel};
 use std::fmt::Write as _;
 
 /// The body as a VTU file: the nodal cells as polygons over the nodes' cells, with displacement, Green–Lagrange strain,

@@ -2,28 +2,21 @@
 //!
 //! Nodes are graded towards the singular points, level by level. The error of a level is estimated against an
 //! *independent* method, quadratic triangles on graded nodes, extrapolated (their error halves from level to level, see
-//! [`Grading::level`]); what the extrapolation leaves open is added to the estimate. Quadratic triangles themselves are
+//! [`Grading::level`](crate::discretization::graded::Grading::level)); what the extrapolation leaves open is added to the estimate. Quadratic triangles themselves are
 //! judged by the distance to their own coarser levels.
 
-use super::model::{ModelError, TissueModel};
 use super::rest::{RestResponse, rest_responses};
-use crate::discretization::graded::{Grading, InterfaceFit, graded_nodes};
-use crate::discretization::{Method, Planar};
-use crate::scene::schema::{Basis, Integration};
+use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
+use crate::discretization::{Basis, Integration, Method};
+use crate::model::{ModelError, TissueModel, graded_model, method_of};
 use crate::scene::{Resolution, Scene};
 use serde::Serialize;
 
-/// Levels tried before giving up; nodes grow about 1.7-fold per level.
-pub(crate) const MAX_LEVEL: i32 = 9;
-/// The coarsest level there is.
-pub(crate) const MIN_LEVEL: i32 = -2;
 /// From this tolerance on, refinement starts at the coarsest level; below it, the coarsest levels could only agree by
 /// accident.
 const LOOSE: f64 = 0.03;
 /// Levels by which refinement goes on at most in one go.
 const LONGEST_SKIP: i32 = 2;
-/// More nodes than this are not tried.
-const MAX_NODES: usize = 40_000;
 /// Share of the tolerance that the reference may leave open.
 const REFERENCE_SHARE: f64 = 0.25;
 
@@ -54,12 +47,11 @@ impl ErrorEstimate {
 /// [`ModelError`], among them [`ModelError::ToleranceNotReached`] with the estimate that was reached.
 pub fn discretise(scene: &Scene) -> Result<(TissueModel, Option<ErrorEstimate>), ModelError> {
     match scene.discretization.resolution {
-        Resolution::Spacing(_) => Ok((TissueModel::new(scene)?, None)),
         Resolution::Tolerance(tolerance) => {
             let (model, estimate) = refine(scene, tolerance)?;
             Ok((model, Some(estimate)))
         }
-        Resolution::Level(level) => Ok((graded_model(scene, method_of(scene), level)?, None)),
+        Resolution::Spacing(_) | Resolution::Level(_) => Ok((TissueModel::new(scene)?, None)),
     }
 }
 
@@ -78,32 +70,6 @@ pub fn profile_model(model: &TissueModel) -> Result<TissueModel, ModelError> {
 
 /// Largest model on which the finite-depth profile is followed.
 const PROFILE_NODES: usize = 1500;
-
-/// A graded model at one level.
-///
-/// # Errors
-/// [`ModelError`] as for any model.
-pub fn graded_model(scene: &Scene, method: Method, level: i32) -> Result<TissueModel, ModelError> {
-    let nodal = matches!(method.integration, Integration::Dni | Integration::Scni | Integration::Nsni);
-    let fit = if nodal { InterfaceFit::Between } else { InterfaceFit::On };
-    let elements = matches!(method.integration, Integration::FemT6);
-    let grading = Grading::level(scene, if elements { level } else { level + KERNEL_LEVELS }, fit);
-    let nodes = graded_nodes(scene, &grading);
-    if nodes.len() > MAX_NODES {
-        return Err(ModelError::TooManyNodes { nodes: nodes.len(), limit: MAX_NODES });
-    }
-    let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, None, method)?;
-    TissueModel::on(scene, planar, grading.finest)
-}
-
-/// Kernels and linear triangles start this many levels finer than quadratic triangles, whose nodes carry more.
-const KERNEL_LEVELS: i32 = 2;
-
-/// The method that a scene asks for.
-pub fn method_of(scene: &Scene) -> Method {
-    let spec = scene.discretization;
-    Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true }
-}
 
 fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
     let method = method_of(scene);

@@ -1,10 +1,10 @@
 //! A second opinion on an answer that carries no error estimate: quadratic triangles on a few graded nodes.
 
-use super::adaptive::{graded_model, method_of};
 use super::rest::rest_responses;
 use super::study::PaddleResult;
+use crate::discretization::{Basis, Integration};
+use crate::model::{graded_model, method_of};
 use crate::scene::Scene;
-use crate::scene::schema::{Basis, Integration};
 use serde::Serialize;
 
 /// Refinement level of the triangles: wrong by 1 to 3 % on `paper`, `paper-hull`, `breast` and `prostate`, for 5 to 50 ms.
@@ -57,7 +57,8 @@ impl CrossCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::placement::{TissueModel, study};
+    use crate::model::TissueModel;
+    use crate::placement::study;
     use crate::scene::Resolution;
     use crate::solver::equilibrium::NewtonSettings;
 

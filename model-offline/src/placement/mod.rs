@@ -3,11 +3,9 @@
 
 pub mod adaptive;
 pub mod cross_check;
-pub mod model;
 pub mod rest;
 pub mod study;
-pub mod table;
 pub mod verdict;
 
-pub use model::{Body, ModelError, TissueModel};
+pub use adaptive::discretise;
 pub use study::{PaddleResult, Placement, StaticStudy, place};

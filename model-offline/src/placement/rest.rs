@@ -1,12 +1,13 @@
 //! Actuation Jacobians at rest for all paddles at once: one assembly and one symbolic analysis serve them all, since
 //! they differ only in which nodal values are held.
 
-use super::model::{ModelError, TissueModel};
 use super::study::best_direction;
+use crate::linalg::Pattern;
+use crate::mechanics::HeldRows;
 use crate::mechanics::assembly::{Scatter, State, internal_force, tangent};
-use crate::solver::constrained::{ConstrainedSolver, HeldRows};
+use crate::model::{ModelError, TissueModel};
+use crate::solver::constrained::ConstrainedSolver;
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
-use crate::solver::linear::Pattern;
 use nalgebra::{Matrix2, Vector2};
 
 /// How the target answers to one paddle and to the needle, at rest.

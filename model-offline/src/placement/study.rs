@@ -1,7 +1,7 @@
 //! The placement study: every paddle, static and dynamic.
 
-use super::model::{ModelError, TissueModel};
 use super::rest::{RestResponse, rest_responses};
+use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;

@@ -60,7 +60,8 @@ pub fn verdict(placement: &Placement, scene: &Scene) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::placement::{TissueModel, place};
+    use crate::model::TissueModel;
+    use crate::placement::place;
     use crate::solver::equilibrium::NewtonSettings;
 
     fn lines(name: &str) -> Vec<String> {

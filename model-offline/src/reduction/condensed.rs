@@ -2,9 +2,9 @@
 //! condensed out. `K_c = K_rr − K_rf K_ff⁻¹ K_fr` (Guyan 1965), exact for the law's small-strain limit.
 
 use super::lifting::{control_values, controls, flat, held_weakly, tangent_at_rest};
+use crate::mechanics::HeldRows;
 use crate::mechanics::assembly::displacement_gradient;
-use crate::placement::{ModelError, TissueModel};
-use crate::solver::constrained::HeldRows;
+use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use std::sync::Arc;
@@ -146,7 +146,7 @@ mod tests {
     #[test]
     fn nitsche_is_refused() {
         let mut scene = Scene::bundled("paper").unwrap();
-        scene.discretization.essential = crate::scene::schema::Essential::Nitsche;
+        scene.discretization.essential = crate::discretization::Essential::Nitsche;
         let model = TissueModel::new(&scene).unwrap();
         assert!(matches!(Condensed::new(&model, Some(0)), Err(ModelError::Unsupported(_))));
     }

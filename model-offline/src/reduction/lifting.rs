@@ -1,7 +1,7 @@
 //! The body's response at rest to each thing that moves it.
 
 use crate::mechanics::Tissue;
-use crate::placement::{ModelError, TissueModel};
+use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 

@@ -5,8 +5,8 @@ use super::lifting::{control_values, flat, lifting, tangent_at_rest};
 use super::nnls::non_negative_fit;
 use super::online::{Domain, Invalid, ReducedModel, SampledPoint};
 use crate::mechanics::assembly::displacement_gradient;
+use crate::model::{ModelError, TissueModel};
 use crate::placement::study::{best_direction, parallel};
-use crate::placement::{ModelError, TissueModel};
 use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use serde::Serialize;
@@ -222,7 +222,7 @@ fn take_snapshots(
     Ok((kept.filter(|s| s.controls.iter().any(|c| *c != 0.0)).collect(), domain))
 }
 
-fn snapshot(body: &crate::placement::Body<'_>) -> Snapshot {
+fn snapshot(body: &crate::model::Body<'_>) -> Snapshot {
     Snapshot {
         controls: control_values(body.depth(), body.paddle()),
         coefficients: body.equilibrium().coefficients().to_vec(),

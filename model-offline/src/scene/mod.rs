@@ -1,17 +1,17 @@
-//! Scenes: the file format, its validation, and the planar geometry they are made of.
+//! Scenes: the file format, its validation, and what other tools draw.
 
 mod error;
-pub mod geometry;
 pub mod import;
 pub mod schema;
 pub mod starter;
 mod validate;
 
 pub use error::SceneError;
-pub use geometry::{Point2, Polygon};
-pub use schema::{Basis, Essential, FitSection, Integration, PlantModel, TableScalar};
+pub use schema::{FitSection, PlantModel, TableScalar};
 
-use crate::mechanics::Material;
+use crate::discretization::{Basis, Essential, Features, Integration};
+use crate::geometry::{Point2, Polygon};
+use crate::material::Material;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -221,6 +221,18 @@ impl Scene {
     #[must_use]
     pub fn without_inclusions(&self) -> Self {
         Self { inclusions: Vec::new(), ..self.clone() }
+    }
+
+    /// The geometry that nodes are fitted to.
+    pub fn features(&self) -> Features {
+        Features {
+            outline: self.outline.clone(),
+            inclusions: self.inclusion_outlines(),
+            immobile: self.immobile.clone(),
+            contact: self.needle.contact.clone(),
+            paddles: self.paddles.iter().map(|p| p.segment).collect(),
+            target: self.target,
+        }
     }
 
     /// The regions of the inclusions.

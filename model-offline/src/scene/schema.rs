@@ -1,6 +1,7 @@
 //! The scene file as it is written: the public contract, field for field. Validation turns it into a
 //! [`Scene`](super::Scene).
 
+use crate::discretization::{Basis, Essential, Integration};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -234,47 +235,6 @@ pub struct ActuatorSection {
     pub max_rate: Option<Located<f64>>,
     /// Fastest needle the controller keeps compensating, length units per second (default: twice the depth per second).
     pub max_needle_speed: Option<Located<f64>>,
-}
-
-/// Integration rules of the weak form, and finite-element baselines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-#[value(rename_all = "kebab-case")]
-pub enum Integration {
-    /// Direct nodal integration: the gradient at the node.
-    Dni,
-    /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell.
-    Scni,
-    /// Naturally stabilised nodal integration: direct, plus the gradient's own variation over the cell.
-    Nsni,
-    /// Gauss points in the triangles of the nodal cells.
-    Gauss,
-    /// Linear triangles on the same nodes.
-    FemT3,
-    /// Quadratic triangles on the same nodes.
-    FemT6,
-}
-
-/// Monomials that the shape functions reproduce exactly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Basis {
-    /// 1, x, y.
-    #[default]
-    Linear,
-    /// 1, x, y, x², xy, y².
-    Quadratic,
-}
-
-/// How essential boundary conditions are imposed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum Essential {
-    /// Nodal values are held exactly (the paper's transformation method).
-    #[default]
-    Transformation,
-    /// Nitsche's method: weakly, with consistent boundary terms.
-    Nitsche,
 }
 
 /// How fine and by which method the tissue is modelled.

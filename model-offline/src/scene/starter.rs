@@ -1,7 +1,7 @@
 //! A commented scene to start from, on a block of tissue or on an outline from elsewhere.
 
-use super::geometry::{Point2, Polygon, distance_to_polyline};
 use super::import::Imported;
+use crate::geometry::{Point2, Polygon, distance_to_polyline};
 use std::fmt::Write as _;
 
 /// What a starter scene is called and measured in.

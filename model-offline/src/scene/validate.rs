@@ -1,12 +1,12 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
 use super::error::{SceneError, Source};
-use super::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
-use super::schema::{
-    DiscretizationSection, InclusionSection, Integration, Located, MaterialModel, MaterialSection, SceneFile,
-};
+use super::schema::{DiscretizationSection, InclusionSection, Located, MaterialModel, MaterialSection, SceneFile};
 use super::{Actuator, Discretization, Inclusion, Needle, Paddle, Resolution, Scene};
-use crate::mechanics::{FungTensors, Material, MaterialError};
+use crate::discretization::Integration;
+use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
+use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
+use crate::material::{FungTensors, Material, MaterialError};
 use std::ops::Range;
 
 /// Outlines of more vertices than this are refused: nothing a needle scene needs, and memory stays bounded.
@@ -458,7 +458,6 @@ pub(crate) fn check_tolerance(t: f64) -> Rule {
 
 /// Whether a refinement level can be asked for.
 pub(crate) fn check_level(level: i32) -> Rule {
-    use crate::placement::adaptive::{MAX_LEVEL, MIN_LEVEL};
     if (MIN_LEVEL..=MAX_LEVEL).contains(&level) {
         Ok(())
     } else {
@@ -476,12 +475,12 @@ pub(crate) fn check_support(support: f64) -> Rule {
 }
 
 fn touch(a: &[Point2], b: &[Point2; 2], tolerance: f64) -> bool {
-    super::geometry::segments_meet(a[0], a[1], b[0], b[1], tolerance)
+    crate::geometry::segments_meet(a[0], a[1], b[0], b[1], tolerance)
 }
 
 fn polyline_near(paths: &[Vec<Point2>], segment: &[Point2], tolerance: f64) -> bool {
     paths.iter().flat_map(|p| p.windows(2)).any(|s| {
-        super::geometry::segments_meet(s[0], s[1], segment[0], segment[1], tolerance)
+        crate::geometry::segments_meet(s[0], s[1], segment[0], segment[1], tolerance)
             || distance_to_segment(0.5 * (segment[0] + segment[1]), s[0], s[1]) <= tolerance
     })
 }
@@ -491,9 +490,9 @@ fn overlap(a: &Polygon, b: &Polygon) -> f64 {
     let v = a.vertices();
     (1..v.len() - 1)
         .map(|i| {
-            let signed = super::geometry::cross(v[i] - v[0], v[i + 1] - v[0]);
+            let signed = crate::geometry::cross(v[i] - v[0], v[i + 1] - v[0]);
             let triangle = if signed >= 0.0 { [v[0], v[i], v[i + 1]] } else { [v[0], v[i + 1], v[i]] };
-            if signed == 0.0 { 0.0 } else { signed.signum() * super::geometry::overlap_area(b, &triangle) }
+            if signed == 0.0 { 0.0 } else { signed.signum() * crate::geometry::overlap_area(b, &triangle) }
         })
         .sum()
 }

@@ -14,80 +14,15 @@
 //! of Λ, for ρ large enough, so Cholesky detects lost stability; same sparsity as K plus the held stencils) and iterate
 //! on μ. The constraint error shrinks by about ρ⁻¹ K per round; a few rounds reach rounding error.
 
-use super::linear::{NotPositiveDefinite, Pattern, SparseCholesky};
-use crate::discretization::{Point, Stencil};
+use crate::geometry::Point;
+use crate::linalg::{NotPositiveDefinite, Pattern, SparseCholesky};
+use crate::mechanics::HeldRows;
 
 /// Penalty over the mean diagonal of the tangent. Large enough that two or three rounds of multipliers reach rounding
 /// error, small enough that the factor of K_ρ keeps its digits.
 const PENALTY: f64 = 1e4;
 /// Rounds of multipliers; each costs one back-substitution.
 const MAX_ROUNDS: usize = 12;
-
-/// Rows Λ_b of the held nodes: `u(X_b) = Σ_I Ψ_I(X_b) d_I`.
-#[derive(Debug, Clone, Default)]
-pub struct HeldRows {
-    offsets: Vec<u32>,
-    nodes: Vec<u32>,
-    values: Vec<f64>,
-}
-
-impl HeldRows {
-    /// One row per stencil.
-    pub fn new<'a, const D: usize>(stencils: impl Iterator<Item = &'a Stencil<D>>) -> Self {
-        let mut rows = Self { offsets: vec![0], ..Self::default() };
-        for stencil in stencils {
-            rows.nodes.extend_from_slice(&stencil.nodes);
-            rows.values.extend_from_slice(&stencil.values);
-            rows.offsets.push(rows.nodes.len() as u32);
-        }
-        rows
-    }
-
-    /// Number of held nodes.
-    pub fn len(&self) -> usize {
-        self.offsets.len().saturating_sub(1)
-    }
-
-    /// Whether nothing is held.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    fn row(&self, b: usize) -> (&[u32], &[f64]) {
-        let range = self.offsets[b] as usize..self.offsets[b + 1] as usize;
-        (&self.nodes[range.clone()], &self.values[range])
-    }
-
-    /// The node lists of the rows, for the sparsity pattern.
-    pub fn node_lists(&self) -> impl Iterator<Item = &[u32]> + Clone {
-        (0..self.len()).map(|b| self.row(b).0)
-    }
-
-    /// `out = Λ d`, D numbers per row.
-    pub fn apply<const D: usize>(&self, d: &[f64], out: &mut [f64]) {
-        for (b, out) in out.chunks_exact_mut(D).enumerate() {
-            let (nodes, values) = self.row(b);
-            out.fill(0.0);
-            for (&i, value) in nodes.iter().zip(values) {
-                for (o, x) in out.iter_mut().zip(&d[i as usize * D..]) {
-                    *o += value * x;
-                }
-            }
-        }
-    }
-
-    /// `out += Λᵀ y`.
-    pub fn add_transpose<const D: usize>(&self, y: &[f64], out: &mut [f64]) {
-        for (b, y) in y.chunks_exact(D).enumerate() {
-            let (nodes, values) = self.row(b);
-            for (&i, value) in nodes.iter().zip(values) {
-                for (o, x) in out[i as usize * D..].iter_mut().zip(y) {
-                    *o += value * x;
-                }
-            }
-        }
-    }
-}
 
 /// Solves tangent systems with held rows; see the module documentation.
 #[derive(Debug)]

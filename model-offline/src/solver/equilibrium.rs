@@ -5,10 +5,12 @@
 //! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
 //! tangent is not positive definite is reported as lost stability, never passed off as an answer.
 
-use super::constrained::{ConstrainedSolver, HeldRows};
-use super::linear::Pattern;
-use crate::discretization::{Point, Quadrature};
+use super::constrained::ConstrainedSolver;
+use crate::discretization::Quadrature;
+use crate::geometry::Point;
+use crate::linalg::Pattern;
 use crate::mechanics::assembly::{self, Inverted, Scatter, State, Tissue};
+use crate::mechanics::{HeldRows, WeaklyHeld};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -84,20 +86,6 @@ pub struct Effort {
     pub factorisations: u32,
     /// Times the increment was halved.
     pub cutbacks: u32,
-}
-
-/// Displacements that are held weakly, by terms of the energy instead of constraints (Nitsche's method).
-pub trait WeaklyHeld: std::fmt::Debug + Send + Sync {
-    /// How many numbers are prescribed.
-    fn prescribed(&self) -> usize;
-    /// Nodes that interact, list by list, each ascending.
-    fn node_lists(&self) -> Vec<&[u32]>;
-    /// Adds energy and its gradient at coefficients `d`, for the prescribed numbers.
-    fn add_force(&self, tissue: &Tissue, d: &[f64], prescribed: &[f64], force: &mut [f64]) -> f64;
-    /// Adds the second derivative.
-    fn add_tangent(&self, tissue: &Tissue, d: &[f64], pattern: &Pattern, values: &mut [f64]);
-    /// Adds the force that unit rates of the prescribed numbers cause: −∂(force)/∂(prescribed) · rates.
-    fn add_response(&self, tissue: &Tissue, d: &[f64], rates: &[f64], out: &mut [f64]);
 }
 
 /// A body in equilibrium, and the means to take it to the next.

@@ -1,6 +1,4 @@
-//! Equilibrium: sparse linear algebra, held nodal values, Newton's method with cutback and line search.
+//! Equilibrium: Newton's method with line search and cutback, under constraints on nodal values.
 
 pub mod constrained;
 pub mod equilibrium;
-pub mod linear;
-mod ordering;

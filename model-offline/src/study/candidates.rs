@@ -1,11 +1,11 @@
 //! The discretizations that are worth comparing on a scene, and what one of them costs and misses.
 
 use crate::discretization::lattice::lattice_nodes;
+use crate::discretization::{Basis, Integration};
 use crate::discretization::{Method, Planar};
+use crate::model::{ModelError, TissueModel};
 use crate::placement::adaptive::{Reference, graded_model};
 use crate::placement::rest::{RestResponse, rest_responses};
-use crate::placement::{ModelError, TissueModel};
-use crate::scene::schema::{Basis, Integration};
 use crate::scene::{Resolution, Scene};
 use std::time::Instant;
 
@@ -86,7 +86,7 @@ impl Candidate {
         let scene = self.scene(scene);
         match self.nodes {
             Nodes::Uniform(spacing) => {
-                let nodes = lattice_nodes(&scene, spacing);
+                let nodes = lattice_nodes(&scene.features(), spacing);
                 let planar =
                     Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), self.method())?;
                 TissueModel::on(&scene, planar, spacing)

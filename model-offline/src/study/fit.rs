@@ -10,13 +10,14 @@
 
 use super::candidates::{Candidate, Nodes, Outcome, families, rule_name};
 use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
+use crate::discretization::Integration;
+use crate::model::{ModelError, TissueModel};
 use crate::placement::adaptive::{Reference, graded_model};
 use crate::placement::study::best_dynamic;
-use crate::placement::table::{TableBuildError, TableOptions, build as build_table};
-use crate::placement::{ModelError, TissueModel};
 use crate::reduction::{Condensed, TrainingOptions, train};
 use crate::scene::Scene;
-use crate::scene::schema::{FitSection, Integration, PlantModel, TableScalar};
+use crate::scene::schema::{FitSection, PlantModel, TableScalar};
+use crate::table::{TableBuildError, TableOptions, build as build_table};
 use firmware::contract::Table;
 use nalgebra::Vector2;
 use serde::Serialize;
@@ -118,7 +119,7 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelEr
     let chosen = Chosen {
         integration: rule_name(candidate.integration),
         basis: match (candidate.integration, candidate.basis) {
-            (Integration::FemT6, _) | (_, crate::scene::Basis::Quadratic) => "quadratic",
+            (Integration::FemT6, _) | (_, crate::discretization::Basis::Quadratic) => "quadratic",
             _ => "linear",
         },
         support: (!candidate.is_element()).then_some(candidate.support),

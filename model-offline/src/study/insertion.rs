@@ -2,11 +2,11 @@
 
 use super::candidates::{Candidate, Nodes};
 use super::pareto::{Job, Point};
-use crate::mechanics::Material;
+use crate::discretization::{Basis, Integration};
+use crate::material::Material;
+use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
-use crate::placement::{ModelError, TissueModel};
 use crate::reduction::{Condensed, TrainingOptions, train};
-use crate::scene::schema::{Basis, Integration};
 use crate::scene::{Resolution, Scene};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::Vector2;

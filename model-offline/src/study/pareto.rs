@@ -9,10 +9,10 @@
 
 use super::candidates::{Candidate, Nodes, families, rule_name};
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
-use crate::placement::ModelError;
+use crate::discretization::{Basis, Integration};
+use crate::model::ModelError;
 use crate::placement::adaptive::Reference;
 use crate::scene::Scene;
-use crate::scene::schema::{Basis, Integration};
 
 /// Distance of the reference's two levels at which it is fine enough to judge the finest candidates.
 const REFERENCE_SHARE: f64 = 1e-3;

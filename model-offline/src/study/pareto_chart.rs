@@ -2,8 +2,8 @@
 
 use super::candidates::{Nodes, rule_name};
 use super::pareto::{Job, Pareto, Point};
+use crate::discretization::Integration;
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
-use crate::scene::schema::Integration;
 use std::fmt::Write as _;
 
 fn marker(integration: Integration) -> Marker {

@@ -1,12 +1,12 @@
 //! What the mesh does to the choice of a paddle: both rankings along a refinement, on uniform and on graded nodes.
 
 use super::candidates::{Candidate, Nodes, rule_name};
+use crate::discretization::{Basis, Integration};
+use crate::model::ModelError;
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
-use crate::placement::ModelError;
 use crate::placement::adaptive::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::placement::study::parallel;
-use crate::scene::schema::{Basis, Integration};
 use crate::scene::{Resolution, Scene};
 use std::fmt::Write as _;
 
@@ -57,7 +57,7 @@ pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Res
     let steps = parallel(candidates.len(), threads, |k| {
         let candidate = candidates[k];
         let model = candidate.build(scene);
-        let nodes = model.as_ref().map_or(0, crate::placement::TissueModel::nodes);
+        let nodes = model.as_ref().map_or(0, crate::model::TissueModel::nodes);
         let responses = model.and_then(|model| rest_responses(&model));
         progress();
         Step { candidate, nodes, responses }

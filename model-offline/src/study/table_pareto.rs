@@ -3,12 +3,12 @@
 //! The loop is the firmware's own controller on a reduced model of the tissue, in this process: 1 kHz, target at 50 Hz
 //! and 20 ms late, insertion in 5 s, sensors without noise, so that what is left is the table's and the delay's.
 
+use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
 use crate::placement::study::best_dynamic;
-use crate::placement::table::{TableBuildError, TableOptions, build};
-use crate::placement::{ModelError, TissueModel};
 use crate::reduction::online::ReducedModel;
 use crate::reduction::{TrainingOptions, train};
+use crate::table::{TableBuildError, TableOptions, build};
 use firmware::contract::frames::TARGET_VISIBLE;
 use firmware::contract::{MAX_TABLE_BYTES, NeedleSample, PaddleSample, Table, TargetSample, encode};
 use firmware::scalar::Scalar;

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use firmware::contract::Table;
 use iceoryx2::service::ipc;
-use model_offline::placement::table::to_bytes;
+use model_offline::table::to_bytes;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde::de::DeserializeOwned;
 

@@ -4,7 +4,7 @@
 //! 2.2 a surface is a physical group, in 4.1 an entity). Without triangles the lines are joined to closed loops.
 
 use super::{ImportError, Imported, assemble};
-use crate::scene::geometry::Point2;
+use crate::geometry::Point2;
 use std::collections::{BTreeMap, HashMap};
 
 /// Element types: 2- and 3-node lines, 3- and 6-node triangles. Others are skipped.

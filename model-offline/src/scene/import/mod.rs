@@ -5,7 +5,7 @@
 pub mod gmsh;
 pub mod svg;
 
-use super::geometry::{Point2, Polygon, bounds, distance_to_segment, signed_area};
+use crate::geometry::{Point2, Polygon, bounds, distance_to_segment, signed_area};
 
 /// Details below this part of the body's size are left out: nothing that a node spacing of a few percent could show.
 const DETAIL: f64 = 2e-3;

@@ -1,7 +1,7 @@
 //! Closed paths and polygons of an SVG drawing; curves are flattened, transforms applied, y turned upwards.
 
 use super::{ImportError, Imported, assemble};
-use crate::scene::geometry::Point2;
+use crate::geometry::Point2;
 use kurbo::{Affine, BezPath, PathEl};
 use roxmltree::{Document, Node};
 use std::str::FromStr as _;

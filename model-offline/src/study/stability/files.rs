@@ -2,8 +2,8 @@
 
 use super::plan::{self, Entry, METHODS, Parameter, SOLVERS, is_meshfree};
 use super::{Outcome, Stability};
+use crate::discretization::Integration;
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
-use crate::scene::schema::Integration;
 use std::fmt::Write as _;
 
 fn family(integration: Integration) -> &'static str {

@@ -1,6 +1,6 @@
 //! The stretch past which a law no longer resists compression: where its nominal stress peaks.
 
-use crate::mechanics::Material;
+use crate::material::Material;
 use nalgebra::Matrix2;
 
 /// Steps of the search from the state at rest downwards.

@@ -13,7 +13,7 @@ pub mod zero_energy;
 mod files;
 mod verdict;
 
-use crate::placement::ModelError;
+use crate::model::ModelError;
 use crate::placement::study::parallel;
 use crate::scene::{Resolution, Scene};
 use law_limit::{Lateral, limit_stretch};

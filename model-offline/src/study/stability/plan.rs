@@ -1,6 +1,6 @@
 //! What is varied: one parameter at a time around the scene's own setting.
 
-use crate::scene::schema::Integration;
+use crate::discretization::Integration;
 use crate::scene::{Resolution, Scene};
 
 /// Every method there is.

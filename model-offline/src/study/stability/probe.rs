@@ -3,10 +3,10 @@
 use super::plan::Setting;
 use crate::discretization::lattice::lattice_nodes;
 use crate::discretization::{DiscretizationError, Method, Planar};
-use crate::mechanics::{Material, MaterialError};
-use crate::placement::{ModelError, TissueModel};
+use crate::geometry::{Location, Point2, distance_to_polyline};
+use crate::material::{Material, MaterialError};
+use crate::model::{ModelError, TissueModel};
 use crate::scene::Scene;
-use crate::scene::geometry::{Location, Point2, distance_to_polyline};
 use crate::solver::equilibrium::{FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 
@@ -174,7 +174,7 @@ pub(super) fn varied(scene: &Scene, setting: &Setting) -> Result<Scene, Material
 
 /// Lattice nodes, those inside the body moved at random; nodes on the boundary and on what is held stay.
 fn jittered(scene: &Scene, setting: &Setting) -> Vec<Point2> {
-    let mut nodes = lattice_nodes(scene, setting.spacing);
+    let mut nodes = lattice_nodes(&scene.features(), setting.spacing);
     if setting.jitter == 0.0 {
         return nodes;
     }

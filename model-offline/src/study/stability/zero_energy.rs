@@ -3,13 +3,14 @@
 
 use super::plan::{self, METHODS, Setting, is_meshfree};
 use super::probe;
+use crate::discretization::Integration;
 use crate::discretization::finite_element::Elements;
 use crate::discretization::triangulation::triangulate;
 use crate::discretization::{DiscretizationError, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration};
-use crate::mechanics::material::Tensor4;
-use crate::placement::ModelError;
-use crate::scene::schema::Integration;
-use crate::scene::{Point2, Scene};
+use crate::geometry::Point2;
+use crate::material::Tensor4;
+use crate::model::ModelError;
+use crate::scene::Scene;
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 /// Eigenvalues below this share of the largest count as zero.

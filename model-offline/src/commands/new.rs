@@ -1,10 +1,10 @@
 //! `model-offline new`: a scene to start from.
 
 use super::CliError;
-use crate::output;
-use crate::scene::Scene;
-use crate::scene::import::{Imported, gmsh, svg};
-use crate::scene::starter::{Labels, starter};
+use model_offline::output;
+use model_offline::scene::Scene;
+use model_offline::scene::import::{Imported, gmsh, svg};
+use model_offline::scene::starter::{Labels, starter};
 use std::path::{Path, PathBuf};
 
 /// Options of `new`.
@@ -73,7 +73,7 @@ pub(super) fn new(args: &NewArgs) -> Result<(), CliError> {
 
 fn import(
     file: &Path,
-    read: impl Fn(&str) -> Result<Imported, crate::scene::import::ImportError>,
+    read: impl Fn(&str) -> Result<Imported, model_offline::scene::import::ImportError>,
 ) -> Result<Imported, CliError> {
     let text = std::fs::read_to_string(file).map_err(|error| {
         CliError::Usage(format!("cannot read {}: {error}", file.display()), "give a text file".into())

@@ -1,7 +1,7 @@
 //! The controller's table: Jacobians and the feed-forward paddle path along the insertion, from the nonlinear model.
 
-use super::model::{Body, ModelError, TissueModel};
-use super::study::best_direction;
+use crate::model::{Body, ModelError, TissueModel};
+use crate::placement::study::best_direction;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use firmware::contract::{
     CONDITION_LIMIT, Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity,

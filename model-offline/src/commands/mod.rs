@@ -2,20 +2,21 @@
 
 mod new;
 
-use crate::discretization::DiscretizationError;
-use crate::output::{self, OutputError};
-use crate::placement::adaptive::{self, ErrorEstimate};
-use crate::placement::cross_check::cross_check;
-use crate::placement::table::{self, TableBuildError, TableOptions};
-use crate::placement::verdict::verdict;
-use crate::placement::{ModelError, Placement, TissueModel, study};
-use crate::scene::schema::{self, Basis, Essential, Integration};
-use crate::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
-use crate::solver::equilibrium::{Failure, NewtonSettings};
-use crate::study::{fit, pareto, stability, sweep, table_pareto};
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
+use model_offline::discretization::DiscretizationError;
+use model_offline::discretization::{Basis, Essential, Integration};
+use model_offline::model::{ModelError, TissueModel};
+use model_offline::output::{self, OutputError};
+use model_offline::placement::adaptive::{self, ErrorEstimate};
+use model_offline::placement::cross_check::cross_check;
+use model_offline::placement::verdict::verdict;
+use model_offline::placement::{Placement, study};
+use model_offline::scene::schema;
+use model_offline::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
+use model_offline::solver::equilibrium::{Failure, NewtonSettings};
+use model_offline::study::{fit, pareto, stability, sweep, table_pareto};
+use model_offline::table::{self, TableBuildError, TableOptions};
 use nalgebra::Vector2;
-use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -323,12 +324,7 @@ impl Common {
     }
 
     fn progress(&self, steps: u64) -> indicatif::ProgressBar {
-        if self.quiet || !std::io::stderr().is_terminal() {
-            return indicatif::ProgressBar::hidden();
-        }
-        let style = indicatif::ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left");
-        let bar = indicatif::ProgressBar::new(steps);
-        if let Ok(style) = style { bar.with_style(style) } else { bar }
+        if self.quiet { indicatif::ProgressBar::hidden() } else { output::terminal::progress(steps) }
     }
 }
 
@@ -375,7 +371,7 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
         }
         Command::Table { scene, paddle, output, knots, without_inclusion, common } => {
             let scene = common.scene(&scene, without_inclusion)?;
-            let model = TissueModel::new(&scene)?;
+            let (model, _) = adaptive::discretise(&scene)?;
             let options = TableOptions { knots, ..TableOptions::default() };
             let paddle = match paddle {
                 Some(index) => index,
@@ -385,7 +381,12 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
             let bytes = table::to_bytes(&table)?;
             output::write_whole(&output, &bytes)?;
             if !common.quiet {
-                println!("{}: {} bytes\n{}", output.display(), bytes.len(), crate::output::table_text::summary(&table));
+                println!(
+                    "{}: {} bytes\n{}",
+                    output.display(),
+                    bytes.len(),
+                    model_offline::output::table_text::summary(&table)
+                );
             }
             Ok(())
         }
@@ -395,12 +396,12 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
         Command::Inspect { table, json } => {
             let bad = |reason: String| CliError::BadTable { path: table.clone(), reason };
             let bytes = std::fs::read(&table).map_err(|e| bad(e.to_string()))?;
-            let contents = crate::output::table_text::read(&bytes).map_err(|e| bad(e.to_string()))?;
+            let contents = model_offline::output::table_text::read(&bytes).map_err(|e| bad(e.to_string()))?;
             if let Some(path) = json {
-                output::write_whole(&path, pretty(&crate::output::table_text::json(&contents)).as_bytes())?;
+                output::write_whole(&path, pretty(&model_offline::output::table_text::json(&contents)).as_bytes())?;
             }
             println!("{}: {} bytes, checked", table.display(), bytes.len());
-            println!("{}", crate::output::table_text::summary(&contents));
+            println!("{}", model_offline::output::table_text::summary(&contents));
             Ok(())
         }
         Command::Pareto { scene, out, quick, without_inclusion, common } => {
@@ -468,7 +469,7 @@ pub fn run(cli: Cli) -> Result<(), CliError> {
 
 /// The comparison of tables, on the scene's own model; where the loop cannot be closed on it, says why and goes on.
 fn pareto_tables(scene: &Scene, out: &Path, common: &Common) -> Result<String, CliError> {
-    let model = adaptive::profile_model(&TissueModel::new(scene)?)?;
+    let model = adaptive::profile_model(&adaptive::discretise(scene)?.0)?;
     match table_pareto::compare_tables(&model, common.threads()) {
         Ok(points) => {
             output::write_whole(&out.join("pareto_table.csv"), table_pareto::csv(&points).as_bytes())?;
@@ -668,7 +669,7 @@ fn solve(
     files: &SolveFiles<'_>,
     quiet: bool,
 ) -> Result<(), CliError> {
-    let model = TissueModel::new(scene)?;
+    let (model, _) = adaptive::discretise(scene)?;
     let position = model.paddle_position(paddle).ok_or_else(|| no_such_paddle(scene, paddle))?;
     let mut body = model.body(Some(position), NewtonSettings::default()).map_err(ModelError::from)?;
     // In pieces of the scene's increment: the path matters near the limits of stability.
@@ -732,22 +733,9 @@ pub fn parse() -> Cli {
             if ELSEWHERE.contains(&word.as_str()) {
                 eprintln!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help");
             } else {
-                suggest(&error, &word, &Cli::command());
+                output::terminal::suggest(&error, &word, &Cli::command());
             }
         }
         std::process::exit(error.exit_code());
     })
-}
-
-/// Names the command that a word was meant for where clap does not: it counts letters near their places, and finds
-/// nothing in common between `rnu` and `run`.
-pub fn suggest(error: &clap::Error, word: &str, command: &clap::Command) {
-    let suggested = error.get(clap::error::ContextKind::SuggestedSubcommand).is_some();
-    let nearest = command
-        .get_subcommands()
-        .map(|known| (strsim::osa_distance(word, known.get_name()), known.get_name()))
-        .min_by_key(|(distance, _)| *distance);
-    if let Some((1, name)) = nearest.filter(|_| !suggested) {
-        eprintln!("\n  tip: did you mean `{name}`?");
-    }
 }

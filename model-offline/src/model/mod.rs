@@ -1,15 +1,18 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
+mod graded;
+
+pub use graded::{graded_model, method_of};
+
 use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::lattice::lattice_nodes;
-use crate::discretization::{DiscretizationError, NodalCell, Planar, Quadrature, ShapeError, Stencil};
+use crate::discretization::{DiscretizationError, Essential, NodalCell, Planar, Quadrature, ShapeError, Stencil};
+use crate::geometry::{Point2, Polygon, distance_to_polyline, overlap_area};
+use crate::material::Material;
 use crate::mechanics::nitsche::Nitsche;
-use crate::mechanics::{Material, Tissue};
-use crate::scene::geometry::{Point2, distance_to_polyline, overlap_area};
-use crate::scene::schema::Essential;
+use crate::mechanics::{HeldRows, Tissue, WeaklyHeld};
 use crate::scene::{Resolution, Scene};
-use crate::solver::constrained::HeldRows;
-use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings, WeaklyHeld};
+use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use std::sync::Arc;
 
@@ -123,17 +126,23 @@ impl<T> Groups<T> {
 }
 
 impl TissueModel {
-    /// Discretises a scene.
+    /// Discretises a scene whose resolution is given: a spacing, or a level of refinement.
     ///
     /// # Errors
-    /// [`ModelError`]: shape functions that do not exist, features without nodes, methods that do not combine.
+    /// [`ModelError`]: shape functions that do not exist, features without nodes, methods that do not combine;
+    /// [`ModelError::Unsupported`] for a tolerance, which [`discretise`](crate::placement::discretise) refines to.
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
-        let spec = scene.discretization;
-        let Resolution::Spacing(spacing) = spec.resolution else {
-            return Ok(super::adaptive::discretise(scene)?.0);
+        let spacing = match scene.discretization.resolution {
+            Resolution::Spacing(spacing) => spacing,
+            Resolution::Level(level) => return graded_model(scene, method_of(scene), level),
+            Resolution::Tolerance(_) => {
+                return Err(ModelError::Unsupported(
+                    "the resolution is a tolerance: refine to it with `placement::discretise`".into(),
+                ));
+            }
         };
-        let nodes = lattice_nodes(scene, spacing);
-        let method = super::adaptive::method_of(scene);
+        let nodes = lattice_nodes(&scene.features(), spacing);
+        let method = method_of(scene);
         let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)
     }
@@ -344,7 +353,7 @@ fn tissue_of(scene: &Scene, cells: &[NodalCell]) -> Tissue {
 
 /// Share of a cell that a region covers. Within rounding of nothing or all it is exactly that, so that a lattice cell
 /// inside an inclusion has the inclusion's stiffness and no other.
-fn covered_fraction(region: &crate::scene::Polygon, corners: &[Point2], area: f64) -> f64 {
+fn covered_fraction(region: &Polygon, corners: &[Point2], area: f64) -> f64 {
     let fraction = overlap_area(region, corners) / area;
     if fraction < 1e-9 {
         0.0

@@ -3,7 +3,7 @@
 //! Kernels couple each node to dozens of others. On such wide stencils, dividing the body by straight cuts gives less
 //! fill than minimum degree does.
 
-use crate::discretization::Point;
+use crate::geometry::Point;
 
 /// Parts of at most this many nodes are not divided further: their blocks are dense anyway.
 const LEAF: usize = 40;

@@ -1,15 +1,6 @@
-//! Planar geometry that scenes and nodal cells are made of: polygons, polylines, segments.
+//! Polygons, polylines and segments of the plane: what scenes and nodal cells are made of.
 
-use nalgebra::Vector2;
-
-/// A point or vector of the plane, in scene length units.
-pub type Point2 = Vector2<f64>;
-
-/// The z component of `a × b`: twice the signed area of the triangle (0, a, b).
-#[inline]
-pub fn cross(a: Point2, b: Point2) -> f64 {
-    a.x * b.y - a.y * b.x
-}
+use super::point::{Point2, cross};
 
 /// Where a point lies with respect to a polygon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

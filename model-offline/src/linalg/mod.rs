@@ -1,0 +1,8 @@
+//! Sparse symmetric systems of node blocks: pattern, ordering, factorisation.
+
+pub mod cholesky;
+mod ordering;
+pub mod pattern;
+
+pub use cholesky::{NotPositiveDefinite, SparseCholesky};
+pub use pattern::Pattern;

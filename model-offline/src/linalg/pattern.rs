@@ -1,0 +1,139 @@
+//! Sparsity of matrices of node blocks.
+
+use super::ordering::Graph;
+use faer::sparse::SymbolicSparseColMatRef;
+
+/// Sparsity of a symmetric matrix of D × D node blocks: the lower triangle of blocks, by block columns. Every scalar
+/// column of a block column has the same rows, so a block is found once and its columns lie a fixed stride apart.
+#[derive(Debug, Clone)]
+pub struct Pattern {
+    dimension: usize,
+    block_starts: Vec<u32>,
+    block_rows: Vec<u32>,
+    column_starts: Vec<u32>,
+    row_indices: Vec<u32>,
+}
+
+impl Pattern {
+    /// The pattern of all pairs of nodes that share one of the given node lists (each ascending).
+    pub fn new<'a>(dimension: usize, nodes: usize, lists: impl Iterator<Item = &'a [u32]> + Clone) -> Self {
+        let mut starts = vec![0_u32; nodes + 1];
+        // Lists by their members, to gather the rows of one column after the other.
+        for list in lists.clone() {
+            for &i in list {
+                starts[i as usize + 1] += 1;
+            }
+        }
+        for i in 0..nodes {
+            starts[i + 1] += starts[i];
+        }
+        let mut fill = starts.clone();
+        let all: Vec<&[u32]> = lists.collect();
+        let mut members = vec![0_u32; *starts.last().unwrap_or(&0) as usize];
+        for (l, list) in all.iter().enumerate() {
+            for &i in *list {
+                members[fill[i as usize] as usize] = l as u32;
+                fill[i as usize] += 1;
+            }
+        }
+        let (mut block_starts, mut block_rows) = (vec![0_u32], Vec::new());
+        let mut seen = vec![u32::MAX; nodes];
+        let mut rows = Vec::new();
+        for j in 0..nodes {
+            rows.clear();
+            // The diagonal block is always there, so that a node without any point shows as a zero pivot.
+            rows.push(j as u32);
+            seen[j] = j as u32;
+            for &l in &members[starts[j] as usize..starts[j + 1] as usize] {
+                for &i in all[l as usize].iter().rev().take_while(|&&i| i as usize > j) {
+                    if seen[i as usize] != j as u32 {
+                        seen[i as usize] = j as u32;
+                        rows.push(i);
+                    }
+                }
+            }
+            rows.sort_unstable();
+            block_rows.extend_from_slice(&rows);
+            block_starts.push(block_rows.len() as u32);
+        }
+        let (mut column_starts, mut row_indices) = (vec![0_u32], Vec::new());
+        for j in 0..nodes {
+            for _ in 0..dimension {
+                for &i in &block_rows[block_starts[j] as usize..block_starts[j + 1] as usize] {
+                    row_indices.extend((0..dimension).map(|r| i * dimension as u32 + r as u32));
+                }
+                column_starts.push(row_indices.len() as u32);
+            }
+        }
+        Self { dimension, block_starts, block_rows, column_starts, row_indices }
+    }
+
+    /// Unknowns per node.
+    pub fn dimension(&self) -> usize {
+        self.dimension
+    }
+
+    /// Number of unknowns.
+    pub fn unknowns(&self) -> usize {
+        self.column_starts.len() - 1
+    }
+
+    /// Number of stored entries.
+    pub fn entries(&self) -> usize {
+        self.row_indices.len()
+    }
+
+    /// Index of the first entry of block (row node i, column node j), i ≥ j; `None` when it is not in the pattern.
+    pub fn block_position(&self, i: u32, j: u32) -> Option<usize> {
+        let range = self.block_starts[j as usize] as usize..self.block_starts[j as usize + 1] as usize;
+        let rank = self.block_rows[range].binary_search(&i).ok()?;
+        Some(self.column_starts[j as usize * self.dimension] as usize + rank * self.dimension)
+    }
+
+    /// Entries per scalar column of block column j: the stride between a block's columns.
+    #[inline]
+    pub fn column_length(&self, j: u32) -> usize {
+        let at = j as usize * self.dimension;
+        (self.column_starts[at + 1] - self.column_starts[at]) as usize
+    }
+
+    /// Index of the diagonal entry of scalar unknown `u`.
+    pub fn diagonal_position(&self, u: usize) -> usize {
+        // The diagonal block is the first of its column.
+        self.column_starts[u] as usize + u % self.dimension
+    }
+
+    /// The graph of nodes that share a block.
+    pub(super) fn graph(&self) -> Graph {
+        let nodes = self.block_starts.len() - 1;
+        let column = |j: usize| &self.block_rows[self.block_starts[j] as usize + 1..self.block_starts[j + 1] as usize];
+        let mut starts = vec![0_u32; nodes + 1];
+        for j in 0..nodes {
+            starts[j + 1] += column(j).len() as u32;
+            for &i in column(j) {
+                starts[i as usize + 1] += 1;
+            }
+        }
+        for i in 0..nodes {
+            starts[i + 1] += starts[i];
+        }
+        let mut fill = starts.clone();
+        let mut neighbours = vec![0_u32; starts[nodes] as usize];
+        let mut join = |a: usize, b: usize| {
+            neighbours[fill[a] as usize] = b as u32;
+            fill[a] += 1;
+        };
+        for j in 0..nodes {
+            for &i in column(j) {
+                join(i as usize, j);
+                join(j, i as usize);
+            }
+        }
+        Graph { starts, neighbours }
+    }
+
+    pub(super) fn symbolic(&self) -> SymbolicSparseColMatRef<'_, u32> {
+        let n = self.unknowns();
+        SymbolicSparseColMatRef::new_checked(n, n, &self.column_starts, None, &self.row_indices)
+    }
+}

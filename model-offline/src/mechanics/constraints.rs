@@ -1,0 +1,85 @@
+//! Essential boundary conditions: nodal values prescribed exactly, or weakly by terms of the energy.
+
+use super::assembly::Tissue;
+use crate::discretization::Stencil;
+use crate::linalg::Pattern;
+
+/// Rows Λ_b of the held nodes: `u(X_b) = Σ_I Ψ_I(X_b) d_I`.
+#[derive(Debug, Clone, Default)]
+pub struct HeldRows {
+    offsets: Vec<u32>,
+    nodes: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl HeldRows {
+    /// One row per stencil.
+    pub fn new<'a, const D: usize>(stencils: impl Iterator<Item = &'a Stencil<D>>) -> Self {
+        let mut rows = Self { offsets: vec![0], ..Self::default() };
+        for stencil in stencils {
+            rows.nodes.extend_from_slice(&stencil.nodes);
+            rows.values.extend_from_slice(&stencil.values);
+            rows.offsets.push(rows.nodes.len() as u32);
+        }
+        rows
+    }
+
+    /// Number of held nodes.
+    pub fn len(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    /// Whether nothing is held.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub(crate) fn row(&self, b: usize) -> (&[u32], &[f64]) {
+        let range = self.offsets[b] as usize..self.offsets[b + 1] as usize;
+        (&self.nodes[range.clone()], &self.values[range])
+    }
+
+    /// The node lists of the rows, for the sparsity pattern.
+    pub fn node_lists(&self) -> impl Iterator<Item = &[u32]> + Clone {
+        (0..self.len()).map(|b| self.row(b).0)
+    }
+
+    /// `out = Λ d`, D numbers per row.
+    pub fn apply<const D: usize>(&self, d: &[f64], out: &mut [f64]) {
+        for (b, out) in out.chunks_exact_mut(D).enumerate() {
+            let (nodes, values) = self.row(b);
+            out.fill(0.0);
+            for (&i, value) in nodes.iter().zip(values) {
+                for (o, x) in out.iter_mut().zip(&d[i as usize * D..]) {
+                    *o += value * x;
+                }
+            }
+        }
+    }
+
+    /// `out += Λᵀ y`.
+    pub fn add_transpose<const D: usize>(&self, y: &[f64], out: &mut [f64]) {
+        for (b, y) in y.chunks_exact(D).enumerate() {
+            let (nodes, values) = self.row(b);
+            for (&i, value) in nodes.iter().zip(values) {
+                for (o, x) in out[i as usize * D..].iter_mut().zip(y) {
+                    *o += value * x;
+                }
+            }
+        }
+    }
+}
+
+/// Displacements that are held weakly, by terms of the energy instead of constraints (Nitsche's method).
+pub trait WeaklyHeld: std::fmt::Debug + Send + Sync {
+    /// How many numbers are prescribed.
+    fn prescribed(&self) -> usize;
+    /// Nodes that interact, list by list, each ascending.
+    fn node_lists(&self) -> Vec<&[u32]>;
+    /// Adds energy and its gradient at coefficients `d`, for the prescribed numbers.
+    fn add_force(&self, tissue: &Tissue, d: &[f64], prescribed: &[f64], force: &mut [f64]) -> f64;
+    /// Adds the second derivative.
+    fn add_tangent(&self, tissue: &Tissue, d: &[f64], pattern: &Pattern, values: &mut [f64]);
+    /// Adds the force that unit rates of the prescribed numbers cause: −∂(force)/∂(prescribed) · rates.
+    fn add_response(&self, tissue: &Tissue, d: &[f64], rates: &[f64], out: &mut [f64]);
+}
