@@ -1,13 +1,10 @@
 //! Published benchmark problems, solved through the library: tests are named after their source.
 
-use model_offline::discretization::{Basis, Integration};
-use model_offline::discretization::{Method, Planar};
+use model_offline::discretization::{Basis, Integration, Method, Planar};
 use model_offline::geometry::{Point2, Polygon};
-use model_offline::material::Material;
-use model_offline::mechanics::HeldRows;
-use model_offline::mechanics::Tissue;
-use model_offline::mechanics::WeaklyHeld;
+use model_offline::material::{Law, Material as _};
 use model_offline::mechanics::nitsche::Nitsche;
+use model_offline::mechanics::{HeldRows, Tissue, WeaklyHeld};
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};
@@ -17,14 +14,14 @@ fn method(integration: Integration, basis: Basis, support: f64, consistent: bool
 }
 
 /// Plane-stress Lamé parameters: λ* = Eν/(1 − ν²), μ = E/(2(1 + ν)).
-fn plane_stress(e: f64, nu: f64) -> Material {
-    Material::linear(e * nu / (1.0 - nu * nu), e / (2.0 * (1.0 + nu))).unwrap()
+fn plane_stress(e: f64, nu: f64) -> Law {
+    Law::linear(e * nu / (1.0 - nu * nu), e / (2.0 * (1.0 + nu))).unwrap()
 }
 
 /// A body with nodes held where `held` gives a displacement.
 fn hold(
     planar: &Planar,
-    material: &Material,
+    material: &Law,
     spacing: f64,
     held: impl Fn(Point2) -> Option<Point2>,
 ) -> (Equilibrium<2>, Vec<f64>) {
@@ -63,7 +60,7 @@ fn patch_with_nitsche(integration: Integration, consistent: bool) -> f64 {
     let planar =
         Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(0.1), method(integration, Basis::Linear, 2.0, consistent))
             .unwrap();
-    let tissue = Tissue::uniform(Material::linear(383.0, 318.5).unwrap(), planar.cells().len());
+    let tissue = Tissue::uniform(Law::linear(383.0, 318.5).unwrap(), planar.cells().len());
     let points = planar.boundary_points().unwrap();
     let prescribed: Vec<f64> = points.iter().flat_map(|p| <[f64; 2]>::from(linear_field(p.position))).collect();
     let weak: Arc<dyn WeaklyHeld> = Arc::new(Nitsche::new(&planar, &tissue, points));
@@ -88,7 +85,7 @@ fn patch_with_tractions(integration: Integration, consistent: bool) -> f64 {
     let planar =
         Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(0.1), method(integration, Basis::Linear, 2.0, consistent))
             .unwrap();
-    let law = Material::linear(383.0, 318.5).unwrap();
+    let law = Law::linear(383.0, 318.5).unwrap();
     let gradient = nalgebra::Matrix2::new(0.01, 0.02, -0.015, 0.01);
     let stress = law.respond(&gradient).pk1_stress;
     let load = planar.boundary_force(|_, n| stress * n).unwrap();
@@ -183,7 +180,7 @@ fn cook(n: usize) -> (Polygon, Vec<Point2>) {
     (outline, nodes)
 }
 
-fn cook_tip(integration: Integration, material: &Material, n: usize, steps: u32) -> f64 {
+fn cook_tip(integration: Integration, material: &Law, n: usize, steps: u32) -> f64 {
     let (outline, nodes) = cook(n);
     let planar = Planar::new(&outline, &[], nodes, None, method(integration, Basis::Linear, 2.0, true)).unwrap();
     let (mut body, prescribed) = hold(&planar, material, 1.0, |x| (x.x.abs() < 1e-9).then(Point2::zeros));
@@ -211,7 +208,7 @@ fn cooks_membrane_finite_strain() {
     // Plane strain, μ = 0.4225 MPa, ν = 0.3, dead load 1 N: 14.74 mm (documents that say 14.33 never applied plane strain).
     let (mu, nu) = (0.4225, 0.3);
     let kappa = 2.0 * mu * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu));
-    let law = Material::neo_hookean(kappa - 2.0 * mu / 3.0, mu).unwrap();
+    let law = Law::neo_hookean(kappa - 2.0 * mu / 3.0, mu).unwrap();
     for integration in [Integration::Scni, Integration::Nsni, Integration::Gauss, Integration::FemT6] {
         let tip = cook_tip(integration, &law, 64, 4);
         println!("{integration:?}: {tip:.3}");
@@ -243,7 +240,7 @@ fn manufactured(integration: Integration, basis: Basis, support: f64, n: usize) 
     let nodes = jittered_rectangle(1.0, 1.0, n, n, 0.15, 3);
     let planar =
         Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(h), method(integration, basis, support, true)).unwrap();
-    let law = Material::linear(lambda, mu).unwrap();
+    let law = Law::linear(lambda, mu).unwrap();
     let tissue = Tissue::uniform(law, planar.cells().len());
     // Weakly, so that the boundary does not limit the order.
     let points = planar.boundary_points().unwrap();
@@ -335,7 +332,7 @@ fn spectrum(integration: Integration) -> Vec<f64> {
     let planar =
         Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(1.0 / 6.0), method(integration, Basis::Linear, 2.0, true))
             .unwrap();
-    let law = Material::saint_venant_kirchhoff(383.0, 318.5).unwrap();
+    let law = Law::saint_venant_kirchhoff(383.0, 318.5).unwrap();
     let a = law.tangent(&nalgebra::Matrix2::zeros());
     let rule = planar.rule();
     let mut stiffness = nalgebra::DMatrix::<f64>::zeros(n, n);

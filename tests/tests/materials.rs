@@ -1,6 +1,6 @@
 //! Stress and tangent of every law against closed forms, finite differences and frame invariance.
 
-use model_offline::material::{FungTensors, Material, Matrix, determinant};
+use model_offline::material::{FungTensors, Law, Material as _, Matrix, determinant};
 use nalgebra::{Matrix2, Matrix3};
 use tests::Scatter;
 
@@ -26,18 +26,18 @@ const TABLE_I_C: [(u32, u32, u32, u32, f64); 8] = [
     (1, 0, 0, 1, 1.5),
 ];
 
-fn paper_law(c: f64) -> Material {
-    Material::fung(383.0, 318.5, c, 1.5, 1.0).unwrap()
+fn paper_law(c: f64) -> Law {
+    Law::fung(383.0, 318.5, c, 1.5, 1.0).unwrap()
 }
 
-fn laws() -> Vec<(&'static str, Material)> {
-    let general = Material::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 10.0).unwrap()).unwrap();
+fn laws() -> Vec<(&'static str, Law)> {
+    let general = Law::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 10.0).unwrap()).unwrap();
     vec![
         ("fung", paper_law(10.0)),
         ("fung general", general),
-        ("st venant-kirchhoff", Material::saint_venant_kirchhoff(383.0, 318.5).unwrap()),
-        ("neo-hookean", Material::neo_hookean(383.0, 318.5).unwrap()),
-        ("linear", Material::linear(383.0, 318.5).unwrap()),
+        ("st venant-kirchhoff", Law::saint_venant_kirchhoff(383.0, 318.5).unwrap()),
+        ("neo-hookean", Law::neo_hookean(383.0, 318.5).unwrap()),
+        ("linear", Law::linear(383.0, 318.5).unwrap()),
         ("fung with barrier", paper_law(10.0).with_barrier(50.0).unwrap()),
     ]
 }
@@ -48,7 +48,7 @@ fn gradient(scatter: &mut Scatter, size: f64) -> Matrix<2> {
 
 #[test]
 fn table_i_is_isotropic_with_the_published_moduli() {
-    let general = Material::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 0.779).unwrap()).unwrap();
+    let general = Law::fung_general(FungTensors::from_entries(&TABLE_I_A, &TABLE_I_C, 0.779).unwrap()).unwrap();
     let mut scatter = Scatter::new(1);
     for _ in 0..50 {
         let h = gradient(&mut scatter, 0.3);
@@ -143,7 +143,7 @@ fn stress_is_the_slope_of_energy_and_tangent_the_slope_of_stress() {
 #[test]
 fn the_same_holds_in_three_dimensions() {
     let mut scatter = Scatter::new(3);
-    for law in [paper_law(10.0), Material::neo_hookean(383.0, 318.5).unwrap().with_barrier(20.0).unwrap()] {
+    for law in [paper_law(10.0), Law::neo_hookean(383.0, 318.5).unwrap().with_barrier(20.0).unwrap()] {
         let h = Matrix3::from_fn(|_, _| 0.2 * scatter.sample());
         let tangent = law.tangent(&h);
         for k in 0..3 {
@@ -205,10 +205,10 @@ fn barrier_is_not_felt_at_small_strain_and_is_felt_in_strong_compression() {
 
 #[test]
 fn unusable_moduli_are_refused() {
-    assert!(Material::fung(383.0, -1.0, 0.0, 0.0, 0.0).is_err());
-    assert!(Material::fung(f64::NAN, 1.0, 0.0, 0.0, 0.0).is_err());
-    assert!(Material::fung(383.0, 318.5, -1.0, 1.5, 1.0).is_err());
-    assert!(Material::linear(-2.0, 1.0).is_err());
+    assert!(Law::fung(383.0, -1.0, 0.0, 0.0, 0.0).is_err());
+    assert!(Law::fung(f64::NAN, 1.0, 0.0, 0.0, 0.0).is_err());
+    assert!(Law::fung(383.0, 318.5, -1.0, 1.5, 1.0).is_err());
+    assert!(Law::linear(-2.0, 1.0).is_err());
     assert!(FungTensors::from_entries(&[(0, 0, 0, 2, 1.0)], &[], 0.0).is_err());
     assert!(paper_law(0.0).with_barrier(f64::INFINITY).is_err());
 }
@@ -217,7 +217,7 @@ fn unusable_moduli_are_refused() {
 /// linear elasticity is exact there to 1e-6.
 #[test]
 fn energies_of_tiny_strains_are_those_of_linear_elasticity() {
-    let linear = Material::linear(383.0, 318.5).unwrap();
+    let linear = Law::linear(383.0, 318.5).unwrap();
     let h = Matrix2::new(2.0e-7, -0.7e-7, 1.1e-7, -0.4e-7);
     let solid = Matrix3::new(2.0e-7, -0.7e-7, 0.3e-7, 1.1e-7, -0.4e-7, 0.9e-7, 0.2e-7, -0.8e-7, 1.3e-7);
     for (name, law) in laws().into_iter().filter(|(name, _)| ["neo-hookean", "st venant-kirchhoff"].contains(name)) {

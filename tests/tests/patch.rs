@@ -6,7 +6,7 @@
 
 use model_offline::discretization::{Basis, Integration};
 use model_offline::discretization::{Method, Planar};
-use model_offline::material::Material;
+use model_offline::material::Law;
 use model_offline::mechanics::HeldRows;
 use model_offline::mechanics::Tissue;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
@@ -24,7 +24,7 @@ fn patch_error(integration: Integration, jitter: f64) -> f64 {
     let stencils: Vec<_> = boundary.iter().map(|x| planar.value_stencil(x).unwrap()).collect();
     let linear = |x: &nalgebra::Vector2<f64>| [0.01 * x.x + 0.02 * x.y, -0.015 * x.x + 0.01 * x.y];
     let prescribed: Vec<f64> = boundary.iter().flat_map(|x| linear(x)).collect();
-    let tissue = Tissue::uniform(Material::linear(383.0, 318.5).unwrap(), nodes.len());
+    let tissue = Tissue::uniform(Law::linear(383.0, 318.5).unwrap(), nodes.len());
     let mut body = Equilibrium::at_rest(
         Arc::clone(planar.rule()),
         tissue,

@@ -5,12 +5,12 @@
 
 use crate::discretization::Quadrature;
 use crate::linalg::Pattern;
-use crate::material::{Material, MaterialError, Matrix, determinant};
+use crate::material::{Law, Material as _, Matrix, determinant};
 
 /// The materials of a tissue, and how much of each every cell contains.
 #[derive(Debug, Clone)]
 pub struct Tissue {
-    materials: Vec<Material>,
+    materials: Vec<Law>,
     /// Per cell: range into `parts`.
     offsets: Vec<u32>,
     /// (material, factor on its energy).
@@ -19,12 +19,12 @@ pub struct Tissue {
 
 impl Tissue {
     /// A tissue of one material in every cell.
-    pub fn uniform(material: Material, cells: usize) -> Self {
+    pub fn uniform(material: Law, cells: usize) -> Self {
         Self { materials: vec![material], offsets: (0..=cells as u32).collect(), parts: vec![(0, 1.0); cells] }
     }
 
     /// A tissue from the parts of every cell: (index into `materials`, factor on the energy).
-    pub fn new(materials: Vec<Material>, cells: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
+    pub fn new(materials: Vec<Law>, cells: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
         let (mut offsets, mut parts) = (vec![0], Vec::new());
         for cell in cells {
             parts.extend(cell);
@@ -35,23 +35,20 @@ impl Tissue {
 
     /// The materials and energy factors of a cell.
     #[inline]
-    pub fn parts(&self, cell: u32) -> impl Iterator<Item = (&Material, f64)> + '_ {
+    pub fn parts(&self, cell: u32) -> impl Iterator<Item = (&Law, f64)> + '_ {
         let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
         self.parts[range].iter().map(|&(m, factor)| (&self.materials[m as usize], factor))
     }
 
     /// Whether every material is linear, so that one tangent serves every state.
     pub fn is_linear(&self) -> bool {
-        self.materials.iter().all(Material::is_linear)
+        self.materials.iter().all(Law::is_linear)
     }
 
     /// The same tissue with every law replaced by its small-strain limit.
-    ///
-    /// # Errors
-    /// Never for the laws there are; the signature leaves room for one without a linear limit.
-    pub fn linearised(&self) -> Result<Self, MaterialError> {
-        let materials = self.materials.iter().map(Material::linearised).collect::<Result<_, _>>()?;
-        Ok(Self { materials, ..self.clone() })
+    #[must_use]
+    pub fn linearised(&self) -> Self {
+        Self { materials: self.materials.iter().map(Law::linearised).collect(), ..self.clone() }
     }
 }
 

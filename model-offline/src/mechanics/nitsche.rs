@@ -11,7 +11,7 @@ use crate::discretization::Planar;
 use crate::discretization::boundary::BoundaryPoint;
 use crate::geometry::Point;
 use crate::linalg::Pattern;
-use crate::material::{Matrix, Tensor4};
+use crate::material::{Material, Matrix, Tensor4};
 
 /// Penalty β over (stiffness / cell size).
 const PENALTY: f64 = 40.0;
@@ -49,7 +49,8 @@ impl Nitsche {
                 let values = nodes.iter().map(|&i| pick(&p.stencil.nodes, i).map_or(0.0, |k| p.stencil.values[k]));
                 let gradients =
                     nodes.iter().map(|&i| pick(cell_nodes, i).map_or_else(Point::zeros, |k| cell_gradients[k]));
-                let stiffness: f64 = tissue.parts(p.cell).map(|(m, factor)| m.rest_stiffness() * factor).sum();
+                let stiffness: f64 =
+                    tissue.parts(p.cell).map(|(m, factor)| Material::<2>::rest_stiffness(m) * factor).sum();
                 let size = planar.cells()[p.cell as usize].area.sqrt();
                 HeldPoint {
                     weight: p.weight,

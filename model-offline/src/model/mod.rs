@@ -8,7 +8,7 @@ use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::lattice::lattice_nodes;
 use crate::discretization::{DiscretizationError, Essential, NodalCell, Planar, Quadrature, ShapeError, Stencil};
 use crate::geometry::{Point2, Polygon, distance_to_polyline, overlap_area};
-use crate::material::Material;
+use crate::material::Law;
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{HeldRows, Tissue, WeaklyHeld};
 use crate::scene::{Resolution, Scene};
@@ -313,7 +313,7 @@ impl TissueModel {
 
 /// Materials of the cells: an inclusion that covers part of a cell counts with the area it covers.
 fn tissue_of(scene: &Scene, cells: &[NodalCell]) -> Tissue {
-    let mut materials: Vec<Material> = vec![scene.material.clone()];
+    let mut materials: Vec<Law> = vec![scene.material.clone()];
     let of_inclusion: Vec<u32> = scene
         .inclusions
         .iter()

@@ -1,6 +1,6 @@
 //! ParaView's unstructured grid, one file.
 
-use crate::material::{Matrix, determinant, green_lagrange};
+use crate::material::{Material as _, Matrix, determinant, green_lagrange};
 use crate::mechanics::assembly::displacement_gradient;
 use crate::model::{Body, TissueModel};
 use std::fmt::Write as _;

@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn condensing_is_exact_for_the_linear_law() {
         let mut scene = Scene::bundled("paper").unwrap();
-        scene.material = scene.material.linearised().unwrap();
+        scene.material = scene.material.linearised();
         for inclusion in [true, false] {
             let scene = if inclusion { scene.clone() } else { scene.without_inclusions() };
             let model = TissueModel::new(&scene).unwrap();

@@ -1,5 +1,6 @@
 //! The body's response at rest to each thing that moves it.
 
+use crate::material::Material as _;
 use crate::mechanics::Tissue;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::NewtonSettings;

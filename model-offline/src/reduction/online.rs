@@ -9,6 +9,7 @@
 //! largest part of the error that the estimate missed on the validation states, so that it was an upper bound on all of
 //! them.
 
+use crate::material::Material as _;
 use crate::mechanics::assembly::Tissue;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use std::sync::Arc;

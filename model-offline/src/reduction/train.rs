@@ -4,6 +4,7 @@ use super::condensed::Condensed;
 use super::lifting::{control_values, flat, lifting, tangent_at_rest};
 use super::nnls::non_negative_fit;
 use super::online::{Domain, Invalid, ReducedModel, SampledPoint};
+use crate::material::Material as _;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::model::{ModelError, TissueModel};
 use crate::placement::study::{best_direction, parallel};

@@ -11,7 +11,7 @@ pub use schema::{FitSection, PlantModel, TableScalar};
 
 use crate::discretization::{Basis, Essential, Features, Integration};
 use crate::geometry::{Point2, Polygon};
-use crate::material::Material;
+use crate::material::Law;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -37,7 +37,7 @@ pub struct Scene {
     /// The body.
     pub outline: Polygon,
     /// What the body is made of.
-    pub material: Material,
+    pub material: Law,
     /// Regions of another stiffness or material.
     pub inclusions: Vec<Inclusion>,
     /// Polylines on the boundary that cannot move.
@@ -64,7 +64,7 @@ pub struct Inclusion {
     /// Factor on the energy.
     pub stiffness: f64,
     /// A material of its own; the body's when absent.
-    pub material: Option<Material>,
+    pub material: Option<Law>,
 }
 
 /// The needle.

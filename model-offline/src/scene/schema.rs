@@ -2,6 +2,7 @@
 //! [`Scene`](super::Scene).
 
 use crate::discretization::{Basis, Essential, Integration};
+use crate::material::MaterialSection;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -118,49 +119,6 @@ impl Default for UnitsSection {
 pub struct DomainSection {
     /// Simple polygon, either orientation.
     pub outline: Located<Vec<[f64; 2]>>,
-}
-
-/// Material models.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum MaterialModel {
-    /// Fung's exponential law, the paper's equation 6.
-    Fung,
-    /// Compressible neo-Hookean with an isochoric-volumetric split.
-    NeoHookean,
-    /// St. Venant–Kirchhoff: linear in the Green–Lagrange strain.
-    SaintVenantKirchhoff,
-    /// Linear elasticity at small strain.
-    Linear,
-}
-
-/// One entry `[i, j, k, l, value]` of a fourth-order tensor, indices from 0, as in the paper's Table I.
-pub type TensorEntry = (u32, u32, u32, u32, f64);
-
-/// What tissue is made of. Either the isotropic moduli or, for `fung`, the general tensors `A` and `C`.
-#[derive(Debug, Clone, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct MaterialSection {
-    /// Which law.
-    pub model: MaterialModel,
-    /// First Lamé parameter λ, stress units.
-    pub lambda: Option<f64>,
-    /// Shear modulus μ, stress units.
-    pub mu: Option<f64>,
-    /// Factor c of Fung's exponential term, stress units.
-    pub c: Option<f64>,
-    /// λ of the exponent, dimensionless.
-    pub lambda_c: Option<f64>,
-    /// μ of the exponent, dimensionless.
-    pub mu_c: Option<f64>,
-    /// General form: entries [i, j, k, l, value] of A, stress units.
-    #[serde(rename = "A")]
-    pub a: Option<Vec<TensorEntry>>,
-    /// General form: entries [i, j, k, l, value] of C, dimensionless.
-    #[serde(rename = "C")]
-    pub c_tensor: Option<Vec<TensorEntry>>,
-    /// Volumetric barrier β, stress units: adds β (ln J)⁴ / 4, felt only under strong volume change.
-    pub barrier: Option<f64>,
 }
 
 /// A region of another stiffness or material.

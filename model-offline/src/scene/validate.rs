@@ -1,12 +1,12 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
 use super::error::{SceneError, Source};
-use super::schema::{DiscretizationSection, InclusionSection, Located, MaterialModel, MaterialSection, SceneFile};
+use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
 use super::{Actuator, Discretization, Inclusion, Needle, Paddle, Resolution, Scene};
 use crate::discretization::Integration;
 use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
-use crate::material::{FungTensors, Material, MaterialError};
+use crate::material::{Law, MaterialSection};
 use std::ops::Range;
 
 /// Outlines of more vertices than this are refused: nothing a needle scene needs, and memory stays bounded.
@@ -293,68 +293,8 @@ impl Validator<'_> {
         })
     }
 
-    fn material(&self, located: &Located<MaterialSection>) -> Checked<Material> {
-        let m = located.get();
-        let fail = |message: String, help: &str| self.error(located.span(), message, help);
-        let required = |value: Option<f64>, name: &str| {
-            value.ok_or_else(|| fail(format!("material: {name} is missing"), "give every modulus of the law"))
-        };
-        let unused = |keys: &[(&str, bool)]| match keys.iter().find(|k| k.1) {
-            Some((key, _)) => {
-                Err(fail(format!("material: {key} has no meaning for this law"), "remove it, or choose another model"))
-            }
-            None => Ok(()),
-        };
-        let exponential = [
-            ("c", m.c.is_some()),
-            ("lambda_c", m.lambda_c.is_some()),
-            ("mu_c", m.mu_c.is_some()),
-            ("A", m.a.is_some()),
-            ("C", m.c_tensor.is_some()),
-        ];
-        let built = match (m.model, &m.a) {
-            (MaterialModel::Fung, Some(a)) => {
-                unused(&[
-                    ("lambda beside A", m.lambda.is_some()),
-                    ("mu beside A", m.mu.is_some()),
-                    ("lambda_c beside A", m.lambda_c.is_some()),
-                    ("mu_c beside A", m.mu_c.is_some()),
-                ])?;
-                let none = Vec::new();
-                let c_entries = m.c_tensor.as_ref().unwrap_or(&none);
-                FungTensors::from_entries(a, c_entries, m.c.unwrap_or(0.0)).and_then(Material::fung_general)
-            }
-            (MaterialModel::Fung, None) => {
-                unused(&[("C without A", m.c_tensor.is_some())])?;
-                let c = m.c.unwrap_or(0.0);
-                let (lambda_c, mu_c) = if c == 0.0 {
-                    (m.lambda_c.unwrap_or(0.0), m.mu_c.unwrap_or(0.0))
-                } else {
-                    (required(m.lambda_c, "lambda_c")?, required(m.mu_c, "mu_c")?)
-                };
-                Material::fung(required(m.lambda, "lambda")?, required(m.mu, "mu")?, c, lambda_c, mu_c)
-            }
-            (MaterialModel::SaintVenantKirchhoff, _) => {
-                unused(&exponential)?;
-                Material::saint_venant_kirchhoff(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
-            }
-            (MaterialModel::NeoHookean, _) => {
-                unused(&exponential)?;
-                Material::neo_hookean(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
-            }
-            (MaterialModel::Linear, _) => {
-                unused(&exponential)?;
-                Material::linear(required(m.lambda, "lambda")?, required(m.mu, "mu")?)
-            }
-        };
-        let refuse = |error: MaterialError| {
-            fail(format!("material: {error}"), "the law must be stable at rest: moduli finite, mu > 0, lambda + mu > 0")
-        };
-        let material = built.map_err(refuse)?;
-        match m.barrier {
-            Some(beta) => material.with_barrier(beta).map_err(refuse),
-            None => Ok(material),
-        }
+    fn material(&self, located: &Located<MaterialSection>) -> Checked<Law> {
+        Law::read(located.get()).map_err(|error| self.error(located.span(), format!("material: {error}"), error.help()))
     }
 
     fn actuator(&self, needle: &Needle) -> Checked<Actuator> {

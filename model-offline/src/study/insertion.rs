@@ -3,7 +3,7 @@
 use super::candidates::{Candidate, Nodes};
 use super::pareto::{Job, Point};
 use crate::discretization::{Basis, Integration};
-use crate::material::Material;
+use crate::material::{Law, Material};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
 use crate::reduction::{Condensed, TrainingOptions, train};
@@ -28,9 +28,9 @@ pub fn with_mesh_limit(scene: &Scene) -> Result<(Scene, Option<f64>), ModelError
     if scene.material.has_mesh_limit() {
         return Ok((scene.clone(), None));
     }
-    let beta = BARRIER_SHARE * scene.material.rest_stiffness();
-    let with = |material: &Material| {
-        let own = BARRIER_SHARE * material.rest_stiffness();
+    let beta = BARRIER_SHARE * Material::<2>::rest_stiffness(&scene.material);
+    let with = |material: &Law| {
+        let own = BARRIER_SHARE * Material::<2>::rest_stiffness(material);
         material.clone().with_barrier(own).map_err(|e| ModelError::Unsupported(e.to_string()))
     };
     let mut limited = scene.clone();

@@ -1,6 +1,6 @@
 //! The stretch past which a law no longer resists compression: where its nominal stress peaks.
 
-use crate::material::Material;
+use crate::material::{Law, Material as _};
 use nalgebra::Matrix2;
 
 /// Steps of the search from the state at rest downwards.
@@ -20,7 +20,7 @@ pub enum Lateral {
 /// Stretch at the peak of the nominal stress in compression along the first axis, plane strain; none when the law
 /// resists ever more. At that stretch ∂P₁₁/∂F₁₁ = 0 (with the lateral stretch following, when it is free), and no
 /// homogeneous state beyond it is stable under a dead load. For St. Venant–Kirchhoff, 1/√3 either way.
-pub fn limit_stretch(law: &Material, lateral: Lateral) -> Option<f64> {
+pub fn limit_stretch(law: &Law, lateral: Lateral) -> Option<f64> {
     let mut width = 1.0;
     let mut slope_at = |stretch: f64| {
         if lateral == Lateral::Free {
@@ -52,7 +52,7 @@ fn gradient(stretch: f64, width: f64) -> Matrix2<f64> {
 }
 
 /// dP₁₁/dF₁₁ along the path.
-fn slope(law: &Material, stretch: f64, width: f64, lateral: Lateral) -> f64 {
+fn slope(law: &Law, stretch: f64, width: f64, lateral: Lateral) -> f64 {
     let a = law.tangent(&gradient(stretch, width));
     match lateral {
         Lateral::Confined => a[0][0][0][0],
@@ -61,7 +61,7 @@ fn slope(law: &Material, stretch: f64, width: f64, lateral: Lateral) -> f64 {
 }
 
 /// The lateral stretch at which P₂₂ = 0, by Newton's method from that of a neighbouring state.
-fn free_width(law: &Material, stretch: f64, guess: f64) -> f64 {
+fn free_width(law: &Law, stretch: f64, guess: f64) -> f64 {
     let mut width = guess;
     for _ in 0..50 {
         let h = gradient(stretch, width);
@@ -78,8 +78,8 @@ fn free_width(law: &Material, stretch: f64, guess: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn fung(c: f64) -> Material {
-        Material::fung(383.0, 318.5, c, 1.5, 1.0).unwrap()
+    fn fung(c: f64) -> Law {
+        Law::fung(383.0, 318.5, c, 1.5, 1.0).unwrap()
     }
 
     #[test]
@@ -101,6 +101,6 @@ mod tests {
 
     #[test]
     fn a_neo_hookean_law_has_no_peak() {
-        assert_eq!(limit_stretch(&Material::neo_hookean(383.0, 318.5).unwrap(), Lateral::Confined), None);
+        assert_eq!(limit_stretch(&Law::neo_hookean(383.0, 318.5).unwrap(), Lateral::Confined), None);
     }
 }

@@ -4,7 +4,7 @@ use super::plan::Setting;
 use crate::discretization::lattice::lattice_nodes;
 use crate::discretization::{DiscretizationError, Method, Planar};
 use crate::geometry::{Location, Point2, distance_to_polyline};
-use crate::material::{Material, MaterialError};
+use crate::material::{Law, Material as _, MaterialError};
 use crate::model::{ModelError, TissueModel};
 use crate::scene::Scene;
 use crate::solver::equilibrium::{FailureReason, NewtonSettings};
@@ -123,7 +123,7 @@ fn smallest_stretch(h: &Matrix2<f64>) -> f64 {
 }
 
 /// Smallest eigenvalue of the acoustic tensor over directions five degrees apart.
-fn smallest_acoustic(law: &Material, h: &Matrix2<f64>) -> f64 {
+fn smallest_acoustic(law: &Law, h: &Matrix2<f64>) -> f64 {
     let a = law.tangent(h);
     (0..36)
         .map(|i| {

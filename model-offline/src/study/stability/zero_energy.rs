@@ -8,7 +8,7 @@ use crate::discretization::finite_element::Elements;
 use crate::discretization::triangulation::triangulate;
 use crate::discretization::{DiscretizationError, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration};
 use crate::geometry::Point2;
-use crate::material::Tensor4;
+use crate::material::{Material as _, Tensor4};
 use crate::model::ModelError;
 use crate::scene::Scene;
 use nalgebra::{DMatrix, DVector, Matrix2};

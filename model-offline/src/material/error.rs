@@ -1,0 +1,46 @@
+//! Why numbers do not make a law.
+
+/// Why moduli do not make a law.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MaterialError {
+    /// Not a finite number.
+    #[error("{0} is not a finite number")]
+    NotFinite(&'static str),
+    /// The law is unstable at rest.
+    #[error("the law is not stable at rest: its small-strain tangent has eigenvalue {0:.3e}")]
+    Unstable(f64),
+    /// A modulus is negative where none may be.
+    #[error("{0} must not be negative")]
+    Negative(&'static str),
+    /// A modulus that the law needs is not given.
+    #[error("{0} is missing")]
+    Missing(&'static str),
+    /// A modulus is given that the law does not know.
+    #[error("{0} has no meaning for this law")]
+    Meaningless(&'static str),
+    /// A tensor index beyond the dimension.
+    #[error("tensor entry [{0}, {1}, {2}, {3}] has an index beyond 1 (indices count from 0)")]
+    Index(u32, u32, u32, u32),
+    /// The general form holds for the plane only.
+    #[error("the general (A, C) form is planar")]
+    PlanarOnly,
+}
+
+impl MaterialError {
+    /// What to do about it.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Missing(_) => "give every modulus of the law",
+            Self::Meaningless(_) => "remove it, or choose another model",
+            _ => "the law must be stable at rest: moduli finite, mu > 0, lambda + 2 mu / 3 > 0",
+        }
+    }
+}
+
+pub(super) fn finite(value: f64, name: &'static str) -> Result<f64, MaterialError> {
+    if value.is_finite() { Ok(value) } else { Err(MaterialError::NotFinite(name)) }
+}
+
+pub(super) fn not_negative(value: f64, name: &'static str) -> Result<f64, MaterialError> {
+    if finite(value, name)? < 0.0 { Err(MaterialError::Negative(name)) } else { Ok(value) }
+}

@@ -1,0 +1,65 @@
+//! Linear elasticity.
+
+use super::catalogue::{Catalogued, lambda};
+use super::error::{MaterialError, finite};
+use super::kinematics::{Matrix, Tensor4, indices, zero4};
+use super::material::{Material, Response};
+use super::section::MaterialSection;
+use serde::Serialize;
+
+/// `W = ½ λ (tr ε)² + μ ε:ε`, ε = ½ (H + Hᵀ).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Linear {
+    pub(super) lambda: f64,
+    pub(super) mu: f64,
+}
+
+impl Linear {
+    pub(super) fn new(lambda: f64, mu: f64) -> Result<Self, MaterialError> {
+        let law = Self { lambda: finite(lambda, "lambda")?, mu: finite(mu, "mu")? };
+        Material::<3>::check_stable_at_rest(&law)?;
+        Ok(law)
+    }
+}
+
+impl<const D: usize> Material<D> for Linear {
+    fn respond(&self, h: &Matrix<D>) -> Response<D> {
+        let strain = (h + h.transpose()) * 0.5;
+        let trace = strain.trace();
+        let stress = Matrix::<D>::identity() * (self.lambda * trace) + strain * (2.0 * self.mu);
+        Response { energy: 0.5 * stress.dot(&strain), pk1_stress: stress }
+    }
+
+    fn tangent(&self, _: &Matrix<D>) -> Tensor4<D> {
+        let mut a = zero4::<D>();
+        for (i, j, k, l) in indices::<D>() {
+            let delta = |p: usize, q: usize| if p == q { 1.0 } else { 0.0 };
+            a[i][j][k][l] = self.lambda * delta(i, j) * delta(k, l)
+                + self.mu * (delta(i, k) * delta(j, l) + delta(i, l) * delta(j, k));
+        }
+        a
+    }
+}
+
+impl Catalogued for Linear {
+    fn read<M>(section: &MaterialSection<M>) -> Result<Self, MaterialError> {
+        let (lambda, mu) = section.lame_parameters()?;
+        Self::new(lambda, mu)
+    }
+
+    fn is_linear(&self) -> bool {
+        true
+    }
+
+    fn has_mesh_limit(&self) -> bool {
+        true
+    }
+
+    fn linearised(&self) -> Option<Linear> {
+        Some(self.clone())
+    }
+
+    fn with_poisson_ratio(&self, poisson: f64) -> Option<Result<Self, MaterialError>> {
+        Some(Self::new(lambda(self.mu, poisson), self.mu))
+    }
+}

@@ -1,0 +1,86 @@
+//! Compressible neo-Hookean law with an isochoric-volumetric split.
+
+use super::catalogue::{Catalogued, lambda};
+use super::error::{MaterialError, finite};
+use super::kinematics::{Matrix, Tensor4, determinant, dilation, indices, inverse_transpose, zero4};
+use super::linear::Linear;
+use super::material::{Material, Response};
+use super::section::MaterialSection;
+use serde::Serialize;
+
+/// `W = μ/2 (Ī₁ − 3) + κ/4 (J² − 1 − 2 ln J)`, Ī₁ = J^(−2/3) tr C in three dimensions (plane strain: C₃₃ = 1).
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NeoHookean {
+    kappa: f64,
+    mu: f64,
+}
+
+impl NeoHookean {
+    pub(super) fn new(lambda: f64, mu: f64) -> Result<Self, MaterialError> {
+        let (lambda, mu) = (finite(lambda, "lambda")?, finite(mu, "mu")?);
+        let law = Self { kappa: lambda + 2.0 * mu / 3.0, mu };
+        Material::<3>::check_stable_at_rest(&law)?;
+        Ok(law)
+    }
+}
+
+impl<const D: usize> Material<D> for NeoHookean {
+    fn respond(&self, h: &Matrix<D>) -> Response<D> {
+        let Self { kappa, mu } = *self;
+        let f = Matrix::<D>::identity() + h;
+        let j = determinant(&f);
+        let inverse_t = inverse_transpose(&f, j);
+        let trace = f.norm_squared() + (3 - D) as f64;
+        let factor = j.powf(-2.0 / 3.0);
+        // From ∇u, never as a difference of numbers near 1: at strains of 1e-6, as at the start of an insertion, the
+        // energy would be nothing but rounding, and the line search with it.
+        let dilation = dilation(h);
+        let stretch = 2.0 * h.trace() + h.norm_squared();
+        let log = dilation.ln_1p();
+        let distortion = factor * stretch + 3.0 * (-2.0 / 3.0 * log).exp_m1();
+        Response {
+            energy: 0.5 * mu * distortion + 0.25 * kappa * (dilation * dilation + 2.0 * (dilation - log)),
+            pk1_stress: (f - inverse_t * (trace / 3.0)) * (mu * factor) + inverse_t * (0.5 * kappa * (j * j - 1.0)),
+        }
+    }
+
+    fn tangent(&self, h: &Matrix<D>) -> Tensor4<D> {
+        let Self { kappa, mu } = *self;
+        let f = Matrix::<D>::identity() + h;
+        let j = determinant(&f);
+        let g = inverse_transpose(&f, j);
+        let trace = f.norm_squared() + (3 - D) as f64;
+        let factor = mu * j.powf(-2.0 / 3.0);
+        let pressure = 0.5 * kappa * (j * j - 1.0);
+        let mut a = zero4::<D>();
+        for (i, jj, k, l) in indices::<D>() {
+            let identity = if i == k && jj == l { 1.0 } else { 0.0 };
+            let swap = g[(i, l)] * g[(k, jj)];
+            a[i][jj][k][l] = factor
+                * (identity - 2.0 / 3.0 * (f[(i, jj)] * g[(k, l)] + g[(i, jj)] * f[(k, l)])
+                    + trace / 3.0 * (swap + 2.0 / 3.0 * g[(i, jj)] * g[(k, l)]))
+                + kappa * j * j * g[(i, jj)] * g[(k, l)]
+                - pressure * swap;
+        }
+        a
+    }
+}
+
+impl Catalogued for NeoHookean {
+    fn read<M>(section: &MaterialSection<M>) -> Result<Self, MaterialError> {
+        let (lambda, mu) = section.lame_parameters()?;
+        Self::new(lambda, mu)
+    }
+
+    fn has_mesh_limit(&self) -> bool {
+        true
+    }
+
+    fn linearised(&self) -> Option<Linear> {
+        Some(Linear { lambda: self.kappa - 2.0 * self.mu / 3.0, mu: self.mu })
+    }
+
+    fn with_poisson_ratio(&self, poisson: f64) -> Option<Result<Self, MaterialError>> {
+        Some(Self::new(lambda(self.mu, poisson), self.mu))
+    }
+}
