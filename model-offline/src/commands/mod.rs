@@ -23,7 +23,7 @@ use std::time::Instant;
 /// Tissue model, paddle placement and controller tables for needle insertion.
 #[derive(Debug, Parser)]
 #[command(name = "model-offline", version, about, max_term_width = 100)]
-pub struct Cli {
+pub(crate) struct Cli {
     #[command(subcommand)]
     command: Command,
 }
@@ -236,7 +236,7 @@ struct Common {
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
-pub enum CliError {
+pub(crate) enum CliError {
     /// The scene is bad.
     #[error(transparent)]
     #[diagnostic(transparent)]
@@ -277,7 +277,7 @@ pub enum CliError {
 
 impl CliError {
     /// 2 for bad input or usage, 1 for a computation that failed.
-    pub fn exit_code(&self) -> u8 {
+    pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Usage(..) | Self::BadTable { .. } => 2,
             Self::Model(ModelError::Unsupported(_)) => 2,
@@ -332,7 +332,7 @@ impl Common {
 ///
 /// # Errors
 /// [`CliError`], whose [`exit_code`](CliError::exit_code) is the process's.
-pub fn run(cli: Cli) -> Result<(), CliError> {
+pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
     match cli.command {
         Command::Place { scene, without_inclusion, json, table, common } => {
             let scene = common.scene(&scene, without_inclusion)?;
@@ -725,7 +725,7 @@ fn solve(
 const ELSEWHERE: [&str; 8] = ["run", "controller", "plant", "timing", "faults", "replay", "export", "report"];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
-pub fn parse() -> Cli {
+pub(crate) fn parse() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         let word = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
         let _ = error.print();

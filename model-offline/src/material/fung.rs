@@ -11,7 +11,7 @@ use serde::Serialize;
 /// `W = ½ [λ (tr E)² + 2μ E:E] + (c/2) (exp[λc (tr E)² + 2μc E:E] − 1)`: the paper's equation 6, its Table I summed over a
 /// symmetric strain, counted from rest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Fung {
+pub(super) struct Fung {
     lambda: f64,
     mu: f64,
     c: f64,

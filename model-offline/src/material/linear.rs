@@ -9,7 +9,7 @@ use serde::Serialize;
 
 /// `W = ½ λ (tr ε)² + μ ε:ε`, ε = ½ (H + Hᵀ).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Linear {
+pub(super) struct Linear {
     pub(super) lambda: f64,
     pub(super) mu: f64,
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 /// `W = μ/2 (Ī₁ − 3) + κ/4 (J² − 1 − 2 ln J)`, Ī₁ = J^(−2/3) tr C in three dimensions (plane strain: C₃₃ = 1).
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct NeoHookean {
+pub(super) struct NeoHookean {
     kappa: f64,
     mu: f64,
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 /// `W = ½ λ (tr E)² + μ E:E`, so S = λ (tr E) I + 2μ E.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SaintVenantKirchhoff {
+pub(super) struct SaintVenantKirchhoff {
     lambda: f64,
     mu: f64,
 }

@@ -3,8 +3,9 @@
 use crate::discretization::lattice::lattice_nodes;
 use crate::discretization::{Basis, Integration};
 use crate::discretization::{Method, Planar};
+use crate::model::graded_model;
 use crate::model::{ModelError, TissueModel};
-use crate::placement::adaptive::{Reference, graded_model};
+use crate::placement::adaptive::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::scene::{Resolution, Scene};
 use std::time::Instant;

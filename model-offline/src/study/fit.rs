@@ -11,8 +11,9 @@
 use super::candidates::{Candidate, Nodes, Outcome, families, rule_name};
 use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
 use crate::discretization::Integration;
+use crate::model::graded_model;
 use crate::model::{ModelError, TissueModel};
-use crate::placement::adaptive::{Reference, graded_model};
+use crate::placement::adaptive::Reference;
 use crate::placement::study::best_dynamic;
 use crate::reduction::{Condensed, TrainingOptions, train};
 use crate::scene::Scene;
@@ -262,7 +263,7 @@ fn law_and_plant(
     let compared = if model.nodes() <= LAW_NODES {
         candidate.build(&limited)?
     } else {
-        graded_model(&limited, crate::placement::adaptive::method_of(&candidate.scene(&limited)), -2)?
+        graded_model(&limited, crate::model::method_of(&candidate.scene(&limited)), -2)?
     };
     let nonlinear = profile(&compared)?;
     let law_error = profile_distance(&linear_profile(&compared)?, &nonlinear);
