@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use clap::Args;
 use iceoryx2::service::ipc;
-use model_offline::model::TissueModel;
 use model_offline::placement::place;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;

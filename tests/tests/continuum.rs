@@ -5,7 +5,8 @@
 
 use model_offline::discretization::Method;
 use model_offline::discretization::{Basis, Integration};
-use model_offline::placement::adaptive::{discretise, graded_model};
+use model_offline::model::graded_model;
+use model_offline::placement::adaptive::discretise;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::{Resolution, Scene};
 

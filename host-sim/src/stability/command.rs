@@ -4,7 +4,7 @@ use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use model_offline::model::{ModelError, TissueModel};
+use model_offline::model::ModelError;
 use model_offline::output::write_whole;
 use model_offline::placement::study::best_dynamic;
 use model_offline::scene::Scene;

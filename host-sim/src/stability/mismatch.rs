@@ -3,7 +3,7 @@
 
 use firmware::contract::{Knot, Table};
 use firmware::stability::gain_limit;
-use model_offline::model::{ModelError, TissueModel};
+use model_offline::model::ModelError;
 use model_offline::placement::discretise;
 use model_offline::placement::study::parallel;
 use model_offline::scene::Scene;

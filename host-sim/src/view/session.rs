@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use firmware::contract::Table;
-use model_offline::model::TissueModel;
 use model_offline::scene::Scene;
 
 use super::{Knobs, View};
