@@ -70,7 +70,7 @@ pub fn command_line() -> Vec<String> {
 
 /// A placement study.
 pub fn placement(tissue: &str, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
-    let integration = serde_json::to_value(model.scene().discretization.integration);
+    let integration = serde_json::to_value(model.scene().discretization.method.integration);
     PlacementResult {
         tissue: tissue.to_owned(),
         nodes: model.nodes(),

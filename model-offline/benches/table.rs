@@ -5,13 +5,12 @@
 //! `STILLPOINT_PEER=1 cargo bench -p model-offline --bench table`; it runs `benches/peer_dolfinx.py` on one thread.
 
 use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
-use model_offline::discretization::{Basis, Integration};
-use model_offline::discretization::{Method, Planar};
+use model_offline::discretization::{Integration, Method, Planar, Resolution};
 use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::discretise;
 use model_offline::placement::rest::rest_responses;
 use model_offline::placement::study;
-use model_offline::scene::{Resolution, Scene};
+use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 use std::time::Instant;
@@ -53,7 +52,7 @@ fn worst_error(model: &TissueModel) -> f64 {
 fn newton(integration: Integration, spacing: f64) -> (usize, f64) {
     let mut scene = homogeneous();
     scene.discretization.resolution = Resolution::Spacing(spacing);
-    scene.discretization.integration = integration;
+    scene.discretization.method.integration = integration;
     let model = TissueModel::new(&scene).expect("the paper's scene");
     let best = (0..3)
         .map(|_| {
@@ -72,7 +71,7 @@ fn newton(integration: Integration, spacing: f64) -> (usize, f64) {
 /// All five Jacobians with known grading, node generation included: milliseconds, worst error, nodes.
 fn five_jacobians(integration: Integration, grading: Grading, support: f64) -> (f64, f64, usize) {
     let scene = homogeneous();
-    let method = Method { integration, basis: Basis::Linear, support, consistent: true };
+    let method = Method { support, ..Method::new(integration) };
     let build = || {
         let planar = Planar::new(&scene.outline, &[], graded_nodes(&scene.features(), &grading), None, method)
             .expect("graded nodes");
@@ -102,7 +101,7 @@ fn main() {
     row(&format!("five Jacobians, quadratic triangles, graded, {nodes} nodes, error {error:.2} %"), time, 50.0, 10.0);
     for integration in [Integration::Scni, Integration::FemT6] {
         let mut scene = homogeneous();
-        scene.discretization.integration = integration;
+        scene.discretization.method.integration = integration;
         scene.discretization.resolution = Resolution::Tolerance(0.01);
         let (model, _) = discretise(&scene).expect("the tolerance is reached");
         let time = milliseconds(|| drop(discretise(&scene).expect("reached")), 3);

@@ -1,7 +1,7 @@
 //! The stability study: depths of an independent implementation, typed reasons, and the files as a user gets them.
 
 use assert_cmd::Command;
-use model_offline::discretization::Integration;
+use model_offline::discretization::{Integration, Method};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::FailureReason;
 use model_offline::study::stability::plan::{Setting, base};
@@ -69,13 +69,18 @@ fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
 fn every_way_to_fail_has_its_type_and_names_its_place() {
     let scene = paper();
     let regular = base(&scene, Integration::Scni, 0.1);
-    let small = run(&scene, 2, &Setting { support: 0.8, ..regular });
+    let small = run(&scene, 2, &Setting { method: Method { support: 0.8, ..regular.method }, ..regular });
     assert_eq!((small.reason, small.depth), (Reason::SingularMomentMatrix, 0.0));
     assert!(small.detail.contains("node"), "{}", small.detail);
     let incompressible = run(&scene, 2, &Setting { poisson: Some(0.5), ..regular });
     assert_eq!(incompressible.reason, Reason::UnstableLaw);
-    let leap =
-        Setting { increments: 1, line_search: false, cutback: false, integration: Integration::FemT6, ..regular };
+    let leap = Setting {
+        increments: 1,
+        line_search: false,
+        cutback: false,
+        method: Method::new(Integration::FemT6),
+        ..regular
+    };
     let leap = run(&scene, 2, &leap);
     assert_eq!((leap.reason, leap.depth), (Reason::Solve(FailureReason::ElementInverted), 0.0));
     assert!(leap.detail.contains("integration point"), "{}", leap.detail);

@@ -1,7 +1,6 @@
 //! What the verification suites share: reproducible scatter, and bodies to test on.
 
-use model_offline::geometry::Point;
-use model_offline::geometry::{Point2, Polygon};
+use model_offline::geometry::{Point, Point2, Polygon};
 
 /// A small reproducible generator (PCG-XSH-RR 64/32, O'Neill 2014): tests must not change with a library's version.
 #[derive(Debug, Clone)]

@@ -1,11 +1,11 @@
 //! Scenes that nobody would write, and some that somebody will: solved, or refused with a typed error. Never a panic, a
 //! hang or unbounded memory.
 
-use model_offline::discretization::Integration;
 use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::discretization::{Integration, Resolution};
 use model_offline::model::{ModelError, TissueModel};
 use model_offline::placement::rest::rest_responses;
-use model_offline::scene::{BUNDLED, Resolution, Scene};
+use model_offline::scene::{BUNDLED, Scene};
 use proptest::prelude::*;
 
 fn paper() -> &'static str {
@@ -64,7 +64,7 @@ fn ten_thousand_vertices_are_read_and_modelled() {
     let parsed = Scene::parse(&text, "circle.toml").unwrap();
     assert_eq!(parsed.outline.vertices().len(), n);
     let mut scene = parsed;
-    scene.discretization.integration = Integration::FemT3;
+    scene.discretization.method.integration = Integration::FemT3;
     let model = TissueModel::new(&scene).unwrap();
     assert!(model.nodes() > n, "every vertex is a node");
     let area: f64 = model.cells().iter().map(|cell| cell.area).sum();
@@ -175,7 +175,7 @@ proptest! {
     fn any_spacing_and_support_is_solved_or_refused(spacing in 0.02..0.4_f64, support in 1.0..4.0_f64) {
         let mut scene = Scene::bundled("paper").unwrap();
         scene.discretization.resolution = Resolution::Spacing(spacing);
-        scene.discretization.support = support;
+        scene.discretization.method.support = support;
         match TissueModel::new(&scene).and_then(|m| rest_responses(&m)) {
             Ok(r) => prop_assert!(r.iter().all(|r| r.controllability_measure.is_finite())),
             Err(error) => prop_assert!(!error.to_string().is_empty()),

@@ -3,12 +3,11 @@
 //! `golden/continuum.json` holds the limits: quadratic finite elements graded towards every singular point, 70,000 to
 //! 90,000 degrees of freedom, by an independent implementation, good to about 0.1 %.
 
-use model_offline::discretization::Method;
-use model_offline::discretization::{Basis, Integration};
+use model_offline::discretization::{Integration, Method, Resolution};
 use model_offline::model::graded_model;
 use model_offline::placement::adaptive::discretise;
 use model_offline::placement::rest::rest_responses;
-use model_offline::scene::{Resolution, Scene};
+use model_offline::scene::Scene;
 
 struct Limit {
     measure: f64,
@@ -56,7 +55,7 @@ fn errors(responses: &[model_offline::placement::rest::RestResponse], limits: &[
 #[test]
 fn a_tolerance_of_one_percent_is_kept_by_quadratic_triangles() {
     for (mut scene, limits) in cases() {
-        scene.discretization.integration = Integration::FemT6;
+        scene.discretization.method.integration = Integration::FemT6;
         scene.discretization.resolution = Resolution::Tolerance(0.01);
         let (model, estimate) = discretise(&scene).unwrap();
         let (measure, displacement) = errors(&rest_responses(&model).unwrap(), &limits);
@@ -94,7 +93,7 @@ fn every_method_converges_to_the_continuum_on_graded_nodes() {
         (Integration::FemT3, 0.015),
         (Integration::FemT6, 0.004),
     ] {
-        let method = Method { integration, basis: Basis::Linear, support: 2.0, consistent: true };
+        let method = Method::new(integration);
         let error = |level| errors(&rest_responses(&graded_model(&scene, method, level).unwrap()).unwrap(), &limits).0;
         let (coarse, fine) = (error(0), error(2));
         println!("{integration:?}: {coarse:.4} {fine:.4}");
@@ -111,7 +110,7 @@ fn the_static_optimum_moves_with_the_mesh_and_the_dynamic_one_does_not() {
     };
     assert_eq!((best(&|l| l.per_depth.x.abs()), best(&|l| l.measure)), (2, 3));
     let scene = Scene::bundled("paper").unwrap().without_inclusions();
-    let method = Method { integration: Integration::FemT6, basis: Basis::Linear, support: 2.0, consistent: true };
+    let method = Method::new(Integration::FemT6);
     let fine = rest_responses(&graded_model(&scene, method, 2).unwrap()).unwrap();
     let smallest =
         (0..5).min_by(|&a, &b| fine[a].target_per_depth.x.abs().total_cmp(&fine[b].target_per_depth.x.abs()));

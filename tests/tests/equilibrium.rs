@@ -1,15 +1,15 @@
 //! The equilibrium solver on the paper's scene: Newton's tail, Jacobians, invariances, typed failures.
 
-use model_offline::discretization::Integration;
+use model_offline::discretization::{Integration, Resolution};
 use model_offline::model::TissueModel;
 use model_offline::placement::place;
-use model_offline::scene::{Resolution, Scene};
+use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 
 fn model(integration: Integration) -> TissueModel {
     let mut scene = Scene::bundled("paper").unwrap();
-    scene.discretization.integration = integration;
+    scene.discretization.method.integration = integration;
     TissueModel::new(&scene).unwrap()
 }
 
@@ -181,7 +181,7 @@ fn the_volumetric_barrier_gives_the_finite_depth_profile_a_mesh_limit() {
     let guarded = text.replacen("mu_c = 1.0", "mu_c = 1.0\nbarrier = 300.0", 1);
     let study = |text: &str, spacing: f64| {
         let mut scene = Scene::parse(text, "scene").unwrap().without_inclusions();
-        scene.discretization.integration = Integration::FemT6;
+        scene.discretization.method.integration = Integration::FemT6;
         scene.discretization.resolution = Resolution::Spacing(spacing);
         place(&TissueModel::new(&scene).unwrap(), NewtonSettings::default(), 2, &|| {}).unwrap()
     };

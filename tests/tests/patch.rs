@@ -4,11 +4,9 @@
 //! between boundary nodes, so even SCNI leaves a small error there. The expected sizes are an independent
 //! implementation's: SCNI 9e-4 on a regular lattice and 8e-4 at 40 % jitter, DNI 7e-4 and 4e-2.
 
-use model_offline::discretization::{Basis, Integration};
-use model_offline::discretization::{Method, Planar};
+use model_offline::discretization::{Integration, Method, Planar};
 use model_offline::material::Law;
-use model_offline::mechanics::HeldRows;
-use model_offline::mechanics::Tissue;
+use model_offline::mechanics::{HeldRows, Tissue};
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};
@@ -17,7 +15,7 @@ use tests::{jittered_rectangle, rectangle};
 fn patch_error(integration: Integration, jitter: f64) -> f64 {
     let spacing = 0.1;
     let nodes = jittered_rectangle(1.0, 1.0, 10, 10, jitter, 11);
-    let method = Method { integration, basis: Basis::Linear, support: 2.0, consistent: false };
+    let method = Method { consistent: false, ..Method::new(integration) };
     let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes.clone(), Some(spacing), method).unwrap();
     let boundary: Vec<_> =
         nodes.iter().filter(|x| [x.x, x.y].iter().any(|c| c.abs() < 1e-12 || (c - 1.0).abs() < 1e-12)).collect();

@@ -2,11 +2,11 @@
 //! fails and small errors weigh much. There is no outside source for it; methods are held against each other, and
 //! against quadratic triangles on nodes fine enough for their levels to agree to a fraction of a per cent.
 
-use model_offline::discretization::Integration;
+use model_offline::discretization::{Integration, Resolution};
 use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::{Reference, discretise};
 use model_offline::placement::rest::rest_responses;
-use model_offline::scene::{Resolution, Scene};
+use model_offline::scene::Scene;
 
 const SLAB: &str = r#"
 [scene]
@@ -58,7 +58,7 @@ integration = "scni"
 
 fn slab(integration: Integration, resolution: Resolution) -> Scene {
     let mut scene = Scene::parse(SLAB, "slab").unwrap();
-    scene.discretization.integration = integration;
+    scene.discretization.method.integration = integration;
     scene.discretization.resolution = resolution;
     scene
 }

@@ -3,16 +3,14 @@
 mod new;
 
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
-use model_offline::discretization::DiscretizationError;
-use model_offline::discretization::{Basis, Essential, Integration};
+use model_offline::discretization::{Basis, DiscretizationError, Essential, Integration, Resolution};
 use model_offline::model::{ModelError, TissueModel};
 use model_offline::output::{self, OutputError};
 use model_offline::placement::adaptive::{self, ErrorEstimate};
 use model_offline::placement::cross_check::cross_check;
 use model_offline::placement::verdict::verdict;
 use model_offline::placement::{Placement, study};
-use model_offline::scene::schema;
-use model_offline::scene::{Resolution, Scene, SceneError, check_override, check_tolerance};
+use model_offline::scene::{Scene, SceneError, check_override, check_tolerance, schema};
 use model_offline::solver::equilibrium::{Failure, NewtonSettings};
 use model_offline::study::{fit, pareto, stability, sweep, table_pareto};
 use model_offline::table::{self, TableBuildError, TableOptions};
@@ -311,9 +309,9 @@ impl Common {
         if let Some(t) = self.tolerance {
             spec.resolution = Resolution::Tolerance(t);
         }
-        spec.support = self.support.unwrap_or(spec.support);
-        spec.integration = self.integration.unwrap_or(spec.integration);
-        spec.basis = self.basis.unwrap_or(spec.basis);
+        spec.method.support = self.support.unwrap_or(spec.method.support);
+        spec.method.integration = self.integration.unwrap_or(spec.method.integration);
+        spec.method.basis = self.basis.unwrap_or(spec.method.basis);
         spec.essential = self.essential.unwrap_or(spec.essential);
         check_override(&scene).map_err(|(message, help)| CliError::Usage(message, help))?;
         Ok(scene)
@@ -549,7 +547,7 @@ fn place(scene: &Scene, common: &Common, table: Option<&Path>) -> Result<(serde_
         "tissue": scene.tissue(),
         "nodes": model.nodes(),
         "dofs": model.dofs(),
-        "integration": scene.discretization.integration,
+        "integration": scene.discretization.method.integration,
         "wall_s": wall_s,
         "error_estimate": estimate,
         "cross_check": check,
@@ -688,7 +686,7 @@ fn solve(
     if let Some(path) = files.json {
         let document = serde_json::json!({
             "scene": scene.name, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
-            "integration": scene.discretization.integration,
+            "integration": scene.discretization.method.integration,
             "paddle": paddle, "depth": depth, "paddle_displacement": point(&displacement),
             "target_displacement": point(&target), "orthogonal": orthogonal,
             "jacobian": study::rows(&jacobian),

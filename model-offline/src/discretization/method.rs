@@ -1,13 +1,42 @@
-//! The words for discretizations: how the displacement is approximated, the weak form integrated, and essential boundary
-//! conditions imposed. Scene files, command lines and studies all take them from here.
+//! The words for discretizations: where the nodes are, how the displacement is approximated, the weak form integrated, and
+//! essential boundary conditions imposed. Scene files, command lines and studies all take them from here.
+//!
+//! What an option is called in files, on the command line and in reports comes from one list, the enum itself.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use strum::{Display, EnumString, IntoStaticStr, VariantArray};
 
 /// Integration rules of the weak form, and finite-element baselines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+///
+/// # Example
+/// ```
+/// use model_offline::discretization::Integration;
+/// use strum::VariantArray as _;
+///
+/// assert_eq!("fem-t6".parse(), Ok(Integration::FemT6));
+/// assert_eq!(Integration::Scni.to_string(), "scni");
+/// assert!(Integration::VARIANTS.contains(&Integration::Nsni));
+/// ```
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Deserialize,
+    Serialize,
+    JsonSchema,
+    clap::ValueEnum,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
 #[value(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Integration {
     /// Direct nodal integration: the gradient at the node.
     Dni,
@@ -23,9 +52,43 @@ pub enum Integration {
     FemT6,
 }
 
+impl Integration {
+    /// Its name in scene files and reports.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// Whether it is a finite-element baseline: basis and support do not apply.
+    pub fn is_element(self) -> bool {
+        matches!(self, Self::FemT3 | Self::FemT6)
+    }
+
+    /// Whether it integrates over nodal cells.
+    pub fn is_nodal(self) -> bool {
+        matches!(self, Self::Dni | Self::Scni | Self::Nsni)
+    }
+}
+
 /// Monomials that the shape functions reproduce exactly.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Default,
+    Deserialize,
+    Serialize,
+    JsonSchema,
+    clap::ValueEnum,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Basis {
     /// 1, x, y.
     #[default]
@@ -34,18 +97,50 @@ pub enum Basis {
     Quadratic,
 }
 
+impl Basis {
+    /// Its name in scene files and reports.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+}
+
 /// How essential boundary conditions are imposed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Deserialize, Serialize, JsonSchema, clap::ValueEnum)]
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    Default,
+    Deserialize,
+    Serialize,
+    JsonSchema,
+    clap::ValueEnum,
+    Display,
+    EnumString,
+    IntoStaticStr,
+    VariantArray,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Essential {
-    /// Nodal values are held exactly (the paper's transformation method).
+    /// Nodal values are prescribed exactly (the paper's transformation method).
     #[default]
     Transformation,
     /// Nitsche's method: weakly, with consistent boundary terms.
     Nitsche,
 }
 
-/// How the displacement is approximated and the weak form integrated.
+/// How the displacement is approximated and the weak form integrated, wherever the nodes are.
+///
+/// # Example
+/// ```
+/// use model_offline::discretization::{Basis, Integration, Method};
+///
+/// let method = Method { basis: Basis::Quadratic, support: 3.0, ..Method::new(Integration::Gauss) };
+/// assert!(method.consistent);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Method {
     /// Integration rule.
@@ -56,4 +151,100 @@ pub struct Method {
     pub support: f64,
     /// Whether `nsni` and `gauss` are corrected to be variationally consistent; SCNI and the elements are by nature.
     pub consistent: bool,
+}
+
+impl Method {
+    /// A rule with a linear basis and a support of two spacings.
+    pub fn new(integration: Integration) -> Self {
+        Self { integration, basis: Basis::Linear, support: 2.0, consistent: true }
+    }
+
+    /// Basis of the displacement itself: that of quadratic triangles is quadratic whatever the shape functions' is.
+    pub fn displacement_basis(&self) -> Basis {
+        match self.integration {
+            Integration::FemT3 => Basis::Linear,
+            Integration::FemT6 => Basis::Quadratic,
+            _ => self.basis,
+        }
+    }
+}
+
+/// How many nodes: given, or found.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Resolution {
+    /// Uniform node spacing, length units.
+    Spacing(f64),
+    /// Refine until the controllability measures are within this relative error.
+    Tolerance(f64),
+    /// Nodes gathered where the solution is singular, at this refinement level.
+    Level(i32),
+}
+
+impl Resolution {
+    /// Half the error, or so.
+    #[must_use]
+    pub fn finer(self) -> Self {
+        match self {
+            Self::Spacing(h) => Self::Spacing(0.5 * h),
+            Self::Tolerance(t) => Self::Tolerance(0.5 * t),
+            Self::Level(level) => Self::Level(level + 1),
+        }
+    }
+
+    /// Whether nodes gather where the solution is singular.
+    pub fn is_graded(self) -> bool {
+        !matches!(self, Self::Spacing(_))
+    }
+}
+
+impl std::fmt::Display for Resolution {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Spacing(h) => write!(f, "uniform {h:.4}"),
+            Self::Tolerance(t) => write!(f, "tolerance {t}"),
+            Self::Level(level) => write!(f, "graded level {level}"),
+        }
+    }
+}
+
+/// A whole discretization: how many nodes, by which method, with which essential boundary conditions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Discretization {
+    /// How many nodes.
+    pub resolution: Resolution,
+    /// How the displacement is approximated and the weak form integrated.
+    pub method: Method,
+    /// How essential boundary conditions are imposed.
+    pub essential: Essential,
+}
+
+impl Discretization {
+    /// A method at a resolution, essential boundary conditions imposed exactly.
+    pub fn new(resolution: Resolution, method: Method) -> Self {
+        Self { resolution, method, essential: Essential::Transformation }
+    }
+
+    /// Another method at another resolution, with the same essential boundary conditions.
+    #[must_use]
+    pub fn with(&self, resolution: Resolution, method: Method) -> Self {
+        Self { resolution, method, ..*self }
+    }
+
+    /// Support and basis where they apply, nodes: the settings in a few words.
+    pub fn settings(&self) -> String {
+        let Method { integration, basis, support, .. } = self.method;
+        if integration.is_element() {
+            self.resolution.to_string()
+        } else {
+            format!("{basis} basis, support {support}, {}", self.resolution)
+        }
+    }
+}
+
+/// Integration rule and settings.
+impl std::fmt::Display for Discretization {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}, {}", self.method.integration, self.settings())
+    }
 }

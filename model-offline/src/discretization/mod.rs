@@ -21,7 +21,7 @@ pub mod triangulation;
 
 pub use features::Features;
 pub use integration::Quadrature;
-pub use method::{Basis, Essential, Integration, Method};
+pub use method::{Basis, Discretization, Essential, Integration, Method, Resolution};
 pub use nodal_cells::NodalCell;
 pub use node_cloud::NodeCloud;
 pub use planar::{DiscretizationError, Planar};

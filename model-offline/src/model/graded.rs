@@ -13,8 +13,7 @@ const MAX_NODES: usize = 40_000;
 /// [`ModelError`] as for any model.
 pub fn graded_model(scene: &Scene, method: Method, level: i32) -> Result<TissueModel, ModelError> {
     let features = scene.features();
-    let nodal = matches!(method.integration, Integration::Dni | Integration::Scni | Integration::Nsni);
-    let fit = if nodal { InterfaceFit::Between } else { InterfaceFit::On };
+    let fit = if method.integration.is_nodal() { InterfaceFit::Between } else { InterfaceFit::On };
     let elements = matches!(method.integration, Integration::FemT6);
     let grading = Grading::level(&features, if elements { level } else { level + KERNEL_LEVELS }, fit);
     let nodes = graded_nodes(&features, &grading);
@@ -27,9 +26,3 @@ pub fn graded_model(scene: &Scene, method: Method, level: i32) -> Result<TissueM
 
 /// Kernels and linear triangles start this many levels finer than quadratic triangles, whose nodes carry more.
 const KERNEL_LEVELS: i32 = 2;
-
-/// The method that a scene asks for.
-pub fn method_of(scene: &Scene) -> Method {
-    let spec = scene.discretization;
-    Method { integration: spec.integration, basis: spec.basis, support: spec.support, consistent: true }
-}

@@ -2,16 +2,18 @@
 
 mod graded;
 
-pub use graded::{graded_model, method_of};
+pub use graded::graded_model;
 
 use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::lattice::lattice_nodes;
-use crate::discretization::{DiscretizationError, Essential, NodalCell, Planar, Quadrature, ShapeError, Stencil};
+use crate::discretization::{
+    DiscretizationError, Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
+};
 use crate::geometry::{Point2, Polygon, distance_to_polyline, overlap_area};
 use crate::material::Law;
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{HeldRows, Tissue, WeaklyHeld};
-use crate::scene::{Resolution, Scene};
+use crate::scene::Scene;
 use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use std::sync::Arc;
@@ -134,7 +136,7 @@ impl TissueModel {
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
         let spacing = match scene.discretization.resolution {
             Resolution::Spacing(spacing) => spacing,
-            Resolution::Level(level) => return graded_model(scene, method_of(scene), level),
+            Resolution::Level(level) => return graded_model(scene, scene.discretization.method, level),
             Resolution::Tolerance(_) => {
                 return Err(ModelError::Unsupported(
                     "the resolution is a tolerance: refine to it with `placement::discretise`".into(),
@@ -142,7 +144,7 @@ impl TissueModel {
             }
         };
         let nodes = lattice_nodes(&scene.features(), spacing);
-        let method = method_of(scene);
+        let method = scene.discretization.method;
         let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)
     }

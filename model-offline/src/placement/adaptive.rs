@@ -7,9 +7,9 @@
 
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
-use crate::discretization::{Basis, Integration, Method};
-use crate::model::{ModelError, TissueModel, graded_model, method_of};
-use crate::scene::{Resolution, Scene};
+use crate::discretization::{Integration, Method, Resolution};
+use crate::model::{ModelError, TissueModel, graded_model};
+use crate::scene::Scene;
 use serde::Serialize;
 
 /// From this tolerance on, refinement starts at the coarsest level; below it, the coarsest levels could only agree by
@@ -72,7 +72,7 @@ pub fn profile_model(model: &TissueModel) -> Result<TissueModel, ModelError> {
 const PROFILE_NODES: usize = 1500;
 
 fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
-    let method = method_of(scene);
+    let method = scene.discretization.method;
     if method.integration == Integration::FemT6 {
         return refine_elements(scene, method, tolerance);
     }
@@ -191,7 +191,7 @@ impl Reference {
     /// # Errors
     /// [`ModelError`] as for any model.
     pub fn compute(scene: &Scene, share: f64) -> Result<Self, ModelError> {
-        let method = Method { integration: Integration::FemT6, basis: Basis::Linear, support: 2.0, consistent: true };
+        let method = Method::new(Integration::FemT6);
         let mut levels = Levels::default();
         let mut finest = None;
         for level in -1..=MAX_LEVEL {

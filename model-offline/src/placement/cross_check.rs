@@ -2,8 +2,8 @@
 
 use super::rest::rest_responses;
 use super::study::PaddleResult;
-use crate::discretization::{Basis, Integration};
-use crate::model::{graded_model, method_of};
+use crate::discretization::{Integration, Method};
+use crate::model::graded_model;
 use crate::scene::Scene;
 use serde::Serialize;
 
@@ -25,10 +25,7 @@ pub struct CrossCheck {
 
 /// Compares results with quadratic triangles on graded nodes; none where those cannot be made.
 pub fn cross_check(scene: &Scene, paddles: &[PaddleResult]) -> Option<CrossCheck> {
-    let mut triangles = scene.clone();
-    triangles.discretization.integration = Integration::FemT6;
-    triangles.discretization.basis = Basis::Linear;
-    let model = graded_model(&triangles, method_of(&triangles), LEVEL).ok()?;
+    let model = graded_model(scene, Method::new(Integration::FemT6), LEVEL).ok()?;
     let others = rest_responses(&model).ok()?;
     let apart = paddles.iter().zip(&others).map(|(paddle, other)| {
         ((paddle.controllability_measure / other.controllability_measure - 1.0).abs(), paddle.index)
@@ -57,9 +54,9 @@ impl CrossCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::discretization::Resolution;
     use crate::model::TissueModel;
     use crate::placement::study;
-    use crate::scene::Resolution;
     use crate::solver::equilibrium::NewtonSettings;
 
     #[test]
@@ -67,7 +64,7 @@ mod tests {
         let check = |integration, spacing| {
             let mut scene = Scene::bundled("paper").unwrap();
             (scene.needle.depth, scene.needle.increments) = (0.001, 1);
-            scene.discretization.integration = integration;
+            scene.discretization.method.integration = integration;
             scene.discretization.resolution = Resolution::Spacing(spacing);
             let model = TissueModel::new(&scene).unwrap();
             let placement = study::place(&model, NewtonSettings::default(), 1, &|| {}).unwrap();

@@ -1,6 +1,7 @@
 //! The placement study: every paddle, static and dynamic.
 
 use super::rest::{RestResponse, rest_responses};
+use crate::discretization::Resolution;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
@@ -141,8 +142,8 @@ pub fn place_on(
 /// edge long before the full depth; finding that depth to an eighth of an increment is enough there.
 pub fn settings_for(scene: &crate::scene::Scene) -> NewtonSettings {
     match scene.discretization.resolution {
-        crate::scene::Resolution::Spacing(_) => NewtonSettings::default(),
-        crate::scene::Resolution::Tolerance(_) | crate::scene::Resolution::Level(_) => {
+        Resolution::Spacing(_) => NewtonSettings::default(),
+        Resolution::Tolerance(_) | Resolution::Level(_) => {
             NewtonSettings { max_cutbacks: 3, max_iterations: 8, ..NewtonSettings::default() }
         }
     }

@@ -9,7 +9,7 @@ mod validate;
 pub use error::SceneError;
 pub use schema::{FitSection, PlantModel, TableScalar};
 
-use crate::discretization::{Basis, Essential, Features, Integration};
+use crate::discretization::{Discretization, Features, Resolution};
 use crate::geometry::{Point2, Polygon};
 use crate::material::Law;
 use serde::Serialize;
@@ -110,33 +110,6 @@ pub struct Actuator {
     pub max_needle_speed: f64,
 }
 
-/// How many nodes: given, or found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Resolution {
-    /// Uniform node spacing.
-    Spacing(f64),
-    /// Refine until the controllability measures are within this relative error.
-    Tolerance(f64),
-    /// Graded nodes at this refinement level.
-    Level(i32),
-}
-
-/// How fine and by which method the tissue is modelled.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Discretization {
-    /// How many nodes.
-    pub resolution: Resolution,
-    /// Kernel support over local spacing.
-    pub support: f64,
-    /// Integration rule.
-    pub integration: Integration,
-    /// Basis of the shape functions.
-    pub basis: Basis,
-    /// How essential boundary conditions are imposed.
-    pub essential: Essential,
-}
-
 /// Whether a discretization that did not come from the file fits the scene.
 ///
 /// # Errors
@@ -147,7 +120,7 @@ pub fn check_override(scene: &Scene) -> Result<(), (String, String)> {
         Resolution::Tolerance(t) => validate::check_tolerance(t)?,
         Resolution::Level(level) => validate::check_level(level)?,
     }
-    validate::check_support(scene.discretization.support)
+    validate::check_support(scene.discretization.method.support)
 }
 
 /// Whether a tolerance can be asked for.
@@ -235,6 +208,12 @@ impl Scene {
         }
     }
 
+    /// The same scene, discretized otherwise.
+    #[must_use]
+    pub fn with_discretization(&self, discretization: Discretization) -> Self {
+        Self { discretization, ..self.clone() }
+    }
+
     /// The regions of the inclusions.
     pub fn inclusion_outlines(&self) -> Vec<Polygon> {
         self.inclusions.iter().map(|i| i.outline.clone()).collect()
@@ -262,7 +241,11 @@ impl Scene {
             "target": point(&self.target),
             "paddles": self.paddles.iter().map(|p| serde_json::json!([p.index, path(&p.segment)])).collect::<Vec<_>>(),
             "actuator": self.actuator,
-            "discretization": self.discretization,
+            "discretization": {
+                "resolution": self.discretization.resolution, "support": self.discretization.method.support,
+                "integration": self.discretization.method.integration, "basis": self.discretization.method.basis,
+                "essential": self.discretization.essential,
+            },
         });
         Sha256::digest(content.to_string()).into()
     }

@@ -2,9 +2,9 @@
 
 use super::error::{SceneError, Source};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
-use super::{Actuator, Discretization, Inclusion, Needle, Paddle, Resolution, Scene};
-use crate::discretization::Integration;
+use super::{Actuator, Inclusion, Needle, Paddle, Scene};
 use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
+use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
 use std::ops::Range;
@@ -354,11 +354,10 @@ impl Validator<'_> {
             }
             None => 2.0,
         };
+        let integration = section.integration.unwrap_or(Integration::Scni);
         Ok(Discretization {
             resolution,
-            support,
-            integration: section.integration.unwrap_or(Integration::Scni),
-            basis: section.basis,
+            method: Method { support, basis: section.basis, ..Method::new(integration) },
             essential: section.essential,
         })
     }

@@ -8,11 +8,10 @@
 //! 3. **Table**: the fewest knots that interpolate the densest table within the tolerance, and single precision if its
 //!    rounding does.
 
-use super::candidates::{Candidate, Nodes, Outcome, families, rule_name};
+use super::candidates::{Measured, families, measure};
 use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
-use crate::discretization::Integration;
-use crate::model::graded_model;
-use crate::model::{ModelError, TissueModel};
+use crate::discretization::{Basis, Discretization, Integration, Resolution};
+use crate::model::{ModelError, TissueModel, graded_model};
 use crate::placement::adaptive::Reference;
 use crate::placement::study::best_dynamic;
 use crate::reduction::{Condensed, TrainingOptions, train};
@@ -40,9 +39,9 @@ const TICKS: u32 = 500;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chosen {
     /// Integration rule.
-    pub integration: &'static str,
+    pub integration: Integration,
     /// Basis of the shape functions (for elements: their order).
-    pub basis: &'static str,
+    pub basis: Basis,
     /// Kernel support over local spacing; none for elements.
     pub support: Option<f64>,
     /// Whether nodes are graded.
@@ -113,19 +112,16 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelEr
     let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
     let (candidate, outcome, verified_error) = discretization(scene, tolerance, &reference, REPEATS, &mut rejected)?;
     let error_estimate = worst(&outcome, &reference);
-    let model = candidate.build(scene)?;
+    let model = build(scene, &candidate)?;
     let (law, plant, plant_depth, step_us) =
         law_and_plant(scene, &candidate, &model, tolerance, threads, &mut rejected)?;
     let (table_knots, table_scalar) = table(&model, tolerance, &mut rejected)?;
     let chosen = Chosen {
-        integration: rule_name(candidate.integration),
-        basis: match (candidate.integration, candidate.basis) {
-            (Integration::FemT6, _) | (_, crate::discretization::Basis::Quadratic) => "quadratic",
-            _ => "linear",
-        },
-        support: (!candidate.is_element()).then_some(candidate.support),
-        graded: matches!(candidate.nodes, Nodes::Graded(_)),
-        level: if let Nodes::Graded(level) = candidate.nodes { Some(level) } else { None },
+        integration: candidate.method.integration,
+        basis: candidate.method.displacement_basis(),
+        support: (!candidate.method.integration.is_element()).then_some(candidate.method.support),
+        graded: candidate.resolution.is_graded(),
+        level: if let Resolution::Level(level) = candidate.resolution { Some(level) } else { None },
         spacing: outcome.spacing,
         nodes: outcome.nodes,
         law,
@@ -148,7 +144,7 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelEr
     })
 }
 
-fn worst(outcome: &Outcome, reference: &Reference) -> f64 {
+fn worst(outcome: &Measured, reference: &Reference) -> f64 {
     outcome.errors.0.max(outcome.errors.1) + reference.open
 }
 
@@ -163,21 +159,21 @@ pub fn discretization(
     reference: &Reference,
     repeats: u32,
     rejected: &mut Vec<Rejected>,
-) -> Result<(Candidate, Outcome, f64), ModelError> {
-    let mut measured: Vec<(Candidate, Outcome)> = Vec::new();
+) -> Result<(Discretization, Measured, f64), ModelError> {
+    let mut measured: Vec<(Discretization, Measured)> = Vec::new();
     let mut unusable = Vec::new();
     let mut best_wall = f64::INFINITY;
     let mut best_error = f64::INFINITY;
     // Elements first: they are cheapest, so that dearer families are given up early.
     let mut families = families(scene, false);
-    families.sort_by_key(|family| !family.first().is_some_and(Candidate::is_element));
+    families.sort_by_key(|family| !family.first().is_some_and(|d| d.method.integration.is_element()));
     for family in families {
         for candidate in family {
-            let outcome = match candidate.measure(scene, reference, repeats) {
+            let outcome = match measure(candidate, scene, reference, repeats) {
                 Ok(outcome) => outcome,
                 Err(error) => {
                     let reason = format!("does not work: {error}");
-                    unusable.push(rejection("discretization", describe(&candidate), f64::NAN, reason));
+                    unusable.push(rejection("discretization", candidate.to_string(), f64::NAN, reason));
                     break;
                 }
             };
@@ -193,10 +189,10 @@ pub fn discretization(
         }
     }
     measured.sort_by(|a, b| a.1.wall_s.total_cmp(&b.1.wall_s));
-    let mut chosen: Option<(Candidate, Outcome, f64)> = None;
+    let mut chosen: Option<(Discretization, Measured, f64)> = None;
     for (candidate, outcome) in measured {
         let error = worst(&outcome, reference);
-        let name = describe(&candidate);
+        let name = candidate.to_string();
         match &chosen {
             Some(best) if error <= tolerance => {
                 let times = outcome.wall_s / best.1.wall_s;
@@ -208,7 +204,8 @@ pub fn discretization(
                 rejected.push(rejection("discretization", name, error, "estimated error".into()));
             }
             None => {
-                let finer = finer(&candidate).build(scene).and_then(|m| crate::placement::rest::rest_responses(&m));
+                let finer = Discretization { resolution: candidate.resolution.finer(), ..candidate };
+                let finer = build(scene, &finer).and_then(|m| crate::placement::rest::rest_responses(&m));
                 let apart = finer.map(|finer| crate::placement::adaptive::distance(&outcome.responses, &finer));
                 match apart {
                     Ok((measure, displacement)) if measure.max(displacement) <= tolerance => {
@@ -232,16 +229,8 @@ pub fn discretization(
     chosen.ok_or(ModelError::ToleranceNotReached { tolerance, reached: best_error })
 }
 
-fn finer(candidate: &Candidate) -> Candidate {
-    let nodes = match candidate.nodes {
-        Nodes::Uniform(h) => Nodes::Uniform(0.5 * h),
-        Nodes::Graded(level) => Nodes::Graded(level + 1),
-    };
-    Candidate { nodes, ..*candidate }
-}
-
-fn describe(candidate: &Candidate) -> String {
-    format!("{}, {}", rule_name(candidate.integration), candidate.settings())
+fn build(scene: &Scene, discretization: &Discretization) -> Result<TissueModel, ModelError> {
+    TissueModel::new(&scene.with_discretization(*discretization))
 }
 
 fn rejection(decision: &'static str, candidate: String, number: f64, reason: String) -> Rejected {
@@ -253,7 +242,7 @@ const LAW_NODES: usize = 1500;
 
 fn law_and_plant(
     scene: &Scene,
-    candidate: &Candidate,
+    candidate: &Discretization,
     model: &TissueModel,
     tolerance: f64,
     threads: usize,
@@ -261,9 +250,9 @@ fn law_and_plant(
 ) -> Result<(&'static str, PlantModel, f64, f64), ModelError> {
     let (limited, _) = with_mesh_limit(scene)?;
     let compared = if model.nodes() <= LAW_NODES {
-        candidate.build(&limited)?
+        build(&limited, candidate)?
     } else {
-        graded_model(&limited, crate::model::method_of(&candidate.scene(&limited)), -2)?
+        graded_model(&limited, candidate.method, -2)?
     };
     let nonlinear = profile(&compared)?;
     let law_error = profile_distance(&linear_profile(&compared)?, &nonlinear);
@@ -387,10 +376,10 @@ impl Fit {
             Some(level) => section["level"] = toml_edit::value(i64::from(level)),
             None => section["spacing"] = toml_edit::value(self.chosen.spacing),
         }
-        section["integration"] = toml_edit::value(self.chosen.integration);
+        section["integration"] = toml_edit::value(self.chosen.integration.name());
         if let Some(support) = self.chosen.support {
             section["support"] = toml_edit::value(support);
-            section["basis"] = toml_edit::value(self.chosen.basis);
+            section["basis"] = toml_edit::value(self.chosen.basis.name());
         }
         let FitSection { plant, table_knots, table_scalar } = self.section();
         let word = |value: serde_json::Value| value.as_str().unwrap_or_default().to_owned();

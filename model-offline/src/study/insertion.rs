@@ -1,16 +1,17 @@
 //! Finite depth: the insertion by every method and law, and what one tick of it costs a simulator.
 
-use super::candidates::{Candidate, Nodes};
+use super::candidates::base_spacing;
 use super::pareto::{Job, Point};
-use crate::discretization::{Basis, Integration};
+use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::material::{Law, Material};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
 use crate::reduction::{Condensed, TrainingOptions, train};
-use crate::scene::{Resolution, Scene};
+use crate::scene::Scene;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::Vector2;
 use std::time::Instant;
+use strum::VariantArray as _;
 
 /// Barrier over the stiffness at rest that gives a law without a mesh limit at finite depth one (the paper's law loses
 /// stability the earlier, the finer its nodes are; with 0.3 of its stiffness every method reaches the whole depth at
@@ -92,33 +93,41 @@ pub fn profile_distance(a: &Profile, b: &Profile) -> f64 {
     all().map(|(a, b)| (a - b).norm()).fold(0.0, f64::max) / largest
 }
 
-fn fine(level: i32) -> Candidate {
-    Candidate { integration: Integration::FemT6, basis: Basis::Linear, support: 2.0, nodes: Nodes::Graded(level) }
+/// Quadratic triangles on graded nodes.
+fn fine(scene: &Scene, level: i32) -> Discretization {
+    scene.discretization.with(Resolution::Level(level), Method::new(Integration::FemT6))
+}
+
+fn build(scene: &Scene, discretization: Discretization) -> Result<TissueModel, ModelError> {
+    TissueModel::new(&scene.with_discretization(discretization))
 }
 
 /// Runs the insertion with each method, by the nonlinear law and by the linear one.
 pub(super) fn insertion_points(scene: &Scene, quick: bool) -> Result<Insertion, ModelError> {
     let finest = if quick { 1 } else { 2 };
-    let model = fine(finest).build(scene)?;
-    let (reference, coarser) = (profile(&model)?, profile(&fine(finest - 1).build(scene)?)?);
+    let model = build(scene, fine(scene, finest))?;
+    let (reference, coarser) = (profile(&model)?, profile(&build(scene, fine(scene, finest - 1))?)?);
     let open = profile_distance(&coarser, &reference);
-    let base = match scene.discretization.resolution {
-        Resolution::Spacing(h) => h,
-        Resolution::Tolerance(_) | Resolution::Level(_) => 0.1 * scene.outline.area().sqrt(),
-    };
-    let nodes: &[Nodes] = if quick {
-        &[Nodes::Uniform(base), Nodes::Graded(-2)]
+    let base = base_spacing(scene);
+    let nodes: &[Resolution] = if quick {
+        &[Resolution::Spacing(base), Resolution::Level(-2)]
     } else {
-        &[Nodes::Uniform(base), Nodes::Uniform(0.5 * base), Nodes::Graded(-2), Nodes::Graded(-1), Nodes::Graded(0)]
+        &[
+            Resolution::Spacing(base),
+            Resolution::Spacing(0.5 * base),
+            Resolution::Level(-2),
+            Resolution::Level(-1),
+            Resolution::Level(0),
+        ]
     };
     let mut points = Vec::new();
-    for integration in super::candidates::RULES {
+    for &integration in Integration::VARIANTS {
         for &nodes in nodes {
-            let candidate = Candidate { integration, basis: Basis::Linear, support: 2.0, nodes };
+            let candidate = scene.discretization.with(nodes, Method::new(integration));
             for law in ["nonlinear", "linear"] {
                 let mut point = Point::new(Job::Insertion, candidate, law);
                 let start = Instant::now();
-                let outcome = candidate.build(scene).and_then(|model| {
+                let outcome = build(scene, candidate).and_then(|model| {
                     (point.nodes, point.spacing) = (model.nodes(), model.spacing());
                     if law == "linear" { linear_profile(&model) } else { Ok(profile(&model)?) }
                 });
@@ -136,20 +145,15 @@ pub(super) fn insertion_points(scene: &Scene, quick: bool) -> Result<Insertion, 
 
 /// Times one tick of a simulated insertion with each kind of plant.
 pub(super) fn step_points(scene: &Scene, quick: bool, reference: &Profile) -> Result<Vec<Point>, ModelError> {
-    let base = match scene.discretization.resolution {
-        Resolution::Spacing(h) => h,
-        Resolution::Tolerance(_) | Resolution::Level(_) => 0.1 * scene.outline.area().sqrt(),
-    };
-    let mut candidates = vec![
-        Candidate { integration: Integration::Scni, basis: Basis::Linear, support: 2.0, nodes: Nodes::Uniform(base) },
-        fine(-2),
-    ];
+    let base = base_spacing(scene);
+    let mut candidates =
+        vec![scene.discretization.with(Resolution::Spacing(base), Method::new(Integration::Scni)), fine(scene, -2)];
     if !quick {
-        candidates.push(fine(0));
+        candidates.push(fine(scene, 0));
     }
     let mut points = Vec::new();
     for candidate in candidates {
-        let model = candidate.build(scene)?;
+        let model = build(scene, candidate)?;
         let paddle = best_dynamic(&model)?;
         let reference = vec![reference[paddle].clone()];
         let mut add = |method: &'static str, law: &'static str, measured: Result<(f64, Profile), String>| {

@@ -7,9 +7,9 @@
 //!   by the linear one; on a law that has a mesh limit at finite depth.
 //! - `step`: one tick of a simulator: the full, the reduced and the condensed model, against the same fine insertion.
 
-use super::candidates::{Candidate, Nodes, families, rule_name};
+use super::candidates::{families, measure};
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
-use crate::discretization::{Basis, Integration};
+use crate::discretization::{Discretization, Resolution};
 use crate::model::ModelError;
 use crate::placement::adaptive::Reference;
 use crate::scene::Scene;
@@ -30,7 +30,7 @@ pub struct Point {
     /// `rkpm`, `fem`, `reduced` or `condensed`.
     pub method: &'static str,
     /// The discretization.
-    pub candidate: Candidate,
+    pub discretization: Discretization,
     /// Number of nodes (0 where building failed).
     pub nodes: usize,
     /// Finest spacing, length units.
@@ -103,8 +103,8 @@ pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Par
     let mut points = Vec::new();
     for (i, family) in families.iter().enumerate() {
         progress(0.8 * i as f64 / families.len() as f64);
-        for candidate in family {
-            let point = placement_point(candidate, scene, &reference);
+        for &discretization in family {
+            let point = placement_point(discretization, scene, &reference);
             let too_long = point.wall_s > longest;
             points.push(point);
             if too_long {
@@ -126,13 +126,13 @@ pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Par
     Ok(Pareto { points, open: (reference.open, open), reference_nodes: (reference.nodes, nodes), barrier })
 }
 
-fn placement_point(candidate: &Candidate, scene: &Scene, reference: &Reference) -> Point {
-    let mut point = Point::new(Job::Placement, *candidate, "linear");
+fn placement_point(discretization: Discretization, scene: &Scene, reference: &Reference) -> Point {
+    let mut point = Point::new(Job::Placement, discretization, "linear");
     let start = std::time::Instant::now();
-    match candidate.measure(scene, reference, REPEATS) {
-        Ok(outcome) => {
-            (point.nodes, point.spacing, point.wall_s) = (outcome.nodes, outcome.spacing, outcome.wall_s);
-            (point.error_cm, point.error_static) = outcome.errors;
+    match measure(discretization, scene, reference, REPEATS) {
+        Ok(measured) => {
+            (point.nodes, point.spacing, point.wall_s) = (measured.nodes, measured.spacing, measured.wall_s);
+            (point.error_cm, point.error_static) = measured.errors;
         }
         Err(error) => {
             point.wall_s = start.elapsed().as_secs_f64();
@@ -143,13 +143,13 @@ fn placement_point(candidate: &Candidate, scene: &Scene, reference: &Reference) 
 }
 
 impl Point {
-    pub(super) fn new(job: Job, candidate: Candidate, law: &'static str) -> Self {
+    pub(super) fn new(job: Job, discretization: Discretization, law: &'static str) -> Self {
         Self {
             job,
-            method: if candidate.is_element() { "fem" } else { "rkpm" },
-            candidate,
+            method: if discretization.method.integration.is_element() { "fem" } else { "rkpm" },
+            discretization,
             nodes: 0,
-            spacing: if let Nodes::Uniform(h) = candidate.nodes { h } else { f64::NAN },
+            spacing: if let Resolution::Spacing(h) = discretization.resolution { h } else { f64::NAN },
             law,
             wall_s: f64::NAN,
             error_cm: f64::NAN,
@@ -189,20 +189,15 @@ impl Pareto {
         );
         let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { String::new() };
         for p in &self.points {
-            let c = &p.candidate;
-            let (basis, support) = match (c.is_element(), c.integration, c.basis) {
-                (true, Integration::FemT6, _) => ("quadratic", String::new()),
-                (true, ..) => ("linear", String::new()),
-                (false, _, Basis::Linear) => ("linear", c.support.to_string()),
-                (false, _, Basis::Quadratic) => ("quadratic", c.support.to_string()),
-            };
+            let method = p.discretization.method;
+            let element = method.integration.is_element();
             let fields = [
                 p.method.to_owned(),
-                basis.to_owned(),
-                rule_name(c.integration).to_owned(),
-                matches!(c.nodes, Nodes::Graded(_)).to_string(),
+                method.displacement_basis().to_string(),
+                method.integration.to_string(),
+                p.discretization.resolution.is_graded().to_string(),
                 number(p.spacing),
-                support,
+                if element { String::new() } else { method.support.to_string() },
                 p.nodes.to_string(),
                 (2 * p.nodes).to_string(),
                 p.law.to_owned(),
@@ -225,15 +220,12 @@ impl Pareto {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::discretization::{Integration, Method};
+    use strum::VariantArray as _;
 
     #[test]
     fn the_front_is_what_nothing_beats() {
-        let candidate = Candidate {
-            integration: Integration::Scni,
-            basis: Basis::Linear,
-            support: 2.0,
-            nodes: Nodes::Uniform(0.1),
-        };
+        let candidate = Discretization::new(Resolution::Spacing(0.1), Method::new(Integration::Scni));
         let at = |wall_s, error_cm| Point { wall_s, error_cm, ..Point::new(Job::Placement, candidate, "linear") };
         let mut points = vec![at(1.0, 0.1), at(2.0, 0.2), at(3.0, 0.05), at(0.5, 0.3), at(0.4, f64::NAN)];
         points.push(Point { failure: Some("x".into()), ..at(0.1, 0.01) });
@@ -245,8 +237,10 @@ mod tests {
     fn a_quick_comparison_shows_every_method_and_hides_no_failure() {
         let scene = Scene::bundled("paper").unwrap().without_inclusions();
         let pareto = compare(&scene, true, &|_| {}).unwrap();
-        for rule in super::super::candidates::RULES {
-            assert!(pareto.points.iter().any(|p| p.candidate.integration == rule && p.job == Job::Placement));
+        for &rule in Integration::VARIANTS {
+            assert!(
+                pareto.points.iter().any(|p| p.discretization.method.integration == rule && p.job == Job::Placement)
+            );
         }
         assert!(pareto.open.0 < 0.004 && pareto.open.1 < 0.05, "{:?}", pareto.open);
         assert!(pareto.barrier.is_some(), "the paper's law has no mesh limit of its own");
@@ -260,10 +254,9 @@ mod tests {
         assert!(csv.lines().all(|line| line.matches(',').count() == 15));
         // The linear law is cheaper and, at full depth, worse than the nonlinear one on the same nodes.
         let by_law = |law: &str| {
-            pareto
-                .points
-                .iter()
-                .find(|p| p.job == Job::Insertion && p.law == law && p.candidate.integration == Integration::FemT6)
+            pareto.points.iter().find(|p| {
+                p.job == Job::Insertion && p.law == law && p.discretization.method.integration == Integration::FemT6
+            })
         };
         let (linear, nonlinear) = (by_law("linear").unwrap(), by_law("nonlinear").unwrap());
         assert!(linear.wall_s < nonlinear.wall_s && linear.error_static > nonlinear.error_static);

@@ -1,6 +1,5 @@
 //! The comparison as a figure and as a table for the terminal.
 
-use super::candidates::{Nodes, rule_name};
 use super::pareto::{Job, Pareto, Point};
 use crate::discretization::Integration;
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
@@ -63,8 +62,8 @@ fn panel(
 
 /// Series that differ in filling only share a name with both meanings, so that the legend stays short.
 fn look(point: &Point, filled: bool) -> (String, Marker, bool) {
-    let integration = point.candidate.integration;
-    let rule = rule_name(integration);
+    let integration = point.discretization.method.integration;
+    let rule = integration.name();
     let label = match (integration, filled) {
         // A cross cannot be filled.
         (Integration::Gauss, _) => rule.to_owned(),
@@ -75,7 +74,7 @@ fn look(point: &Point, filled: bool) -> (String, Marker, bool) {
 }
 
 fn by_rule(point: &Point) -> (String, Marker, bool) {
-    look(point, matches!(point.candidate.nodes, Nodes::Graded(_)))
+    look(point, point.discretization.resolution.is_graded())
 }
 
 fn by_law(point: &Point) -> (String, Marker, bool) {
@@ -148,7 +147,7 @@ impl Pareto {
             for p in self.front(job) {
                 let name = match p.method {
                     "reduced" | "condensed" => p.method,
-                    _ => rule_name(p.candidate.integration),
+                    _ => p.discretization.method.integration.name(),
                 };
                 let percent = |e: f64| if e.is_finite() { format!("{:.3} %", 100.0 * e) } else { "–".into() };
                 let _ = writeln!(
@@ -157,7 +156,7 @@ impl Pareto {
                     scale * p.wall_s,
                     percent(p.error_cm),
                     percent(p.error_static),
-                    p.candidate.settings(),
+                    p.discretization.settings(),
                     p.nodes,
                     p.law
                 );

@@ -1,13 +1,13 @@
 //! What the mesh does to the choice of a paddle: both rankings along a refinement, on uniform and on graded nodes.
 
-use super::candidates::{Candidate, Nodes, rule_name};
-use crate::discretization::{Basis, Integration};
-use crate::model::ModelError;
+use super::candidates::base_spacing;
+use crate::discretization::{Discretization, Integration, Method, Resolution};
+use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
 use crate::placement::adaptive::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::placement::study::parallel;
-use crate::scene::{Resolution, Scene};
+use crate::scene::Scene;
 use std::fmt::Write as _;
 
 /// Uniform spacings over the scene's own.
@@ -21,7 +21,7 @@ const REFERENCE_SHARE: f64 = 2e-3;
 #[derive(Debug, Clone)]
 pub struct Step {
     /// The discretization.
-    pub candidate: Candidate,
+    pub discretization: Discretization,
     /// Number of nodes.
     pub nodes: usize,
     /// Responses of all paddles, in the scene's order; or why there are none.
@@ -43,24 +43,21 @@ pub struct Sweep {
 /// # Errors
 /// [`ModelError`] when the limit cannot be computed.
 pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Result<Sweep, ModelError> {
-    let base = match scene.discretization.resolution {
-        Resolution::Spacing(h) => h,
-        Resolution::Tolerance(_) | Resolution::Level(_) => 0.1 * scene.outline.area().sqrt(),
-    };
-    let candidate = |integration, nodes| Candidate { integration, basis: Basis::Linear, support: 2.0, nodes };
-    let candidates: Vec<Candidate> = [Integration::Dni, Integration::Scni, Integration::FemT3]
+    let base = base_spacing(scene);
+    let candidate = |rule, nodes| scene.discretization.with(nodes, Method::new(rule));
+    let candidates: Vec<Discretization> = [Integration::Dni, Integration::Scni, Integration::FemT3]
         .into_iter()
-        .flat_map(|rule| SPACINGS.map(|share| candidate(rule, Nodes::Uniform(base * share))))
-        .chain(LEVELS.map(|level| candidate(Integration::FemT6, Nodes::Graded(level))))
+        .flat_map(|rule| SPACINGS.map(|share| candidate(rule, Resolution::Spacing(base * share))))
+        .chain(LEVELS.map(|level| candidate(Integration::FemT6, Resolution::Level(level))))
         .collect();
     let reference = Reference::compute(scene, REFERENCE_SHARE)?;
     let steps = parallel(candidates.len(), threads, |k| {
-        let candidate = candidates[k];
-        let model = candidate.build(scene);
-        let nodes = model.as_ref().map_or(0, crate::model::TissueModel::nodes);
+        let discretization = candidates[k];
+        let model = TissueModel::new(&scene.with_discretization(discretization));
+        let nodes = model.as_ref().map_or(0, TissueModel::nodes);
         let responses = model.and_then(|model| rest_responses(&model));
         progress();
-        Step { candidate, nodes, responses }
+        Step { discretization, nodes, responses }
     });
     Ok(Sweep { scene: scene.clone(), steps, reference })
 }
@@ -84,11 +81,12 @@ impl Sweep {
 
     fn rows(&self) -> impl Iterator<Item = (String, String, usize, &[RestResponse])> {
         let meshes = self.steps.iter().filter_map(|step| {
-            let nodes = match step.candidate.nodes {
-                Nodes::Uniform(h) => format!("uniform {}", (h * 1e6).round() / 1e6),
-                Nodes::Graded(level) => format!("level {level}"),
+            let nodes = match step.discretization.resolution {
+                Resolution::Spacing(h) => format!("uniform {}", (h * 1e6).round() / 1e6),
+                Resolution::Level(level) => format!("level {level}"),
+                other @ Resolution::Tolerance(_) => other.to_string(),
             };
-            let rule = rule_name(step.candidate.integration).to_owned();
+            let rule = step.discretization.method.integration.to_string();
             Some((rule, nodes, step.nodes, step.responses.as_deref().ok()?))
         });
         let limit = ("limit".to_owned(), "extrapolated".to_owned(), self.reference.nodes, self.reference.responses());
@@ -144,7 +142,7 @@ impl Sweep {
                 let mut points: Vec<(f64, f64)> = self
                     .steps
                     .iter()
-                    .filter(|step| step.candidate.integration == rule)
+                    .filter(|step| step.discretization.method.integration == rule)
                     .filter_map(|step| Some((step.nodes as f64, key(&step.responses.as_ref().ok()?[k]))))
                     .collect();
                 let marker = MARKERS[k % MARKERS.len()];
@@ -185,7 +183,7 @@ mod tests {
             let optima: Vec<(u32, u32)> = sweep
                 .steps
                 .iter()
-                .filter(|s| s.candidate.integration == rule)
+                .filter(|s| s.discretization.method.integration == rule)
                 .map(|s| sweep.optima(s.responses.as_ref().unwrap()))
                 .collect();
             assert_eq!((optima[0].0, optima[optima.len() - 1].0), (coarsest, 2), "{rule:?}: {optima:?}");

@@ -1,13 +1,14 @@
 //! The study as CSV and as a chart.
 
-use super::plan::{self, Entry, METHODS, Parameter, SOLVERS, is_meshfree};
+use super::plan::{Entry, Parameter, SOLVERS};
 use super::{Outcome, Stability};
 use crate::discretization::Integration;
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
 use std::fmt::Write as _;
+use strum::VariantArray as _;
 
 fn family(integration: Integration) -> &'static str {
-    if is_meshfree(integration) { "rkpm" } else { "fem" }
+    if !integration.is_element() { "rkpm" } else { "fem" }
 }
 
 /// A field of a CSV file (RFC 4180).
@@ -22,13 +23,13 @@ pub fn csv(study: &Stability) -> String {
     );
     for (entry, o) in &study.rows {
         let s = &entry.setting;
-        let support = if is_meshfree(s.integration) { s.support.to_string() } else { String::new() };
+        let support = if !s.method.integration.is_element() { s.method.support.to_string() } else { String::new() };
         let limit = super::verdict::limit_of(study, s).map_or_else(String::new, |l| format!("{l:.6}"));
         let _ = writeln!(
             out,
             "{},{},{},{},{},{},{:.6},{},{support},{},{},{:.6},{limit},{:.6},{:.6e},{}",
-            family(s.integration),
-            plan::name(s.integration),
+            family(s.method.integration),
+            s.method.integration.name(),
             entry.parameter.name(),
             entry.value_text(),
             s.spacing,
@@ -56,7 +57,7 @@ pub fn zero_energy_csv(study: &Stability) -> String {
             out,
             "{},{},{},{:.0},{},{},{:.6e},{:.6e},{:.6e},{:.6e}",
             family(z.integration),
-            plan::name(z.integration),
+            z.integration.name(),
             study.spacing,
             100.0 * z.jitter,
             z.nodes,
@@ -82,7 +83,7 @@ fn look(integration: Integration) -> Series {
     let label = match integration {
         Integration::FemT3 => "linear triangles",
         Integration::FemT6 => "quadratic triangles",
-        meshfree => plan::name(meshfree),
+        meshfree => meshfree.name(),
     };
     Series { line: Some(dash), ..Series::scatter(label, marker, filled, Vec::new()) }
 }
@@ -94,12 +95,12 @@ fn by_method(
     place: &dyn Fn(&Entry, &Outcome) -> Option<f64>,
     height: &dyn Fn(&Outcome) -> f64,
 ) -> Vec<Series> {
-    METHODS
+    Integration::VARIANTS
         .iter()
         .map(|&method| {
             let mut groups: Vec<(f64, Vec<f64>)> = Vec::new();
             let mut series = look(method);
-            for (entry, outcome) in study.rows.iter().filter(|r| r.0.setting.integration == method) {
+            for (entry, outcome) in study.rows.iter().filter(|r| r.0.setting.method.integration == method) {
                 let Some(x) = place(entry, outcome) else { continue };
                 if outcome.depth == 0.0 {
                     series.failures.push((x, 0.0));
@@ -187,7 +188,7 @@ pub fn figure(study: &Stability) -> Figure {
     });
 
     let means: Vec<&str> = SOLVERS.iter().map(|s| if *s == "line-search" { "search" } else { s }).collect();
-    let methods: Vec<&str> = METHODS.iter().map(|m| plan::name(*m)).collect();
+    let methods: Vec<&str> = Integration::VARIANTS.iter().map(|m| m.name()).collect();
     let energies = |label: &str, marker, filled, of: &dyn Fn(&super::ZeroEnergy) -> f64| {
         let regular = study.zero_energy.iter().filter(|z| z.jitter == 0.0).enumerate();
         // Exactly nothing has no place on a log axis: it goes to the lower edge.

@@ -13,9 +13,10 @@ pub mod zero_energy;
 mod files;
 mod verdict;
 
+use crate::discretization::Resolution;
 use crate::model::ModelError;
 use crate::placement::study::parallel;
-use crate::scene::{Resolution, Scene};
+use crate::scene::Scene;
 use law_limit::{Lateral, limit_stretch};
 use plan::{Entry, Setting};
 use probe::Outcome;

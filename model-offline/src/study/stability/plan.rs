@@ -1,44 +1,16 @@
 //! What is varied: one parameter at a time around the scene's own setting.
 
-use crate::discretization::Integration;
-use crate::scene::{Resolution, Scene};
-
-/// Every method there is.
-pub const METHODS: [Integration; 6] = [
-    Integration::Dni,
-    Integration::Scni,
-    Integration::Nsni,
-    Integration::Gauss,
-    Integration::FemT3,
-    Integration::FemT6,
-];
-
-/// Name of a method on the command line and in files.
-pub fn name(integration: Integration) -> &'static str {
-    match integration {
-        Integration::Dni => "dni",
-        Integration::Scni => "scni",
-        Integration::Nsni => "nsni",
-        Integration::Gauss => "gauss",
-        Integration::FemT3 => "fem-t3",
-        Integration::FemT6 => "fem-t6",
-    }
-}
-
-/// Whether a method is meshfree.
-pub fn is_meshfree(integration: Integration) -> bool {
-    !matches!(integration, Integration::FemT3 | Integration::FemT6)
-}
+use crate::discretization::{Integration, Method, Resolution};
+use crate::scene::Scene;
+use strum::VariantArray as _;
 
 /// Everything that decides a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
-    /// Integration rule or element.
-    pub integration: Integration,
+    /// Method.
+    pub method: Method,
     /// Node spacing, length units.
     pub spacing: f64,
-    /// Kernel support over spacing (meshfree only).
-    pub support: f64,
     /// Largest displacement of interior nodes over the spacing, either axis.
     pub jitter: f64,
     /// Which random displacement.
@@ -129,9 +101,8 @@ impl Entry {
 /// The scene's own setting with a method at a spacing.
 pub fn base(scene: &Scene, integration: Integration, spacing: f64) -> Setting {
     Setting {
-        integration,
+        method: Method { integration, ..scene.discretization.method },
         spacing,
-        support: scene.discretization.support,
         jitter: 0.0,
         seed: 0,
         contrast: None,
@@ -191,7 +162,7 @@ pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
     let Resolution::Spacing(spacing) = scene.discretization.resolution else { return Vec::new() };
     let factors: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25] };
     let mut entries = Vec::new();
-    for integration in METHODS {
+    for &integration in Integration::VARIANTS {
         for factor in factors {
             // 0.15, not 0.15000000000000002.
             let setting = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
@@ -204,7 +175,7 @@ pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
             sweeps(scene, base(scene, integration, 0.5 * spacing), &Values::few(), &mut entries);
         }
     }
-    let key = |e: &Entry| (e.parameter, METHODS.iter().position(|m| *m == e.setting.integration));
+    let key = |e: &Entry| (e.parameter, Integration::VARIANTS.iter().position(|m| *m == e.setting.method.integration));
     entries.sort_by(|a, b| {
         key(a)
             .cmp(&key(b))
@@ -217,9 +188,9 @@ pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
 
 fn sweeps(scene: &Scene, base: Setting, values: &Values, out: &mut Vec<Entry>) {
     let mut push = |parameter, value, setting| out.push(Entry { parameter, value, setting });
-    if is_meshfree(base.integration) {
+    if !base.method.integration.is_element() {
         for &support in &values.support {
-            push(Parameter::Support, support, Setting { support, ..base });
+            push(Parameter::Support, support, Setting { method: Method { support, ..base.method }, ..base });
         }
     }
     for &percent in values.jitter {

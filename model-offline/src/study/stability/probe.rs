@@ -2,7 +2,7 @@
 
 use super::plan::Setting;
 use crate::discretization::lattice::lattice_nodes;
-use crate::discretization::{DiscretizationError, Method, Planar};
+use crate::discretization::{DiscretizationError, Planar};
 use crate::geometry::{Location, Point2, distance_to_polyline};
 use crate::material::{Law, Material as _, MaterialError};
 use crate::model::{ModelError, TissueModel};
@@ -200,13 +200,8 @@ fn uniform(state: &mut u64) -> f64 {
 }
 
 fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Setting) -> Result<TissueModel, ModelError> {
-    let method = Method {
-        integration: setting.integration,
-        basis: scene.discretization.basis,
-        support: setting.support,
-        consistent: true,
-    };
-    let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(setting.spacing), method)?;
+    let planar =
+        Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(setting.spacing), setting.method)?;
     TissueModel::on(scene, planar, setting.spacing)
 }
 

@@ -1,8 +1,10 @@
 //! The claim that meshfree methods are more stable than finite elements under large deformation, counted.
 
-use super::plan::{self, METHODS, Parameter, Setting, is_meshfree};
+use super::plan::{Parameter, Setting};
 use super::{Outcome, Stability};
+use crate::discretization::{Integration, Method};
 use std::fmt::Write as _;
+use strum::VariantArray as _;
 
 /// Depths within this share of the larger one count as the same.
 const SAME: f64 = 0.05;
@@ -75,13 +77,13 @@ type Run<'a, 's> = &'a (Setting, &'s Outcome);
 pub fn verdict(study: &Stability) -> Verdict {
     let distinct = study.distinct();
     let alike = |m: &Setting, e: &Setting| {
-        let stripped = |s: &Setting| Setting { integration: plan::METHODS[0], spacing: 0.0, support: 0.0, ..*s };
+        let stripped = |s: &Setting| Setting { method: Method::new(Integration::Dni), spacing: 0.0, ..*s };
         stripped(m) == stripped(e)
     };
     let pairs = |element, matches: &dyn Fn(Run<'_, '_>, Run<'_, '_>) -> bool| {
         let mut depths = Vec::new();
-        for m in distinct.iter().filter(|d| is_meshfree(d.0.integration)) {
-            for e in distinct.iter().filter(|d| d.0.integration == element && alike(&m.0, &d.0)) {
+        for m in distinct.iter().filter(|d| !d.0.method.integration.is_element()) {
+            for e in distinct.iter().filter(|d| d.0.method.integration == element && alike(&m.0, &d.0)) {
                 if matches(m, e) {
                     depths.push((m.1.depth, e.1.depth));
                 }
@@ -94,7 +96,7 @@ pub fn verdict(study: &Stability) -> Verdict {
         let (m, e) = (m.1.nodes as f64, e.1.nodes as f64);
         (m - e).abs() <= EQUAL_NODES * m.max(e)
     };
-    let [linear, quadratic] = [METHODS[4], METHODS[5]];
+    let [linear, quadratic] = [Integration::FemT3, Integration::FemT6];
     let started: Vec<Run<'_, '_>> = distinct.iter().filter(|d| d.1.depth > 0.0).collect();
     let limited: Vec<(f64, &Outcome)> =
         started.iter().filter_map(|(setting, outcome)| Some((limit_of(study, setting)?, *outcome))).collect();
@@ -127,17 +129,17 @@ pub fn summary(study: &Stability) -> String {
         study.rows.len()
     );
     let _ = write!(out, "{:<26}", "depth reached");
-    for method in METHODS {
-        let _ = write!(out, "{:>9}", plan::name(method));
+    for &method in Integration::VARIANTS {
+        let _ = write!(out, "{:>9}", method.name());
     }
     out.push('\n');
     let mut line = |label: &str, pick: &dyn Fn(&super::Entry) -> bool| {
         let _ = write!(out, "{label:<26}");
-        for method in METHODS {
+        for &method in Integration::VARIANTS {
             let depths: Vec<f64> = study
                 .rows
                 .iter()
-                .filter(|(e, _)| e.setting.integration == method && pick(e))
+                .filter(|(e, _)| e.setting.method.integration == method && pick(e))
                 .map(|(_, o)| o.depth)
                 .collect();
             let low = depths.iter().copied().fold(f64::INFINITY, f64::min);
@@ -205,7 +207,7 @@ pub fn summary(study: &Stability) -> String {
         let _ = writeln!(
             out,
             "  {:<7} {} | {:.1e}, {:.1e} | {:.1e}",
-            plan::name(z.integration),
+            z.integration.name(),
             z.zero_modes,
             z.checkerboard_felt,
             z.interior_felt,

@@ -1,17 +1,19 @@
 //! Deformations that a rule does not feel: eigenvalues of the unconstrained tangent at rest, and the energy of
 //! displacements that alternate from node to node.
 
-use super::plan::{self, METHODS, Setting, is_meshfree};
+use super::plan::{self, Setting};
 use super::probe;
-use crate::discretization::Integration;
 use crate::discretization::finite_element::Elements;
 use crate::discretization::triangulation::triangulate;
-use crate::discretization::{DiscretizationError, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration};
+use crate::discretization::{
+    DiscretizationError, Integration, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration,
+};
 use crate::geometry::Point2;
 use crate::material::{Material as _, Tensor4};
 use crate::model::ModelError;
 use crate::scene::Scene;
 use nalgebra::{DMatrix, DVector, Matrix2};
+use strum::VariantArray as _;
 
 /// Eigenvalues below this share of the largest count as zero.
 const ZERO: f64 = 1e-10;
@@ -48,13 +50,15 @@ pub struct ZeroEnergy {
 pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelError> {
     [0.0, 0.4]
         .into_iter()
-        .flat_map(|jitter| METHODS.map(|m| Setting { jitter, ..plan::base(scene, m, spacing) }))
+        .flat_map(|jitter| {
+            Integration::VARIANTS.iter().map(move |m| Setting { jitter, ..plan::base(scene, *m, spacing) })
+        })
         .map(|setting| measure_one(scene, &setting))
         .collect()
 }
 
 fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelError> {
-    let (integration, spacing) = (setting.integration, setting.spacing);
+    let (integration, spacing) = (setting.method.integration, setting.spacing);
     let model = probe::model(scene, setting)?;
     // The lattice before it was jittered: what the checkerboard alternates on.
     let lattice = probe::model(scene, &Setting { jitter: 0.0, ..*setting })?.positions().to_vec();
@@ -62,7 +66,7 @@ fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelErro
     let everywhere = |_: u32| true;
     let stiffness = dense_tangent(model.rule(), &law, model.nodes(), &everywhere);
     // Elements are integrated exactly by their own rule.
-    let accurate = match is_meshfree(integration) {
+    let accurate = match !integration.is_element() {
         true => Some(accurate_rule(scene, model.positions(), setting)?),
         false => None,
     };
@@ -88,7 +92,7 @@ fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelErro
         .collect();
     let interior_felt = accurate.as_ref().map_or(1.0, |(rule, cells)| {
         // Cells in which no kernel feels the boundary.
-        let clear = setting.support * spacing - 1e-9 * extent;
+        let clear = setting.method.support * spacing - 1e-9 * extent;
         let inside = |cells: &[NodalCell]| -> Vec<bool> {
             cells.iter().map(|c| c.corners().iter().all(|x| scene.outline.distance_to_boundary(*x) >= clear)).collect()
         };
@@ -109,7 +113,7 @@ fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelErro
         checkerboard_over_smooth: energy(&stiffness, &checkerboard) / energy(&stiffness, &smooth),
         checkerboard_felt: energy(&stiffness, &checkerboard) / energy(&exact, &checkerboard),
         interior_felt,
-        least_felt: if is_meshfree(integration) { least_share(&stiffness, &exact) } else { 1.0 },
+        least_felt: if !integration.is_element() { least_share(&stiffness, &exact) } else { 1.0 },
     })
 }
 
@@ -129,8 +133,8 @@ fn accurate_rule(
     nodes: &[Point2],
     setting: &Setting,
 ) -> Result<(Quadrature<2>, Vec<NodalCell>), ModelError> {
-    let cloud = NodeCloud::new(nodes.to_vec(), vec![setting.spacing * setting.support; nodes.len()]);
-    let shape = ShapeFunctions::new(&cloud, scene.discretization.basis);
+    let cloud = NodeCloud::new(nodes.to_vec(), vec![setting.spacing * setting.method.support; nodes.len()]);
+    let shape = ShapeFunctions::new(&cloud, setting.method.basis);
     let triangles = triangulate(nodes, &scene.outline, &[]).map_err(DiscretizationError::from)?;
     let cells = Elements::linear(nodes.to_vec(), triangles.clone()).cells();
     Ok((integration::gauss(&shape, &triangles, &cells, true, false)?, cells))
