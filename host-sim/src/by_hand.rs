@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use iceoryx2::service::ipc;
-use model_offline::placement::place;
-use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::placement::best_dynamic;
 use nalgebra::Vector2;
 use serde::{Deserialize, Serialize};
 
@@ -65,7 +64,7 @@ pub fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let (model, _) = model_offline::placement::discretise(&scene)?;
     let paddle = match args.paddle {
         Some(index) => index,
-        None => place(&model, NewtonSettings::default(), 1, &|| {})?.optimum.dynamic,
+        None => best_dynamic(&model)?,
     };
     let mut world = World::new(&model, Some(paddle), &simulation)?;
     let space = Space::new(&args.link)?;

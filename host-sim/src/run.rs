@@ -8,10 +8,10 @@ use firmware::Controller;
 use firmware::contract::Table;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use model_offline::model::TissueModel;
-use model_offline::placement::study::{parallel, progress_steps};
-use model_offline::placement::{Placement, place};
+use model_offline::parallel;
+use model_offline::placement::study::steps;
+use model_offline::placement::{Placement, PlacementOptions, place};
 use model_offline::scene::Scene;
-use model_offline::solver::equilibrium::NewtonSettings;
 use model_offline::table::{TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
 
@@ -395,7 +395,7 @@ impl Studies {
         }
         let threads =
             args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, std::num::NonZero::get));
-        let studies: u64 = models.iter().map(|model| progress_steps(&model.1)).sum();
+        let studies: u64 = models.iter().map(|model| steps(model.1.scene())).sum();
         let ticks = (simulation.duration_s * simulation.loop_args.rate) as u64;
         let runs: u64 = cases
             .iter()
@@ -420,7 +420,8 @@ impl Studies {
             self.bar.set_message(format!("{}: placement", tissue.name()));
             let started = Instant::now();
             let progress = || self.bar.inc(1);
-            let placement = place(model, NewtonSettings::default(), self.threads, &progress)?;
+            let placement =
+                place(model, &PlacementOptions { threads: self.threads, progress: &progress, newton: None })?;
             interrupt::check()?;
             let wall_s = started.elapsed().as_secs_f64();
             self.placements.push((*tissue, placement, wall_s));
@@ -462,7 +463,7 @@ impl Studies {
                 none.into_iter().chain([(i, Some(paddle), "static")])
             })
             .collect();
-        let outcomes = parallel(jobs.len(), self.threads, |job| {
+        let outcomes = parallel::map(jobs.len(), self.threads, |job| {
             let (i, paddle, strategy) = jobs[job];
             let progress = || self.bar.inc(1);
             let label = cases[i].label(strategy);

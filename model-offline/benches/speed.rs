@@ -2,7 +2,7 @@
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use model_offline::model::TissueModel;
-use model_offline::placement::place;
+use model_offline::placement::{PlacementOptions, place};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
@@ -15,7 +15,7 @@ fn paper() -> TissueModel {
 fn placement(c: &mut Criterion) {
     let model = paper();
     c.bench_function("placement study, one tissue, one thread, 106 nodes", |b| {
-        b.iter(|| place(&model, NewtonSettings::default(), 1, &|| {}).expect("all depths converge"));
+        b.iter(|| place(&model, &PlacementOptions { threads: 1, ..Default::default() }).expect("all depths converge"));
     });
     c.bench_function("discretization, 106 nodes", |b| b.iter(paper));
 }

@@ -9,7 +9,7 @@ use model_offline::discretization::{Integration, Method, Planar, Resolution};
 use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::discretise;
 use model_offline::placement::rest::rest_responses;
-use model_offline::placement::study;
+use model_offline::placement::{PlacementOptions, PlacementStudy};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
@@ -109,9 +109,8 @@ fn main() {
         row(&format!("the same from tolerance 0.01 alone, {integration:?}, error {error:.2} %"), time, 250.0, 60.0);
         let study = milliseconds(
             || {
-                let (model, _) = discretise(&scene).expect("reached");
-                let profile = model_offline::placement::adaptive::profile_model(&model).expect("graded");
-                drop(study::place_on(&model, &profile, study::settings_for(&scene), 1, &|| {}).expect("controllable"));
+                let options = PlacementOptions { threads: 1, ..Default::default() };
+                drop(PlacementStudy::run(&scene, &options).expect("controllable"));
             },
             1,
         );

@@ -28,16 +28,17 @@
 //!
 //! # Example
 //! ```
-//! use model_offline::model::TissueModel;
-//! use model_offline::placement::place;
+//! use model_offline::placement::{PlacementOptions, PlacementStudy};
 //! use model_offline::scene::Scene;
-//! use model_offline::solver::equilibrium::NewtonSettings;
 //!
 //! let scene = Scene::bundled("paper").expect("bundled").without_inclusions();
-//! let model = TissueModel::new(&scene)?;
-//! let placement = place(&model, NewtonSettings::default(), 1, &|| {})?;
-//! assert_eq!((placement.optimum.fixture, placement.optimum.dynamic), (4, 3)); // the paper's optima
-//! # Ok::<(), model_offline::model::ModelError>(())
+//! let study = PlacementStudy::run(&scene, &PlacementOptions::default())?;
+//! let optimum = study.placement.optimum;
+//! assert_eq!((optimum.fixture, optimum.dynamic), (4, 3)); // the paper's optima
+//!
+//! let table = model_offline::table::build(&study.model, optimum.dynamic, &Default::default())?;
+//! assert_eq!(table.paddle.index, 3);
+//! # Ok::<(), model_offline::table::TableBuildError>(())
 //! ```
 
 pub mod discretization;
@@ -48,6 +49,7 @@ pub mod material;
 pub mod mechanics;
 pub mod model;
 pub mod output;
+pub mod parallel;
 pub mod placement;
 pub mod reduction;
 pub mod scene;

@@ -2,9 +2,8 @@
 
 use assert_cmd::Command;
 use model_offline::model::TissueModel;
-use model_offline::placement::place;
+use model_offline::placement::{PlacementOptions, place};
 use model_offline::scene::{BUNDLED, Scene};
-use model_offline::solver::equilibrium::NewtonSettings;
 use std::path::Path;
 
 fn model_offline() -> Command {
@@ -41,7 +40,7 @@ fn results_do_not_depend_on_the_units() {
         .collect();
     let solve = |text: &str| {
         let model = TissueModel::new(&Scene::parse(text, "scaled").unwrap()).unwrap();
-        place(&model, NewtonSettings::default(), 1, &|| {}).unwrap()
+        place(&model, &PlacementOptions { threads: 1, ..Default::default() }).unwrap()
     };
     let (one, other) = (solve(text), solve(&scaled));
     assert_eq!(one.optimum, other.optimum);

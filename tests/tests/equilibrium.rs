@@ -2,7 +2,7 @@
 
 use model_offline::discretization::{Integration, Resolution};
 use model_offline::model::TissueModel;
-use model_offline::placement::place;
+use model_offline::placement::{PlacementOptions, place};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
@@ -123,8 +123,8 @@ fn the_answer_turns_with_the_scene() {
 #[test]
 fn results_do_not_depend_on_the_number_of_threads() {
     let model = model(Integration::Dni);
-    let one = place(&model, NewtonSettings::default(), 1, &|| {}).unwrap();
-    let four = place(&model, NewtonSettings::default(), 4, &|| {}).unwrap();
+    let one = place(&model, &PlacementOptions { threads: 1, ..Default::default() }).unwrap();
+    let four = place(&model, &PlacementOptions { threads: 4, ..Default::default() }).unwrap();
     assert_eq!(one, four);
 }
 
@@ -134,7 +134,7 @@ fn too_deep_is_a_typed_failure_with_the_last_converged_state() {
     scene.needle.depth = 0.4;
     scene.needle.increments = 40;
     let model = TissueModel::new(&scene).unwrap();
-    let placement = place(&model, NewtonSettings::default(), 2, &|| {}).unwrap();
+    let placement = place(&model, &PlacementOptions { threads: 2, ..Default::default() }).unwrap();
     for paddle in &placement.paddles {
         let failure = paddle.fixture.failure.as_ref().expect("the law loses stability before depth 0.4");
         assert!(failure.depth > 0.08 && failure.depth < 0.3, "{failure:?}");
@@ -153,7 +153,7 @@ fn a_paddle_that_failed_never_ranks_above_one_that_reached_the_depth() {
     scene.needle.depth = 0.13;
     scene.needle.increments = 13;
     let model = TissueModel::new(&scene).unwrap();
-    let placement = place(&model, NewtonSettings::default(), 2, &|| {}).unwrap();
+    let placement = place(&model, &PlacementOptions { threads: 2, ..Default::default() }).unwrap();
     let best = placement.paddles.iter().find(|p| p.index == placement.optimum.fixture).unwrap();
     if placement.paddles.iter().any(|p| p.fixture.failure.is_none()) {
         assert!(best.fixture.failure.is_none());
@@ -183,7 +183,7 @@ fn the_volumetric_barrier_gives_the_finite_depth_profile_a_mesh_limit() {
         let mut scene = Scene::parse(text, "scene").unwrap().without_inclusions();
         scene.discretization.method.integration = Integration::FemT6;
         scene.discretization.resolution = Resolution::Spacing(spacing);
-        place(&TissueModel::new(&scene).unwrap(), NewtonSettings::default(), 2, &|| {}).unwrap()
+        place(&TissueModel::new(&scene).unwrap(), &PlacementOptions { threads: 2, ..Default::default() }).unwrap()
     };
     assert!(study(text, 0.05).paddles.iter().all(|p| p.fixture.failure.is_some()));
     let worst: Vec<Vec<f64>> = [0.2, 0.1, 0.05]

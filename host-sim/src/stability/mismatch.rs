@@ -4,8 +4,8 @@
 use firmware::contract::{Knot, Table};
 use firmware::stability::gain_limit;
 use model_offline::model::ModelError;
+use model_offline::parallel;
 use model_offline::placement::discretise;
-use model_offline::placement::study::parallel;
 use model_offline::scene::Scene;
 use model_offline::table::{TableBuildError, TableOptions, build};
 use nalgebra::{Complex, Matrix2, Vector2};
@@ -78,7 +78,7 @@ pub fn mismatches(scene: &Scene, knots: usize, threads: usize) -> Result<(Vec<Mi
     let models = [discretise(&scene.without_inclusions())?.0, discretise(scene)?.0];
     let options = TableOptions { knots, ..TableOptions::default() };
     let paddles = &scene.paddles;
-    let tables = parallel(2 * paddles.len(), threads, |i| build(&models[i % 2], paddles[i / 2].index, &options));
+    let tables = parallel::map(2 * paddles.len(), threads, |i| build(&models[i % 2], paddles[i / 2].index, &options));
     let (mut rows, mut refused) = (Vec::new(), Vec::new());
     for (paddle, pair) in paddles.iter().zip(tables.chunks(2)) {
         match (&pair[0], &pair[1]) {

@@ -1,6 +1,6 @@
 //! `model-offline new`: a scene to start from.
 
-use super::CliError;
+use super::error::CliError;
 use model_offline::output;
 use model_offline::scene::Scene;
 use model_offline::scene::import::{Imported, gmsh, svg};
@@ -36,8 +36,8 @@ pub(super) struct NewArgs {
     force: bool,
 }
 
-pub(super) fn new(args: &NewArgs) -> Result<(), CliError> {
-    let usage = |message: String, help: &str| CliError::Usage(message, help.to_owned());
+pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
+    let usage = |message: String, help: &str| CliError::usage(message, help);
     if let Some(size) = args.size {
         if !(size.is_finite() && size > 0.0) {
             return Err(usage(format!("--size is {size}"), "give the length of the body's longer side, above 0"));
@@ -75,11 +75,10 @@ fn import(
     file: &Path,
     read: impl Fn(&str) -> Result<Imported, model_offline::scene::import::ImportError>,
 ) -> Result<Imported, CliError> {
-    let text = std::fs::read_to_string(file).map_err(|error| {
-        CliError::Usage(format!("cannot read {}: {error}", file.display()), "give a text file".into())
-    })?;
+    let text = std::fs::read_to_string(file)
+        .map_err(|error| CliError::usage(format!("cannot read {}: {error}", file.display()), "give a text file"))?;
     read(&text).map_err(|error| {
         let help = "an outline is a closed path of an SVG drawing, or the boundary of a planar ASCII Gmsh mesh";
-        CliError::Usage(format!("{}: {error}", file.display()), help.into())
+        CliError::usage(format!("{}: {error}", file.display()), help)
     })
 }

@@ -86,7 +86,7 @@ pub fn json(table: &Table<f64, 2>) -> serde_json::Value {
         },
         "knots": table.knots.iter().map(|k| serde_json::json!({
             "depth": k.depth,
-            "jacobian": crate::placement::study::rows(&k.jacobian),
+            "jacobian": crate::placement::controllability::rows(&k.jacobian),
             "paddle_path": v(&k.paddle_path),
             "paddle_path_slope": v(&k.paddle_path_slope),
             "target_displacement": v(&k.target_displacement),

@@ -56,8 +56,7 @@ mod tests {
     use super::*;
     use crate::discretization::Resolution;
     use crate::model::TissueModel;
-    use crate::placement::study;
-    use crate::solver::equilibrium::NewtonSettings;
+    use crate::placement::study::{PlacementOptions, place};
 
     #[test]
     fn coarse_nodes_are_found_out_and_fine_ones_are_not_accused() {
@@ -67,7 +66,7 @@ mod tests {
             scene.discretization.method.integration = integration;
             scene.discretization.resolution = Resolution::Spacing(spacing);
             let model = TissueModel::new(&scene).unwrap();
-            let placement = study::place(&model, NewtonSettings::default(), 1, &|| {}).unwrap();
+            let placement = place(&model, &PlacementOptions::default()).unwrap();
             cross_check(&scene, &placement.paddles).unwrap()
         };
         let (coarse, fine) = (check(Integration::Dni, 0.2), check(Integration::Gauss, 0.05));

@@ -2,10 +2,13 @@
 //! study, and the rankings for the static and the dynamic approach.
 
 pub mod adaptive;
+pub mod controllability;
 pub mod cross_check;
 pub mod rest;
 pub mod study;
 pub mod verdict;
+pub mod workflow;
 
 pub use adaptive::discretise;
-pub use study::{PaddleResult, Placement, StaticStudy, place};
+pub use study::{PaddleResult, Placement, PlacementOptions, StaticStudy, best_dynamic, place};
+pub use workflow::PlacementStudy;

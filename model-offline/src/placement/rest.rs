@@ -1,7 +1,7 @@
 //! Actuation Jacobians at rest for all paddles at once: one assembly and one symbolic analysis serve them all, since
 //! they differ only in which nodal values are held.
 
-use super::study::best_direction;
+use super::controllability::best_direction;
 use crate::linalg::Pattern;
 use crate::mechanics::HeldRows;
 use crate::mechanics::assembly::{Scatter, State, internal_force, tangent};
@@ -81,8 +81,9 @@ fn response_of(
     target_per_depth: Vector2<f64>,
 ) -> Result<RestResponse, ModelError> {
     let scene = model.scene();
-    let direction = best_direction(&jacobian, scene.needle.orthogonal())
-        .map_err(|condition| ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition })?;
+    let direction = best_direction(&jacobian, scene.needle.orthogonal()).map_err(|singular| {
+        ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition: singular.condition }
+    })?;
     Ok(RestResponse {
         jacobian,
         controllability_measure: direction.norm(),

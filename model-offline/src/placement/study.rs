@@ -1,14 +1,16 @@
 //! The placement study: every paddle, static and dynamic.
 
+use super::adaptive::profile_model;
+use super::controllability::rows;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::Resolution;
 use crate::model::{ModelError, TissueModel};
+use crate::parallel;
+use crate::scene::Scene;
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::Vector2;
 use serde::Serialize;
-
-/// Above this condition number a Jacobian controls nothing that a real paddle could use.
-pub const MAX_JACOBIAN_CONDITION: f64 = 1e8;
+use std::borrow::Cow;
 
 /// Why and where a static run ended before the full depth.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -77,71 +79,68 @@ pub struct Placement {
     pub paddles: Vec<PaddleResult>,
     /// The best paddles.
     pub optimum: Optimum,
+    /// Nodes of the model on which the insertion was followed to depth.
+    pub profile_nodes: usize,
 }
 
-/// Runs `work` for 0..count on at most `threads` threads; results come in order, whatever the number of threads.
-pub fn parallel<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
-    let next = std::sync::atomic::AtomicUsize::new(0);
-    let mut results: Vec<(usize, T)> = std::thread::scope(|scope| {
-        let worker = || {
-            let mut done = Vec::new();
-            loop {
-                let i = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-                if i >= count {
-                    return done;
-                }
-                done.push((i, work(i)));
-            }
-        };
-        let handles: Vec<_> = (1..threads.min(count)).map(|_| scope.spawn(worker)).collect();
-        let mut results = worker();
-        for handle in handles {
-            results.extend(handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
-        }
-        results
-    });
-    results.sort_by_key(|r| r.0);
-    results.into_iter().map(|r| r.1).collect()
+/// How a placement study runs.
+///
+/// # Example
+/// ```
+/// use model_offline::placement::PlacementOptions;
+///
+/// let options = PlacementOptions { threads: 2, ..PlacementOptions::default() };
+/// assert!(options.newton.is_none()); // those that suit the resolution
+/// ```
+#[derive(Clone, Copy)]
+pub struct PlacementOptions<'a> {
+    /// Threads to use; the result does not depend on them.
+    pub threads: usize,
+    /// Settings of Newton's method along the insertion; when absent, those that suit the scene's resolution.
+    pub newton: Option<NewtonSettings>,
+    /// Called [`steps`] times along the way.
+    pub progress: &'a (dyn Fn() + Sync),
 }
 
-/// Studies every paddle of the model's scene.
+impl std::fmt::Debug for PlacementOptions<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { threads, newton, .. } = self;
+        f.debug_struct("PlacementOptions").field("threads", threads).field("newton", newton).finish_non_exhaustive()
+    }
+}
+
+impl Default for PlacementOptions<'_> {
+    /// All threads, silent.
+    fn default() -> Self {
+        Self { threads: parallel::available(), newton: None, progress: &|| {} }
+    }
+}
+
+/// Studies every paddle of the model's scene. Jacobians at rest are those of the model itself; on a model that was refined to
+/// a tolerance, the insertion is followed to depth on its [`profile_model`].
 ///
 /// # Errors
 /// [`ModelError`] when a Jacobian cannot be computed; a static run that stops early is a result, not an error.
-pub fn place(
-    model: &TissueModel,
-    settings: NewtonSettings,
-    threads: usize,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Placement, ModelError> {
-    place_on(model, model, settings, threads, progress)
-}
-
-/// The same with the insertion followed to depth on a model of its own (see
-/// [`profile_model`](super::adaptive::profile_model)).
-///
-/// # Errors
-/// [`ModelError`] when a Jacobian cannot be computed.
-pub fn place_on(
-    model: &TissueModel,
-    profile: &TissueModel,
-    settings: NewtonSettings,
-    threads: usize,
-    progress: &(dyn Fn() + Sync),
-) -> Result<Placement, ModelError> {
+pub fn place(model: &TissueModel, options: &PlacementOptions<'_>) -> Result<Placement, ModelError> {
+    let resolution = model.scene().discretization.resolution;
+    let profile = match resolution {
+        Resolution::Tolerance(_) => Cow::Owned(profile_model(model)?),
+        Resolution::Spacing(_) | Resolution::Level(_) => Cow::Borrowed(model),
+    };
+    let newton = options.newton.unwrap_or_else(|| newton_for(resolution));
     let rest = rest_responses(model)?;
-    let paddles =
-        parallel(rest.len(), threads, |paddle| study_paddle(profile, &rest[paddle], paddle, settings, progress))
-            .into_iter()
-            .collect::<Result<Vec<_>, _>>()?;
+    let paddles = parallel::map(rest.len(), options.threads, |paddle| {
+        study_paddle(&profile, &rest[paddle], paddle, &PlacementOptions { newton: Some(newton), ..*options })
+    });
+    let paddles = paddles.into_iter().collect::<Result<Vec<_>, _>>()?;
     let optimum = rank(&paddles, model.scene().needle.orthogonal());
-    Ok(Placement { paddles, optimum })
+    Ok(Placement { paddles, optimum, profile_nodes: profile.nodes() })
 }
 
-/// Settings for the static study of a scene. On nodes refined to a tolerance the law loses stability under the needle's
+/// Newton's settings for the static study. On nodes refined to a tolerance the law loses stability under the needle's
 /// edge long before the full depth; finding that depth to an eighth of an increment is enough there.
-pub fn settings_for(scene: &crate::scene::Scene) -> NewtonSettings {
-    match scene.discretization.resolution {
+fn newton_for(resolution: Resolution) -> NewtonSettings {
+    match resolution {
         Resolution::Spacing(_) => NewtonSettings::default(),
         Resolution::Tolerance(_) | Resolution::Level(_) => {
             NewtonSettings { max_cutbacks: 3, max_iterations: 8, ..NewtonSettings::default() }
@@ -150,8 +149,8 @@ pub fn settings_for(scene: &crate::scene::Scene) -> NewtonSettings {
 }
 
 /// Number of times [`place`] calls its progress function.
-pub fn progress_steps(model: &TissueModel) -> u64 {
-    model.scene().paddles.len() as u64 * u64::from(model.scene().needle.increments)
+pub fn steps(scene: &Scene) -> u64 {
+    scene.paddles.len() as u64 * u64::from(scene.needle.increments)
 }
 
 /// The paddle with the smallest controllability measure, by index; no static study is run.
@@ -173,13 +172,12 @@ fn study_paddle(
     model: &TissueModel,
     rest: &RestResponse,
     paddle: usize,
-    settings: NewtonSettings,
-    progress: &(dyn Fn() + Sync),
+    options: &PlacementOptions<'_>,
 ) -> Result<PaddleResult, ModelError> {
     let scene = model.scene();
     let index = scene.paddles[paddle].index;
     let normal = scene.needle.orthogonal();
-    let mut body = model.body(Some(paddle), settings)?;
+    let mut body = model.body(Some(paddle), options.newton.unwrap_or_default())?;
 
     let mut fixture = StaticStudy {
         depth: Vec::new(),
@@ -192,7 +190,7 @@ fn study_paddle(
     let mut jacobians = Vec::new();
     let increments = scene.needle.increments;
     for increment in 1..=increments {
-        progress();
+        (options.progress)();
         let depth = scene.needle.depth * f64::from(increment) / f64::from(increments);
         let outcome = body.drive(depth, Vector2::zeros()).and_then(|()| body.actuation_jacobian());
         match outcome {
@@ -223,24 +221,6 @@ fn study_paddle(
         jacobians,
         fixture,
     })
-}
-
-/// J⁻¹ n: the paddle displacement that moves the target by one along n and not at all across.
-///
-/// # Errors
-/// The condition number, when it is beyond [`MAX_JACOBIAN_CONDITION`].
-pub fn best_direction(jacobian: &Matrix2<f64>, normal: Vector2<f64>) -> Result<Vector2<f64>, f64> {
-    let values = jacobian.singular_values();
-    let condition = values.max() / values.min();
-    match jacobian.try_inverse() {
-        Some(inverse) if condition <= MAX_JACOBIAN_CONDITION => Ok(inverse * normal),
-        _ => Err(condition),
-    }
-}
-
-/// Rows of a matrix as arrays.
-pub fn rows(m: &Matrix2<f64>) -> [[f64; 2]; 2] {
-    [[m[(0, 0)], m[(0, 1)]], [m[(1, 0)], m[(1, 1)]]]
 }
 
 /// The best paddles. A fixture that did not reach the depth ranks below every one that did. When none did, they are

@@ -61,13 +61,12 @@ pub fn verdict(placement: &Placement, scene: &Scene) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::model::TissueModel;
-    use crate::placement::place;
-    use crate::solver::equilibrium::NewtonSettings;
+    use crate::placement::{PlacementOptions, place};
 
     fn lines(name: &str) -> Vec<String> {
         let scene = Scene::bundled(name).unwrap();
         let model = TissueModel::new(&scene).unwrap();
-        verdict(&place(&model, NewtonSettings::default(), 1, &|| {}).unwrap(), &scene)
+        verdict(&place(&model, &PlacementOptions::default()).unwrap(), &scene)
     }
 
     #[test]

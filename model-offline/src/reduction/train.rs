@@ -7,7 +7,8 @@ use super::online::{Domain, Invalid, ReducedModel, SampledPoint};
 use crate::material::Material as _;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::model::{ModelError, TissueModel};
-use crate::placement::study::{best_direction, parallel};
+use crate::parallel;
+use crate::placement::controllability::best_direction;
 use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use serde::Serialize;
@@ -197,7 +198,7 @@ fn take_snapshots(
             (0..9).map(|k| Vector2::new(f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0) * asked.paddle).collect()
         }
     };
-    let runs = parallel(places.len(), threads, |k| -> Result<(Vec<Snapshot>, f64), ModelError> {
+    let runs = parallel::map(places.len(), threads, |k| -> Result<(Vec<Snapshot>, f64), ModelError> {
         let mut body = model.body(paddle, SNAPSHOT_SETTINGS)?;
         let mut taken = Vec::new();
         for depth in DEPTHS.map(|share| share * asked.depth) {
@@ -233,7 +234,7 @@ fn snapshot(body: &crate::model::Body<'_>) -> Snapshot {
 
 /// Full solutions at states spread over the domain without a pattern (Halton's sequence in bases 2, 3, 5).
 fn take_trials(model: &TissueModel, paddle: Option<usize>, domain: Domain, threads: usize) -> Vec<Snapshot> {
-    let states = parallel(TRIALS, threads, |k| {
+    let states = parallel::map(TRIALS, threads, |k| {
         let at = |base| radical_inverse(k as u32 + 1, base);
         let place = Vector2::new(2.0 * at(3) - 1.0, 2.0 * at(5) - 1.0) * domain.paddle;
         let mut body = model.body(paddle, NewtonSettings::default()).ok()?;

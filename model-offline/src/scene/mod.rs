@@ -2,14 +2,16 @@
 
 mod error;
 pub mod import;
+pub mod limits;
 pub mod schema;
 pub mod starter;
 mod validate;
 
 pub use error::SceneError;
+pub use limits::LimitError;
 pub use schema::{FitSection, PlantModel, TableScalar};
 
-use crate::discretization::{Discretization, Features, Resolution};
+use crate::discretization::{Discretization, Features};
 use crate::geometry::{Point2, Polygon};
 use crate::material::Law;
 use serde::Serialize;
@@ -108,27 +110,6 @@ pub struct Actuator {
     pub max_rate: f64,
     /// Fastest needle the controller keeps compensating, length units per second.
     pub max_needle_speed: f64,
-}
-
-/// Whether a discretization that did not come from the file fits the scene.
-///
-/// # Errors
-/// What is wrong, and what to do.
-pub fn check_override(scene: &Scene) -> Result<(), (String, String)> {
-    match scene.discretization.resolution {
-        Resolution::Spacing(h) => validate::check_spacing(h, &scene.outline)?,
-        Resolution::Tolerance(t) => validate::check_tolerance(t)?,
-        Resolution::Level(level) => validate::check_level(level)?,
-    }
-    validate::check_support(scene.discretization.method.support)
-}
-
-/// Whether a tolerance can be asked for.
-///
-/// # Errors
-/// What is wrong, and what to do.
-pub fn check_tolerance(tolerance: f64) -> Result<(), (String, String)> {
-    validate::check_tolerance(tolerance)
 }
 
 impl Scene {

@@ -1,9 +1,9 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
 use super::error::{SceneError, Source};
+use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
 use super::{Actuator, Inclusion, Needle, Paddle, Scene};
-use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
@@ -11,8 +11,6 @@ use std::ops::Range;
 
 /// Outlines of more vertices than this are refused: nothing a needle scene needs, and memory stays bounded.
 const MAX_VERTICES: usize = 20_000;
-/// More nodes than this are refused before any memory is taken.
-const MAX_NODES: f64 = 2.0e6;
 
 type Checked<T> = Result<T, SceneError>;
 
@@ -309,7 +307,16 @@ impl Validator<'_> {
         })
     }
 
-    fn two_resolutions(&self, second: std::ops::Range<usize>) -> SceneError {
+    fn limit(&self, span: Range<usize>, error: LimitError) -> SceneError {
+        self.error(span, error.to_string(), error.help())
+    }
+
+    fn resolution(&self, resolution: Resolution, span: Range<usize>, outline: &Polygon) -> Checked<Resolution> {
+        limits::check_resolution(resolution, outline).map_err(|error| self.limit(span, error))?;
+        Ok(resolution)
+    }
+
+    fn two_resolutions(&self, second: Range<usize>) -> SceneError {
         self.error(
             second,
             "both spacing and tolerance are given",
@@ -333,23 +340,18 @@ impl Validator<'_> {
             }
             (Some(spacing), None, None) => {
                 let h = self.positive(spacing, "spacing")?;
-                check_spacing(h, outline).map_err(|(message, help)| self.error(spacing.span(), message, help))?;
-                Resolution::Spacing(h)
+                self.resolution(Resolution::Spacing(h), spacing.span(), outline)?
             }
             (None, Some(tolerance), None) => {
                 let t = self.positive(tolerance, "tolerance")?;
-                check_tolerance(t).map_err(|(message, help)| self.error(tolerance.span(), message, help))?;
-                Resolution::Tolerance(t)
+                self.resolution(Resolution::Tolerance(t), tolerance.span(), outline)?
             }
-            (None, None, Some(level)) => {
-                check_level(*level.get()).map_err(|(message, help)| self.error(level.span(), message, help))?;
-                Resolution::Level(*level.get())
-            }
+            (None, None, Some(level)) => self.resolution(Resolution::Level(*level.get()), level.span(), outline)?,
         };
         let support = match &section.support {
             Some(located) => {
                 let support = self.positive(located, "support")?;
-                check_support(support).map_err(|(message, help)| self.error(located.span(), message, help))?;
+                limits::check_support(support).map_err(|error| self.limit(located.span(), error))?;
                 support
             }
             None => 2.0,
@@ -360,56 +362,6 @@ impl Validator<'_> {
             method: Method { support, basis: section.basis, ..Method::new(integration) },
             essential: section.essential,
         })
-    }
-}
-
-type Rule = Result<(), (String, String)>;
-
-/// Whether a spacing fits an outline: at least one node row, and not more nodes than memory is meant for.
-pub(crate) fn check_spacing(h: f64, outline: &Polygon) -> Rule {
-    if !(h.is_finite() && h > 0.0) {
-        return Err((format!("spacing is {h}"), "spacing must be a positive finite number".to_owned()));
-    }
-    if h > 0.5 * outline.size() {
-        return Err((
-            format!("spacing {h} is too coarse for a body of size {:.4}", outline.size()),
-            "choose a spacing well below the size of the body".to_owned(),
-        ));
-    }
-    let nodes = outline.area() / (h * h);
-    if nodes > MAX_NODES {
-        return Err((
-            format!("spacing {h} would give about {nodes:.1e} nodes, at most {MAX_NODES:.0e} are accepted"),
-            "choose a larger spacing, or a tolerance".to_owned(),
-        ));
-    }
-    Ok(())
-}
-
-/// Whether a tolerance can be asked for.
-pub(crate) fn check_tolerance(t: f64) -> Rule {
-    if (1e-4..=0.5).contains(&t) {
-        Ok(())
-    } else {
-        Err((format!("tolerance is {t}"), "give a relative error between 0.0001 and 0.5".to_owned()))
-    }
-}
-
-/// Whether a refinement level can be asked for.
-pub(crate) fn check_level(level: i32) -> Rule {
-    if (MIN_LEVEL..=MAX_LEVEL).contains(&level) {
-        Ok(())
-    } else {
-        Err((format!("level is {level}"), format!("give a refinement level between {MIN_LEVEL} and {MAX_LEVEL}")))
-    }
-}
-
-/// Whether a kernel support can be used.
-pub(crate) fn check_support(support: f64) -> Rule {
-    if (1.0..=6.0).contains(&support) {
-        Ok(())
-    } else {
-        Err((format!("support is {support}"), "give a kernel support between 1 and 6 spacings; 2 is usual".to_owned()))
     }
 }
 

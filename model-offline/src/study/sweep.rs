@@ -4,9 +4,9 @@ use super::candidates::base_spacing;
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
+use crate::parallel;
 use crate::placement::adaptive::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
-use crate::placement::study::parallel;
 use crate::scene::Scene;
 use std::fmt::Write as _;
 
@@ -51,7 +51,7 @@ pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Res
         .chain(LEVELS.map(|level| candidate(Integration::FemT6, Resolution::Level(level))))
         .collect();
     let reference = Reference::compute(scene, REFERENCE_SHARE)?;
-    let steps = parallel(candidates.len(), threads, |k| {
+    let steps = parallel::map(candidates.len(), threads, |k| {
         let discretization = candidates[k];
         let model = TissueModel::new(&scene.with_discretization(discretization));
         let nodes = model.as_ref().map_or(0, TissueModel::nodes);

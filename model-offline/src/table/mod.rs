@@ -1,7 +1,7 @@
 //! The controller's table: Jacobians and the feed-forward paddle path along the insertion, from the nonlinear model.
 
 use crate::model::{Body, ModelError, TissueModel};
-use crate::placement::study::best_direction;
+use crate::placement::controllability::best_direction;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use firmware::contract::{
     CONDITION_LIMIT, Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity,
@@ -190,8 +190,8 @@ type Linearisation = (Matrix2<f64>, Vector2<f64>, Vector2<f64>);
 
 fn linearise(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<Linearisation, ModelError> {
     let jacobian = body.actuation_jacobian()?;
-    let direction =
-        best_direction(&jacobian, normal).map_err(|condition| ModelError::Uncontrollable { paddle, condition })?;
+    let direction = best_direction(&jacobian, normal)
+        .map_err(|singular| ModelError::Uncontrollable { paddle, condition: singular.condition })?;
     Ok((jacobian, direction, body.depth_sensitivity()?))
 }
 

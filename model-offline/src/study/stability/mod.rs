@@ -15,7 +15,7 @@ mod verdict;
 
 use crate::discretization::Resolution;
 use crate::model::ModelError;
-use crate::placement::study::parallel;
+use crate::parallel;
 use crate::scene::Scene;
 use law_limit::{Lateral, limit_stretch};
 use plan::{Entry, Setting};
@@ -113,7 +113,7 @@ impl Plan {
             .iter()
             .position(|p| p.index == paddle)
             .ok_or_else(|| ModelError::Unsupported(format!("the scene has no paddle {paddle}")))?;
-        let outcomes = parallel(self.settings.len(), threads, |i| {
+        let outcomes = parallel::map(self.settings.len(), threads, |i| {
             let outcome = probe::run(scene, place, &self.settings[i]);
             progress();
             outcome

@@ -1,0 +1,106 @@
+//! What commands share: the scene with the flags that override it, threads, progress.
+
+use super::error::CliError;
+use clap::Args;
+use indicatif::ProgressBar;
+use model_offline::discretization::{Basis, Essential, Integration, Resolution};
+use model_offline::output::terminal;
+use model_offline::parallel;
+use model_offline::scene::{Scene, limits};
+use std::path::{Path, PathBuf};
+
+/// A scene file, with or without its inclusions.
+#[derive(Debug, Args)]
+pub(super) struct SceneArgs {
+    /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, prostate, tethered).
+    pub(super) scene: PathBuf,
+    /// Leave the inclusions out: homogeneous tissue.
+    #[arg(long)]
+    without_inclusion: bool,
+}
+
+impl SceneArgs {
+    /// The scene as its file has it.
+    pub(super) fn read(&self) -> Result<Scene, CliError> {
+        let scene = Scene::read(&self.scene)?;
+        Ok(if self.without_inclusion { scene.without_inclusions() } else { scene })
+    }
+}
+
+/// Flags that override `[discretization]`, and how to run.
+#[derive(Debug, Args)]
+pub(super) struct Common {
+    /// Node spacing, length units.
+    #[arg(long, value_name = "H", conflicts_with = "tolerance")]
+    spacing: Option<f64>,
+    /// Relative error of the controllability measures to refine down to.
+    #[arg(long, value_name = "T")]
+    tolerance: Option<f64>,
+    /// Kernel support over local spacing.
+    #[arg(long)]
+    support: Option<f64>,
+    /// Integration rule.
+    #[arg(long)]
+    integration: Option<Integration>,
+    /// Basis of the shape functions.
+    #[arg(long)]
+    basis: Option<Basis>,
+    /// How essential boundary conditions are imposed.
+    #[arg(long)]
+    essential: Option<Essential>,
+    /// Threads to use (default: all).
+    #[arg(long)]
+    threads: Option<usize>,
+    /// No progress and no summary.
+    #[arg(long)]
+    pub(super) quiet: bool,
+}
+
+impl Common {
+    /// The scene with the flags in it, checked.
+    pub(super) fn over(&self, mut scene: Scene) -> Result<Scene, CliError> {
+        let spec = &mut scene.discretization;
+        if let Some(h) = self.spacing {
+            spec.resolution = Resolution::Spacing(h);
+        }
+        if let Some(t) = self.tolerance {
+            spec.resolution = Resolution::Tolerance(t);
+        }
+        spec.method.support = self.support.unwrap_or(spec.method.support);
+        spec.method.integration = self.integration.unwrap_or(spec.method.integration);
+        spec.method.basis = self.basis.unwrap_or(spec.method.basis);
+        spec.essential = self.essential.unwrap_or(spec.essential);
+        limits::check(&scene.discretization, &scene.outline)?;
+        Ok(scene)
+    }
+
+    pub(super) fn threads(&self) -> usize {
+        threads_or_all(self.threads)
+    }
+
+    pub(super) fn progress(&self, steps: u64) -> ProgressBar {
+        if self.quiet { ProgressBar::hidden() } else { terminal::progress(steps) }
+    }
+}
+
+pub(super) fn threads_or_all(threads: Option<usize>) -> usize {
+    threads.unwrap_or_else(parallel::available).max(1)
+}
+
+pub(super) fn no_such_paddle(scene: &Scene, index: u32) -> CliError {
+    let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
+    CliError::usage(format!("the scene has no paddle {index}"), format!("choose one of {}", known.join(", ")))
+}
+
+pub(super) fn pretty(value: &impl serde::Serialize) -> String {
+    // Values made of numbers, strings and lists always serialise.
+    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
+}
+
+/// Writes JSON where it is asked for.
+pub(super) fn write_json(path: Option<&Path>, value: &impl serde::Serialize) -> Result<(), CliError> {
+    match path {
+        Some(path) => Ok(model_offline::output::write_whole(path, pretty(value).as_bytes())?),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,104 @@
+//! Why a command failed, and what scripts are told.
+
+use model_offline::discretization::DiscretizationError;
+use model_offline::model::ModelError;
+use model_offline::output::{self, OutputError};
+use model_offline::scene::{LimitError, Scene, SceneError};
+use model_offline::solver::equilibrium::Failure;
+use model_offline::table::TableBuildError;
+use std::path::{Path, PathBuf};
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub(crate) enum CliError {
+    /// The scene is bad.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(#[from] SceneError),
+    /// An argument is bad.
+    #[error("{message}")]
+    #[diagnostic(help("{help}"))]
+    Usage {
+        /// What is wrong.
+        message: String,
+        /// What to do.
+        help: String,
+    },
+    /// The table file cannot be used.
+    #[error("{}: {reason}", path.display())]
+    BadTable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The model cannot be made or solved.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The table cannot be made.
+    #[error(transparent)]
+    Table(#[from] TableBuildError),
+    /// No equilibrium.
+    #[error("no equilibrium: {failure}; last converged state at depth {depth:.4}")]
+    #[diagnostic(help(
+        "the tissue law loses stability under strong compression: reduce the depth, or add a barrier to the material"
+    ))]
+    Solve {
+        /// Why.
+        failure: Failure,
+        /// Depth of the last converged state.
+        depth: f64,
+    },
+    /// A file could not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+}
+
+impl From<LimitError> for CliError {
+    fn from(error: LimitError) -> Self {
+        Self::usage(error.to_string(), error.help())
+    }
+}
+
+impl CliError {
+    pub(super) fn usage(message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self::Usage { message: message.into(), help: help.into() }
+    }
+
+    /// 2 for bad input or usage, 1 for a computation that failed.
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
+            Self::Model(ModelError::Unsupported(_)) => 2,
+            Self::Table(TableBuildError::NoSuchPaddle(_) | TableBuildError::Knots(_)) => 2,
+            _ => 1,
+        }
+    }
+
+    fn reason(&self) -> String {
+        match self {
+            Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => failure.reason.to_string(),
+            Self::Model(ModelError::Uncontrollable { .. }) => "singular-jacobian".into(),
+            Self::Model(ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_))) => {
+                "singular-moment-matrix".into()
+            }
+            _ => "failed".into(),
+        }
+    }
+
+    /// The error, told in the JSON too when a computation failed, so that a script sees the reason.
+    pub(super) fn reported(self, json: Option<&Path>, scene: &Scene) -> Self {
+        if self.exit_code() == 1
+            && let Some(path) = json
+        {
+            let document = serde_json::json!({
+                "scene": scene.name, "tissue": scene.tissue(),
+                "failure": {"reason": self.reason(), "detail": self.to_string()},
+            });
+            if let Err(output) = output::write_whole(path, super::common::pretty(&document).as_bytes()) {
+                return output.into();
+            }
+        }
+        self
+    }
+}

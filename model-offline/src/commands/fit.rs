@@ -1,0 +1,58 @@
+//! `model-offline fit`: the smallest model that keeps a tolerance.
+
+use super::common::{SceneArgs, threads_or_all, write_json};
+use super::error::CliError;
+use model_offline::discretization::Resolution;
+use model_offline::output;
+use model_offline::scene::{Scene, limits};
+use model_offline::study::fit;
+use std::path::{Path, PathBuf};
+
+/// Options of `fit`.
+#[derive(Debug, clap::Args)]
+pub(super) struct FitArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Relative error of controllability and target displacement to keep.
+    #[arg(long, value_name = "T")]
+    tolerance: f64,
+    /// Write the scene with the choice in it.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Write the choice and what was rejected as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Threads to use for training (default: all). Times are those of one thread.
+    #[arg(long)]
+    threads: Option<usize>,
+    /// No summary.
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
+    let mut scene = args.scene.read()?;
+    scene.discretization.resolution = match scene.discretization.resolution {
+        Resolution::Spacing(h) => Resolution::Spacing(h),
+        _ => Resolution::Tolerance(args.tolerance),
+    };
+    limits::check_tolerance(args.tolerance)?;
+    let outcome = fit::fit(&scene, args.tolerance, threads_or_all(args.threads))
+        .map_err(CliError::from)
+        .and_then(|fit| Ok((scene_with(&fit, &args.scene.scene)?, fit)));
+    let (text, fit) = outcome.map_err(|error| error.reported(args.json.as_deref(), &scene))?;
+    if let Some(file) = &args.output {
+        output::write_whole(file, text.as_bytes())?;
+    }
+    write_json(args.json.as_deref(), &fit)?;
+    if !args.quiet {
+        print!("{}", fit.summary());
+    }
+    Ok(())
+}
+
+/// The text of the scene with a fit written into it.
+fn scene_with(fit: &fit::Fit, path: &Path) -> Result<String, CliError> {
+    let text = Scene::text(path)?;
+    fit.written_into(&text).map_err(|error| CliError::usage(error.to_string(), "the scene changed meanwhile"))
+}

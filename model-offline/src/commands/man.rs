@@ -1,0 +1,20 @@
+//! `model-offline man`: manual pages.
+
+use super::error::CliError;
+use model_offline::output::OutputError;
+use std::path::PathBuf;
+
+/// Options of `man`.
+#[derive(Debug, clap::Args)]
+pub(super) struct ManArgs {
+    /// Directory for the pages.
+    directory: PathBuf,
+}
+
+pub(super) fn run(args: &ManArgs, command: clap::Command) -> Result<(), CliError> {
+    let fail = |source| OutputError { path: args.directory.clone(), source };
+    std::fs::create_dir_all(&args.directory).map_err(fail)?;
+    clap_mangen::generate_to(command, &args.directory).map_err(fail)?;
+    println!("{}", args.directory.join("model-offline.1").display());
+    Ok(())
+}

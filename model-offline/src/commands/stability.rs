@@ -1,0 +1,56 @@
+//! `model-offline stability`: where each method stops working.
+
+use super::common::{Common, no_such_paddle};
+use super::error::CliError;
+use model_offline::discretization::Resolution;
+use model_offline::model::TissueModel;
+use model_offline::output;
+use model_offline::placement::best_dynamic;
+use model_offline::scene::Scene;
+use model_offline::study::stability;
+use std::path::PathBuf;
+
+/// Options of `stability`.
+#[derive(Debug, clap::Args)]
+pub(super) struct StabilityArgs {
+    /// Scene file, or the name of a bundled scene.
+    scene: PathBuf,
+    /// Folder for stability.csv, stability.svg and zero_energy.csv; made when it is not there.
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Fewer values and one spacing for the sweeps.
+    #[arg(long)]
+    quick: bool,
+    /// Index of the paddle attached as a fixture (default: the best dynamic paddle).
+    #[arg(long, value_name = "K")]
+    paddle: Option<u32>,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
+    let scene = &args.common.over(Scene::read(&args.scene)?)?;
+    let Resolution::Spacing(_) = scene.discretization.resolution else {
+        return Err(CliError::usage(
+            "the study varies a spacing, and this scene has a tolerance",
+            "give the spacing to vary around, e.g. --spacing 0.1",
+        ));
+    };
+    let paddle = match args.paddle {
+        Some(index) if scene.paddles.iter().any(|p| p.index == index) => index,
+        Some(index) => return Err(no_such_paddle(scene, index)),
+        None => best_dynamic(&TissueModel::new(&scene.without_inclusions())?)?,
+    };
+    output::make_folder(&args.out)?;
+    let plan = stability::Plan::new(scene, args.quick);
+    let bar = args.common.progress(plan.runs() as u64);
+    let result = plan.run(scene, paddle, args.common.threads(), &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    output::write_whole(&args.out.join("stability.csv"), stability::csv(&result).as_bytes())?;
+    output::write_whole(&args.out.join("zero_energy.csv"), stability::zero_energy_csv(&result).as_bytes())?;
+    output::write_whole(&args.out.join("stability.svg"), stability::figure(&result).svg().as_bytes())?;
+    if !args.common.quiet {
+        print!("{}", stability::summary(&result));
+    }
+    Ok(())
+}

@@ -1,0 +1,39 @@
+//! `model-offline table`: the controller table of one paddle.
+
+use super::common::{Common, SceneArgs};
+use super::error::CliError;
+use model_offline::output::{self, table_text};
+use model_offline::placement::{best_dynamic, discretise};
+use model_offline::table::{self, TableOptions};
+use std::path::PathBuf;
+
+/// Options of `table`.
+#[derive(Debug, clap::Args)]
+pub(super) struct TableArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Paddle index (default: the best dynamic paddle).
+    #[arg(long)]
+    paddle: Option<u32>,
+    /// Where to write the table.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Depth knots.
+    #[arg(long, default_value_t = TableOptions::default().knots)]
+    knots: usize,
+    #[command(flatten)]
+    common: Common,
+}
+
+pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
+    let (model, _) = discretise(&args.common.over(args.scene.read()?)?)?;
+    let options = TableOptions { knots: args.knots, ..TableOptions::default() };
+    let paddle = args.paddle.map_or_else(|| best_dynamic(&model), Ok)?;
+    let table = table::build(&model, paddle, &options)?;
+    let bytes = table::to_bytes(&table)?;
+    output::write_whole(&args.output, &bytes)?;
+    if !args.common.quiet {
+        println!("{}: {} bytes\n{}", args.output.display(), bytes.len(), table_text::summary(&table));
+    }
+    Ok(())
+}

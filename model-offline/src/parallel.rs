@@ -1,0 +1,27 @@
+//! Work on several threads whose result does not depend on how many there are.
+
+use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, ParallelIterator as _};
+
+/// Runs `work` for 0..count on at most `threads` threads; results come in order, whatever the number of threads.
+///
+/// # Example
+/// ```
+/// assert_eq!(model_offline::parallel::map(4, 2, |i| i * i), [0, 1, 4, 9]);
+/// ```
+pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    let in_order = || (0..count).map(&work).collect();
+    if threads.min(count) <= 1 {
+        return in_order();
+    }
+    match rayon::ThreadPoolBuilder::new().num_threads(threads.min(count)).build() {
+        // One by one: pieces of work differ in size.
+        Ok(pool) => pool.install(|| (0..count).into_par_iter().with_max_len(1).map(&work).collect()),
+        // No threads to be had: the result is the same without.
+        Err(_) => in_order(),
+    }
+}
+
+/// As many threads as the machine runs at once.
+pub fn available() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
