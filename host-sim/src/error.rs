@@ -8,8 +8,8 @@ use model_offline::model::ModelError;
 use model_offline::scene::SceneError;
 use model_offline::solver::equilibrium::Failure;
 
-use crate::link::LinkError;
-use crate::recorder::RecordingError;
+use crate::exchange::LinkError;
+use crate::record::recording::RecordingError;
 
 /// Why a command ended early.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -108,7 +108,7 @@ pub enum SimError {
     Spawn(std::io::Error),
     /// The controller on a board cannot be used.
     #[error("the controller on the board cannot be used")]
-    Board(#[from] crate::board::BoardError),
+    Board(#[from] crate::exchange::board::BoardError),
     /// The peer is gone.
     #[error("the {peer} process has died ({how}); the run is void, shared memory has been cleaned up")]
     PeerDied {

@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = host_sim::cli::parse();
+    let cli = host_sim::commands::parse();
     // Two processes share one terminal: whose error is it?
-    let is_controller = matches!(cli.command, Some(host_sim::cli::Command::Controller(_)));
-    match host_sim::cli::execute(cli) {
+    let is_controller = matches!(cli.command, Some(host_sim::commands::Command::Controller(_)));
+    match host_sim::commands::execute(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();

@@ -6,10 +6,10 @@ use std::cell::Cell;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::io::run_tick;
 use firmware::{Controller, Inputs, Mode, Settings, State};
-use host_sim::faults::fixture;
-use host_sim::link::{ControllerPorts, Departure, PlantPorts, Space};
-use host_sim::recorder::stream::StreamRecorder;
-use host_sim::recorder::{Exchange, Header, RunMode};
+use host_sim::bench::faults::fixture;
+use host_sim::exchange::{ControllerPorts, Departure, PlantPorts, Space};
+use host_sim::record::recording::stream::StreamRecorder;
+use host_sim::record::recording::{Exchange, Header, RunMode};
 use iceoryx2::service::ipc;
 
 thread_local! {

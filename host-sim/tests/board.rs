@@ -10,9 +10,9 @@ use firmware::contract::{Units, Validity};
 use firmware::scalar::ScalarKind;
 use firmware::serial::{Board, Memory, Reply, Request, ResetCause, serve};
 use firmware::{Faults, Inputs, Mode, Settings};
-use host_sim::board::tamper::{Damage, Tamper};
-use host_sim::board::{BoardError, Device, Image, Processor, SerialLine};
-use host_sim::core::encode_as;
+use host_sim::exchange::board::tamper::{Damage, Tamper};
+use host_sim::exchange::board::{BoardError, Device, Image, Processor, SerialLine};
+use host_sim::runtime::executor::encode_as;
 use nalgebra::{Matrix2, Vector2};
 
 const MS: u64 = 1_000_000;
@@ -273,7 +273,7 @@ fn a_silent_host_leads_to_hold_and_then_to_safe() {
 fn image(scalar: ScalarKind) -> Option<Image> {
     let image = Image::build(scalar, Processor::Double);
     let missing = match image {
-        Ok(image) if host_sim::board::Qemu::is_installed() => return Some(image),
+        Ok(image) if host_sim::exchange::board::Qemu::is_installed() => return Some(image),
         Ok(_) => BoardError::NoQemu,
         Err(missing @ BoardError::NoTarget) => missing,
         Err(other) => panic!("{other}"),

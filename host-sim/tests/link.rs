@@ -2,7 +2,7 @@
 
 use firmware::contract::{NeedleSample, PaddleCommand, TargetSample};
 use firmware::io::{CommandSink, SampleSource};
-use host_sim::link::{ClockFrame, ClockKind, ControllerPorts, LinkError, PlantPorts, Space};
+use host_sim::exchange::{ClockFrame, ClockKind, ControllerPorts, LinkError, PlantPorts, Space};
 use iceoryx2::service::local::Service;
 
 fn both(name: &str) -> (Space, PlantPorts<Service>, ControllerPorts<Service>) {
@@ -18,7 +18,7 @@ fn both(name: &str) -> (Space, PlantPorts<Service>, ControllerPorts<Service>) {
 
 fn end(space: &Space, plant: PlantPorts<Service>, controller: ControllerPorts<Service>) {
     drop((plant, controller));
-    space.leave::<Service>(host_sim::link::Departure::Last);
+    space.leave::<Service>(host_sim::exchange::Departure::Last);
     assert!(!space.root().exists(), "nothing stays behind");
 }
 

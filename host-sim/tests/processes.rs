@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use host_sim::output::read_run;
-use host_sim::recorder::Recording;
+use host_sim::record::recording::Recording;
+use host_sim::report::directory::read_run;
 
 fn host_sim() -> Command {
     Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))

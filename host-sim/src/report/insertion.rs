@@ -6,7 +6,7 @@ use super::axis::Axis;
 use super::chart::Chart;
 use super::number::{NO_NUMBER, in_unit, number, plain};
 use super::svg::Drawing;
-use crate::result::{CaseResult, RunResult, StrategyResult};
+use crate::bench::result::{CaseResult, RunResult, StrategyResult};
 
 /// Strategies in the order in which they are shown: class of their line and name.
 pub(super) fn strategies(case: &CaseResult) -> Vec<(&'static str, &'static str, &StrategyResult)> {

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::insertion::strategies;
 use super::number::{NO_NUMBER, count};
-use crate::result::{LedgerResult, RunResult};
+use crate::bench::result::{LedgerResult, RunResult};
 
 fn ledgers(run: &RunResult) -> Vec<(String, &LedgerResult)> {
     run.cases

@@ -7,14 +7,18 @@
 mod attachments;
 mod axis;
 mod chart;
+pub mod directory;
 mod insertion;
 mod ledger;
 mod number;
+pub mod paper;
 mod placement;
 mod scene;
 mod settings;
 mod slider;
+pub mod stability;
 mod style;
+pub mod summary;
 mod svg;
 mod timing;
 mod view;
@@ -30,8 +34,8 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use self::insertion::{CaseCharts, case_charts, case_name, strategies};
 use self::number::{in_unit, number, plain};
 use self::svg::{Drawing, sheet};
-use crate::paper::{is_paper, paper_optima};
-use crate::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+use crate::report::paper::{is_paper, paper_optima};
 
 const SCRIPT: &str = include_str!("page.js");
 /// Whatever a string in the result says, the page loads nothing.
@@ -292,6 +296,6 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
 }
 
 /// Histograms of loops with bins of 1 µs and logarithmic axes, as one picture.
-pub fn timing_histograms(loops: &[(&str, &crate::result::LoopTiming)]) -> String {
+pub fn timing_histograms(loops: &[(&str, &crate::bench::result::LoopTiming)]) -> String {
     sheet(&timing::histograms(loops), 3)
 }

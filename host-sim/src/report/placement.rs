@@ -6,8 +6,8 @@ use super::axis::Axis;
 use super::chart::Chart;
 use super::number::{NO_NUMBER, in_unit, number, plain};
 use super::svg::{Drawing, Marker};
-use crate::paper::{is_paper, paper_controllability, paper_optima};
-use crate::result::{PaddlePlacement, PlacementResult, RunResult};
+use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
+use crate::report::paper::{is_paper, paper_controllability, paper_optima};
 
 fn names(placement: &PlacementResult) -> impl Iterator<Item = String> {
     placement.paddles.iter().map(|paddle| paddle.index.to_string())

@@ -7,7 +7,7 @@ use maud::{Markup, html};
 use super::number::{in_unit, number, plain};
 use super::svg::{Anchor, Drawing, Px};
 use super::view::{View, along, inside, middle};
-use crate::result::{CaseResult, Geometry, RunResult, StrategyResult};
+use crate::bench::result::{CaseResult, Geometry, RunResult, StrategyResult};
 
 /// Width of the scene and of a body, px.
 const SCENE_WIDTH: f64 = 420.0;

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::insertion::{case_name, strategies};
 use super::number::{NO_NUMBER, count, number, plain};
-use crate::result::{CaseResult, RunResult, StrategyResult};
+use crate::bench::result::{CaseResult, RunResult, StrategyResult};
 
 /// A word of a command line as a shell takes it.
 fn word(word: &str) -> String {

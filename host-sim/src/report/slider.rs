@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::insertion::{CaseCharts, strategies};
 use super::scene::{BANDS, Surface, body_id};
-use crate::result::{RunResult, StrategyResult};
+use crate::bench::result::{RunResult, StrategyResult};
 
 /// Points of a time series that the slider can show.
 const POINTS: usize = 200;

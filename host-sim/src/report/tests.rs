@@ -1,9 +1,9 @@
 //! Every chart is there, every string escaped, every number finite.
 
 use super::*;
-use crate::clock::Scheduling;
-use crate::recorder::RunMode;
-use crate::result::*;
+use crate::bench::result::*;
+use crate::record::recording::RunMode;
+use crate::runtime::clock::Scheduling;
 
 const EVIL: &str = "<script>alert(\"x\")</script>&'";
 
@@ -46,7 +46,7 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         deformed_nodes: nodes.clone(),
         frames: vec![Frame { depth: 0.05, nodes: rest() }, Frame { depth: 0.1, nodes }],
         plant_step_us: 1.0,
-        plant: crate::tissue_solver::PlantAccount::default(),
+        plant: crate::world::tissue::PlantAccount::default(),
     }
 }
 

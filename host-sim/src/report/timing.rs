@@ -6,7 +6,7 @@ use super::axis::Axis;
 use super::chart::Chart;
 use super::number::{count, number};
 use super::svg::Drawing;
-use crate::result::{Distribution, LoopTiming, RunResult};
+use crate::bench::result::{Distribution, LoopTiming, RunResult};
 
 /// A loop on the machine's clock: whose it is, and its figures.
 fn loops(run: &RunResult) -> Vec<(String, &LoopTiming)> {

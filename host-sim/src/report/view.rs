@@ -3,7 +3,7 @@
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
 use super::svg::Px;
-use crate::result::{Geometry, RunResult};
+use crate::bench::result::{Geometry, RunResult};
 
 /// Length of the needle outside the tissue, as a part of the scene's size.
 const NEEDLE: f64 = 0.16;

@@ -77,7 +77,7 @@ impl View {
 fn token() -> std::io::Result<String> {
     let mut bytes = [0; 16];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
-    Ok(crate::strategy::hex(&bytes))
+    Ok(crate::bench::strategy::hex(&bytes))
 }
 
 /// Who may come in.

@@ -6,11 +6,11 @@ use firmware::contract::Table;
 use model_offline::scene::Scene;
 
 use super::{Knobs, View};
-use crate::core::Hardware;
+use crate::bench::result::StrategyResult;
+use crate::bench::strategy::{Active, Extras, Label, active};
 use crate::error::SimError;
-use crate::recorder::RunMode;
-use crate::result::StrategyResult;
-use crate::strategy::{Active, Extras, Label, active};
+use crate::record::recording::RunMode;
+use crate::runtime::executor::Hardware;
 use crate::world::Simulation;
 
 /// What the page's insertions start from.

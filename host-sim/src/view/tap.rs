@@ -7,10 +7,10 @@ use std::time::Duration;
 use model_offline::model::TissueModel;
 use serde::{Deserialize, Serialize};
 
-use crate::clock::now_ns;
-use crate::interrupt;
-use crate::recorder::RunMode;
-use crate::tissue_solver::TissueSolver;
+use crate::record::recording::RunMode;
+use crate::runtime::clock::now_ns;
+use crate::runtime::signals;
+use crate::world::tissue::TissueSolver;
 
 /// Time between two pictures: 30 a second.
 pub(super) const FRAME_NS: u64 = 33_333_333;
@@ -189,7 +189,7 @@ impl Shared {
 
     /// Holds time between two ticks of lockstep: while paused, and to keep pace with the clock on the wall.
     pub fn hold(&self, pacing: &mut Pacing) {
-        while self.is_paused() && !self.ends_early() && interrupt::check().is_ok() {
+        while self.is_paused() && !self.ends_early() && signals::check().is_ok() {
             let step = self.steps.fetch_update(Ordering::AcqRel, Ordering::Acquire, |left| left.checked_sub(1));
             pacing.restart();
             if step.is_ok() {
@@ -225,7 +225,7 @@ impl Pacing {
         self.next_ns += self.period_ns * 1000 / thousandths;
         let now = now_ns();
         if self.next_ns > now {
-            crate::clock::sleep_until(self.next_ns);
+            crate::runtime::clock::sleep_until(self.next_ns);
         } else if now - self.next_ns > 200_000_000 {
             // Too slow for this pace: what is lost stays lost.
             self.next_ns = now;
@@ -317,7 +317,7 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tissue_solver::PlantChoice;
+    use crate::world::tissue::PlantChoice;
     use model_offline::scene::Scene;
 
     const KNOBS: Knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };

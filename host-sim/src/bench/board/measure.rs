@@ -1,0 +1,284 @@
+//! What the image costs: instructions per step by branch, flash, RAM and stack; and that its commands are the host's.
+
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+use firmware::contract::{MAX_TABLE_BYTES, Table, encode};
+use firmware::scalar::{Scalar, ScalarKind};
+use firmware::{Controller, Faults, Inputs, Mode, Settings, State};
+use serde::{Deserialize, Serialize};
+
+use crate::exchange::board::device::Device;
+use crate::exchange::board::error::BoardError;
+use crate::exchange::board::image::{Image, MemoryUse, Processor};
+use crate::exchange::board::qemu::ICOUNT_SHIFT;
+use crate::record::recording::Recording;
+use crate::record::replay::difference;
+
+/// A step that takes longer than this is no step.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Ticks of each scenario besides the recorded run itself.
+const SCENARIO_TICKS: usize = 600;
+
+/// Inputs for the controller, with the table and settings that it runs with.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// What it is about.
+    pub name: &'static str,
+    table: Table<f64, 2>,
+    settings: Settings,
+    inputs: Vec<Inputs>,
+}
+
+/// The recorded run, and variations of its end that reach the other branches of the step.
+///
+/// # Errors
+/// [`BoardError::Budget`] for a recording that is too short, or of another scalar than `f64`.
+pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, BoardError> {
+    let table = firmware::contract::decode::<f64, 2>(&recording.header.table)
+        .map_err(|error| BoardError::Budget(format!("the recording's table: {error}")))?;
+    let settings = recording.header.settings;
+    let recorded: Vec<Inputs> = recording.records.iter().map(|record| record.exchange.inputs).collect();
+    if recorded.len() < 2 * SCENARIO_TICKS {
+        return Err(BoardError::Budget(format!(
+            "the recording has {} ticks, at least {} are needed: make a longer one",
+            recorded.len(),
+            2 * SCENARIO_TICKS
+        )));
+    }
+    // The end of the insertion: the needle still moves, then arrives.
+    let end = recorded[recorded.len() - 2 * SCENARIO_TICKS..][..SCENARIO_TICKS].to_vec();
+    let vary = |name, change: &dyn Fn(usize, &mut Inputs)| {
+        let mut inputs = end.clone();
+        inputs.iter_mut().enumerate().for_each(|(i, tick)| change(i, tick));
+        Scenario { name, table: table.clone(), settings, inputs }
+    };
+    let mut slow = vary("paddle too slow and too weak", &|_, _| {});
+    let longest = slow.table.knots.iter().map(|knot| knot.paddle_path.norm()).fold(0.0, f64::max);
+    slow.table.paddle.max_displacement = longest * (1.0 + 1e-9);
+    slow.table.paddle.max_rate *= 0.01;
+    // The recorded paddle is faster than that: it would be a fault of its own.
+    slow.settings.following_error = Some(1e3 * longest);
+    Ok(vec![
+        Scenario { name: "recorded run", table: table.clone(), settings, inputs: recorded },
+        vary("target lost", &|i, tick| {
+            if i % 300 >= 100 {
+                tick.target = None;
+            }
+        }),
+        vary("wrong paddle attached", &|i, tick| {
+            if let (true, Some(paddle)) = (i >= 100, &mut tick.paddle) {
+                paddle.paddle_index += 1;
+            }
+        }),
+        slow,
+        vary("needle deeper than the table", &|_, tick| {
+            if let Some(needle) = &mut tick.needle {
+                needle.depth *= 1.2;
+            }
+        }),
+    ])
+}
+
+/// Branch of a step, by what its command says.
+fn branch(state: u32, faults: Faults) -> &'static str {
+    let has = |codes: Faults| !faults.intersection(codes).is_empty();
+    match Mode::from_wire(state) {
+        Some(Mode::Safe) => "safe",
+        Some(Mode::Run) if has(Faults::DEPTH_CLAMPED) => "table-edge",
+        Some(Mode::Run) if has(Faults::POSITION_LIMITED | Faults::RATE_LIMITED) => "saturated",
+        Some(Mode::Run) => "run",
+        _ => "hold",
+    }
+}
+
+/// Instructions of the steps of one branch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Instructions {
+    /// Fewest.
+    pub min: u32,
+    /// Median.
+    pub median: u32,
+    /// Most.
+    pub max: u32,
+}
+
+/// Everything that is measured of one image.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figures {
+    /// Flash without a table, bytes.
+    pub flash: u32,
+    /// Statics, bytes.
+    pub ram: u32,
+    /// Deepest stack, bytes.
+    pub stack: u32,
+    /// Steps counted.
+    pub steps: u32,
+    /// Instructions per step, by branch.
+    pub instructions: BTreeMap<String, Instructions>,
+}
+
+/// Figures of all images, by [`name`].
+pub type Budget = BTreeMap<String, Figures>;
+
+/// Name of an image in a budget.
+pub fn name(image: &Image) -> String {
+    format!("{}-{}", image.scalar.name(), image.processor.name())
+}
+
+/// Builds all four images.
+///
+/// # Errors
+/// As [`Image::build`].
+pub fn images() -> Result<Vec<Image>, BoardError> {
+    let kinds = Processor::ALL
+        .into_iter()
+        .flat_map(|processor| [ScalarKind::F64, ScalarKind::F32].map(|scalar| (scalar, processor)));
+    kinds.map(|(scalar, processor)| Image::build(scalar, processor)).collect()
+}
+
+/// Runs all scenarios on an image. Every command must be the host's, bit by bit.
+///
+/// # Errors
+/// [`BoardError`]; [`BoardError::Budget`] for a command that is not the host's.
+pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, BoardError> {
+    let mut device = Device::emulate(image)?;
+    let mut counted: BTreeMap<&'static str, Vec<u32>> = BTreeMap::new();
+    let mut stack = 0;
+    for scenario in scenarios {
+        match image.scalar {
+            ScalarKind::F32 => run(&mut device, &scenario.table.cast::<f32>(), scenario, &mut counted)?,
+            ScalarKind::F64 => run(&mut device, &scenario.table, scenario, &mut counted)?,
+        }
+        let account = device.account()?;
+        stack = stack.max(account.stack_bytes);
+        if account.ledger.unaccounted() > 0 {
+            return Err(BoardError::Budget(format!("{}: samples unaccounted for", scenario.name)));
+        }
+    }
+    let MemoryUse { flash, ram } = image.memory_use()?;
+    let steps = counted.values().map(Vec::len).sum::<usize>() as u32;
+    let instructions = counted
+        .into_iter()
+        .map(|(branch, mut counts)| {
+            counts.sort_unstable();
+            let (min, max) = (counts[0], counts[counts.len() - 1]);
+            (branch.to_owned(), Instructions { min, median: counts[counts.len() / 2], max })
+        })
+        .collect();
+    Ok(Figures { flash, ram, stack, steps, instructions })
+}
+
+fn run<T: Scalar>(
+    device: &mut Device,
+    table: &Table<T, 2>,
+    scenario: &Scenario,
+    counted: &mut BTreeMap<&'static str, Vec<u32>>,
+) -> Result<(), BoardError> {
+    let refused = |what: String| BoardError::Budget(format!("{}: {what}", scenario.name));
+    let mut bytes = vec![0; MAX_TABLE_BYTES];
+    let length = encode(table, &mut bytes).map_err(|error| refused(error.to_string()))?;
+    let controller = Controller::new(table, &scenario.settings).map_err(|error| refused(error.to_string()))?;
+    let mut state = State::<T>::new();
+    device.begin(&bytes[..length], &scenario.settings)?;
+    let counter_hz = device.identity().counter_hz;
+    for inputs in &scenario.inputs {
+        let expected = controller.step(&mut state, inputs);
+        let answer = device
+            .step(inputs, PATIENCE)?
+            .ok_or(BoardError::Silent { to: "a step", silent_s: PATIENCE.as_secs_f64() })?;
+        if let Some(what) = difference(&expected, &answer.command) {
+            return Err(refused(format!("tick {}: on the board {what} (host first)", inputs.tick)));
+        }
+        let command = &answer.command;
+        let branch = branch(command.state, Faults::from_bits(command.faults));
+        counted.entry(branch).or_default().push(instructions(answer.counts, counter_hz));
+    }
+    Ok(())
+}
+
+/// Instructions that took so many counts: an instruction is 2^[`ICOUNT_SHIFT`] ns, several counts long, so that
+/// rounding gives the exact number.
+fn instructions(counts: u32, counter_hz: u32) -> u32 {
+    let ns = f64::from(counts) * 1e9 / f64::from(counter_hz);
+    (ns / f64::from(1 << ICOUNT_SHIFT)).round() as u32
+}
+
+/// How far a figure may be above its budget.
+pub const TOLERANCE: f64 = 0.02;
+
+/// Figures above their budget, in words.
+pub fn exceeded(measured: &Figures, budget: &Figures, image: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let mut hold = |what: &str, is: u32, allowed: u32| {
+        if f64::from(is) > f64::from(allowed) * (1.0 + TOLERANCE) {
+            found.push(format!("{image}: {what} is {is}, the budget {allowed}"));
+        }
+    };
+    hold("flash", measured.flash, budget.flash);
+    hold("RAM", measured.ram, budget.ram);
+    hold("stack", measured.stack, budget.stack);
+    for (branch, is) in &measured.instructions {
+        match budget.instructions.get(branch) {
+            Some(allowed) => {
+                hold(&format!("{branch} min"), is.min, allowed.min);
+                hold(&format!("{branch} median"), is.median, allowed.median);
+                hold(&format!("{branch} max"), is.max, allowed.max);
+            }
+            None => hold(&format!("{branch}, which the budget lacks,"), is.max, 0),
+        }
+    }
+    for branch in budget.instructions.keys().filter(|branch| !measured.instructions.contains_key(*branch)) {
+        found.push(format!("{image}: no step took the branch {branch}: the corpus does not reach it"));
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn figures() -> Figures {
+        let run = Instructions { min: 100, median: 200, max: 300 };
+        Figures { flash: 1000, ram: 2000, stack: 500, steps: 9, instructions: [("run".to_owned(), run)].into() }
+    }
+
+    /// The complaints about figures that differ from the budget in this.
+    fn complaints(change: impl FnOnce(&mut Figures)) -> Vec<String> {
+        let mut measured = figures();
+        change(&mut measured);
+        exceeded(&measured, &figures(), "image")
+    }
+
+    #[test]
+    fn what_is_within_the_tolerance_is_within_the_budget() {
+        assert_eq!(complaints(|_| {}), [""; 0]);
+        assert_eq!(complaints(|f| f.flash = 1020), [""; 0]);
+        assert_eq!(complaints(|f| (f.flash, f.ram, f.stack) = (1, 1, 1)), [""; 0], "less is welcome");
+    }
+
+    #[test]
+    fn every_figure_above_its_budget_is_named_with_both_numbers() {
+        assert_eq!(complaints(|f| f.flash = 1021), ["image: flash is 1021, the budget 1000"]);
+        assert_eq!(complaints(|f| f.ram = 2041), ["image: RAM is 2041, the budget 2000"]);
+        assert_eq!(complaints(|f| f.stack = 511), ["image: stack is 511, the budget 500"]);
+        let all = complaints(|f| {
+            f.instructions.insert("run".to_owned(), Instructions { min: 103, median: 205, max: 307 });
+        });
+        let expected =
+            ["run min is 103, the budget 100", "run median is 205, the budget 200", "run max is 307, the budget 300"];
+        assert_eq!(all, expected.map(|complaint| format!("image: {complaint}")));
+    }
+
+    #[test]
+    fn both_know_the_same_branches() {
+        let more = complaints(|f| {
+            f.instructions.insert("safe".to_owned(), Instructions { min: 1, median: 1, max: 1 });
+        });
+        assert_eq!(more, ["image: safe, which the budget lacks, is 1, the budget 0"]);
+        let fewer = complaints(|f| f.instructions.clear());
+        assert_eq!(fewer, ["image: no step took the branch run: the corpus does not reach it"]);
+    }
+}

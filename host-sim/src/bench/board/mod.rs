@@ -1,0 +1,3 @@
+//! What the images cost on the board.
+
+pub mod measure;

@@ -1,0 +1,101 @@
+//! Scene, model and placement study in the words of the result.
+
+use model_offline::geometry::Point2;
+use model_offline::model::TissueModel;
+use model_offline::placement::Placement;
+use model_offline::scene::Scene;
+
+use crate::bench::result::{Geometry, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
+use crate::world::Simulation;
+
+fn point(point: &Point2) -> [f64; 2] {
+    [point.x, point.y]
+}
+
+fn path(points: &[Point2]) -> Vec<[f64; 2]> {
+    points.iter().map(point).collect()
+}
+
+/// Settings of the simulation.
+pub fn settings(scene: &Scene, simulation: &Simulation) -> SimulationSettings {
+    let Simulation { loop_args, actuator, .. } = simulation;
+    SimulationSettings {
+        rate_hz: loop_args.rate,
+        insertion_s: simulation.insertion_s,
+        duration_s: simulation.duration_s,
+        depth: simulation.depth,
+        target_rate_hz: loop_args.target_rate,
+        target_latency_ms: loop_args.latency,
+        noise: loop_args.noise_for(simulation.depth),
+        paddle_lag_ms: actuator.lag_s * 1e3,
+        paddle_delay_ticks: actuator.delay_ticks,
+        paddle_gain: actuator.gain,
+        paddle_max_rate: actuator.max_rate,
+        paddle_max_displacement: scene.actuator.max_displacement,
+    }
+}
+
+/// The scene at rest; inclusions are those of the scene file, whatever tissue is simulated.
+pub fn geometry(scene: &Scene, model: &TissueModel) -> Geometry {
+    Geometry {
+        outline: path(scene.outline.vertices()),
+        immobile: scene.immobile.iter().map(|part| path(part)).collect(),
+        needle_contact: path(&scene.needle.contact),
+        needle_axis: point(&scene.needle.axis),
+        orthogonal: point(&scene.needle.orthogonal()),
+        target: point(&scene.target),
+        paddles: scene
+            .paddles
+            .iter()
+            .map(|paddle| PaddleGeometry {
+                index: paddle.index,
+                segment: [point(&paddle.segment[0]), point(&paddle.segment[1])],
+            })
+            .collect(),
+        inclusions: scene.inclusions.iter().map(|inclusion| path(inclusion.outline.vertices())).collect(),
+        nodes: path(model.positions()),
+    }
+}
+
+/// The command line of this process, without the directory of the program.
+pub fn command_line() -> Vec<String> {
+    let mut arguments: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    if let Some(program) = arguments.first_mut() {
+        *program = std::path::Path::new(program.as_str())
+            .file_name()
+            .map_or_else(|| env!("CARGO_PKG_NAME").to_owned(), |name| name.to_string_lossy().into_owned());
+    }
+    arguments
+}
+
+/// A placement study.
+pub fn placement(tissue: &str, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
+    let integration = serde_json::to_value(model.scene().discretization.method.integration);
+    PlacementResult {
+        tissue: tissue.to_owned(),
+        nodes: model.nodes(),
+        integration: integration.ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default(),
+        wall_s,
+        best_static: placement.optimum.fixture,
+        best_dynamic: placement.optimum.dynamic,
+        paddles: placement
+            .paddles
+            .iter()
+            .map(|paddle| PaddlePlacement {
+                index: paddle.index,
+                jacobian: paddle.jacobian,
+                controllability_measure: paddle.controllability_measure,
+                best_direction: paddle.best_direction,
+                depth: paddle.fixture.depth.clone(),
+                orthogonal: paddle.fixture.orthogonal.clone(),
+                max_orthogonal: paddle.fixture.max_orthogonal,
+                reached_depth: paddle.fixture.reached_depth,
+                failure: paddle
+                    .fixture
+                    .failure
+                    .as_ref()
+                    .map(|failure| format!("{}: {}", failure.reason, failure.detail)),
+            })
+            .collect(),
+    }
+}

@@ -1,0 +1,402 @@
+//! The closed loop in one thread and virtual time: plant, sensors, seam, controller, actuator; nothing waits.
+//!
+//! The plant ticks every period. The controller follows its own [`Schedule`] in the same virtual time, so that a slow
+//! step makes it skip periods while the plant goes on. Its record is the one of [`crate::record::recording`].
+
+use std::collections::VecDeque;
+
+use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
+use firmware::io::{CommandSink, SampleSource, run_tick};
+use firmware::schedule::Schedule;
+use firmware::{Controller, Mode, Settings, SettingsError, State};
+use nalgebra::Vector2;
+use rand_pcg::Pcg64;
+
+use super::audit::Audit;
+use super::fault::{Event, Fault, Stream};
+use super::invariants::Invariants;
+use super::seam::{Channel, see};
+use super::tissue::LinearTissue;
+use crate::record::recording::Exchange;
+use crate::world::actuator::{ActuatorModel, Paddle};
+use crate::world::sensors::{Encoders, TargetSensor};
+
+/// Part of a period that a healthy step takes.
+const HEALTHY_STEP: f64 = 0.1;
+/// Time in which the needle's drive reaches the largest speed of the table, s.
+const NEEDLE_RAMP_S: f64 = 0.1;
+/// Stream of the generator for the faults' own noise.
+const FAULT_STREAM: u128 = 7;
+
+/// What a bench is built from.
+#[derive(Clone, Copy, Debug)]
+pub struct Setup {
+    /// Settings of the controller.
+    pub settings: Settings,
+    /// Standard deviation of the target sensor, length.
+    pub noise: f64,
+    /// Speed of the insertion, length/s.
+    pub speed: f64,
+    /// Depth where the needle stops, length.
+    pub depth_end: f64,
+    /// The paddle's actuator.
+    pub actuator: ActuatorModel,
+    /// First sequence number of needle and paddle samples.
+    pub sequence: u32,
+    /// Whether the needle turns back at the end of the table, again and again.
+    pub shuttles: bool,
+    /// Where the paddle is before the controller starts, length.
+    pub paddle: [f64; 2],
+    /// Seed of all noise.
+    pub seed: u64,
+}
+
+impl Setup {
+    /// A 1 kHz loop on `table` with the target at 50 Hz, 20 ms late; the insertion takes 5 s.
+    pub fn new(table: &Table<f64, 2>, seed: u64) -> Self {
+        const MS: u64 = 1_000_000;
+        let depth = table.validity.depth_end;
+        let noise = crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH * depth;
+        Self {
+            settings: Settings { target_noise: noise, ..Settings::new(MS, 20 * MS, 20 * MS) },
+            noise,
+            speed: depth / 5.0,
+            depth_end: depth,
+            actuator: ActuatorModel { max_rate: table.paddle.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 },
+            sequence: 0,
+            shuttles: false,
+            paddle: [0.0; 2],
+            seed,
+        }
+    }
+}
+
+/// What the controller's traits see of the bench.
+#[derive(Debug, Default)]
+struct Link {
+    needle: Channel<NeedleSample>,
+    target: Channel<TargetSample>,
+    paddle: Channel<PaddleSample>,
+    sent: Option<PaddleCommand>,
+}
+
+impl SampleSource for Link {
+    fn needle(&mut self) -> Option<NeedleSample> {
+        self.needle.take()
+    }
+    fn target(&mut self) -> Option<TargetSample> {
+        self.target.take()
+    }
+    fn paddle(&mut self) -> Option<PaddleSample> {
+        self.paddle.take()
+    }
+}
+
+impl CommandSink for Link {
+    type Error = std::convert::Infallible;
+    fn send(&mut self, command: &PaddleCommand) -> Result<(), Self::Error> {
+        self.sent = Some(*command);
+        Ok(())
+    }
+}
+
+/// The closed loop.
+#[derive(Debug)]
+pub struct Bench<'t> {
+    setup: Setup,
+    table: &'t Table<f64, 2>,
+    controller: Controller<'t, f64>,
+    /// State of the controller.
+    pub state: State<f64>,
+    schedule: Schedule,
+    events: Vec<Event>,
+    active: Vec<Fault>,
+    tick: u64,
+    tissue: LinearTissue<'t>,
+    depth: f64,
+    velocity: f64,
+    direction: f64,
+    paddle: Paddle,
+    encoders: Encoders,
+    target_sensor: TargetSensor,
+    random: Pcg64,
+    link: Link,
+    /// Commands on their way, with the time when the step that gave them has ended, ns.
+    on_their_way: VecDeque<(u64, PaddleCommand)>,
+    next_release_ns: u64,
+    /// Wall clock minus steady clock, ns: what nothing here may depend on.
+    wall_offset_ns: i64,
+    /// Accounts from outside of the controller.
+    pub audit: Audit,
+    /// What must hold on every tick.
+    pub invariants: Invariants,
+    /// Last exchange of the controller.
+    pub last: Option<Exchange>,
+    /// Orthogonal error now, length.
+    pub error: f64,
+    /// Largest orthogonal error so far, length.
+    pub max_error: f64,
+    /// Injections so far.
+    pub injected: u64,
+    /// Commands that came with at least one fault code.
+    pub flagged: u64,
+}
+
+impl<'t> Bench<'t> {
+    /// Everything at rest at time 0.
+    ///
+    /// # Errors
+    /// What the controller refuses.
+    pub fn new(table: &'t Table<f64, 2>, setup: Setup) -> Result<Self, SettingsError> {
+        let settings = &setup.settings;
+        let controller = Controller::new(table, settings)?;
+        Ok(Self {
+            controller,
+            table,
+            state: State::new(),
+            schedule: Schedule::new(0, settings.loop_period_ns),
+            events: Vec::new(),
+            active: Vec::new(),
+            tick: 0,
+            tissue: LinearTissue::new(table),
+            depth: table.validity.depth_start,
+            velocity: 0.0,
+            direction: 1.0,
+            paddle: Paddle::at(setup.actuator, Vector2::from(setup.paddle)),
+            encoders: Encoders::starting_at(setup.sequence),
+            target_sensor: TargetSensor::new(
+                settings.target_period_ns,
+                settings.target_latency_ns,
+                setup.noise,
+                setup.seed,
+            ),
+            random: Pcg64::new(u128::from(setup.seed), FAULT_STREAM),
+            link: Link::default(),
+            on_their_way: VecDeque::new(),
+            next_release_ns: 0,
+            wall_offset_ns: 0,
+            audit: Audit::default(),
+            invariants: Invariants::new(table, settings),
+            last: None,
+            error: 0.0,
+            max_error: 0.0,
+            injected: 0,
+            flagged: 0,
+            setup,
+        })
+    }
+
+    /// The settings it was built from.
+    pub fn setup(&self) -> &Setup {
+        &self.setup
+    }
+
+    /// Number of the next tick of the plant.
+    pub fn now(&self) -> u64 {
+        self.tick
+    }
+
+    /// Depth of the needle, length.
+    pub fn depth(&self) -> f64 {
+        self.depth
+    }
+
+    /// Where the paddle is, length.
+    pub fn paddle(&self) -> Vector2<f64> {
+        self.paddle.position()
+    }
+
+    /// The tissue.
+    pub fn tissue(&mut self) -> &mut LinearTissue<'t> {
+        &mut self.tissue
+    }
+
+    /// Loop gain g in use.
+    pub fn loop_gain(&self) -> f64 {
+        self.controller.loop_gain()
+    }
+
+    /// `fault` from now on for this many ticks of the plant.
+    pub fn inject(&mut self, fault: Fault, ticks: u64) -> &mut Self {
+        self.inject_at(Event { fault, from: self.tick, until: self.tick + ticks })
+    }
+
+    /// `event` when its time has come.
+    pub fn inject_at(&mut self, event: Event) -> &mut Self {
+        self.events.push(event);
+        self
+    }
+
+    /// Somebody has looked and re-arms the controller.
+    pub fn rearm(&mut self) {
+        self.state.rearm();
+        self.audit.rearm();
+        self.invariants.rearm();
+    }
+
+    /// Lets this many ticks of the plant pass.
+    pub fn run(&mut self, ticks: u64) -> &mut Self {
+        for _ in 0..ticks {
+            self.step();
+        }
+        self
+    }
+
+    /// Ticks of the plant until a command satisfies `condition`, that tick included; none within `limit`.
+    pub fn until(&mut self, limit: u64, condition: impl Fn(&PaddleCommand) -> bool) -> Option<u64> {
+        (1..=limit).find(|_| self.step().is_some_and(|exchange| condition(&exchange.command)))
+    }
+
+    /// Mode of the last command.
+    pub fn mode(&self) -> Mode {
+        self.state.mode()
+    }
+
+    /// What is in one account and not in the other.
+    pub fn unaccounted(&self) -> u64 {
+        self.audit.unaccounted(&self.state)
+    }
+
+    /// One tick of the plant, and of the controller if it is due.
+    pub fn step(&mut self) -> Option<Exchange> {
+        let time_ns = self.tick * self.setup.settings.loop_period_ns;
+        self.active.clear();
+        let tick = self.tick;
+        self.active.extend(self.events.iter().filter(|event| event.is_active(tick)).map(|event| event.fault));
+        self.move_plant(time_ns);
+        self.sense(time_ns);
+        let exchange = if self.next_release_ns <= time_ns { Some(self.control(time_ns)) } else { None };
+        self.tick += 1;
+        exchange
+    }
+
+    /// One period passes for needle, actuator and whatever pushes.
+    fn move_plant(&mut self, time_ns: u64) {
+        let period_s = self.setup.settings.loop_period_ns as f64 * 1e-9;
+        let mut actuator = self.setup.actuator;
+        let (mut speed, mut stuck) = (1.0, false);
+        self.tissue.gain = 1.0;
+        for fault in &self.active {
+            match *fault {
+                Fault::Stuck => stuck = true,
+                Fault::ActuatorGain(gain) => actuator.gain = gain,
+                Fault::TissueGain(gain) => self.tissue.gain = gain,
+                Fault::Push(rate) => self.tissue.push += rate * period_s,
+                Fault::NeedleSpeed(factor) => speed = factor,
+                Fault::WallClock(by_ns) => self.wall_offset_ns = by_ns,
+                _ => continue,
+            }
+            self.injected += 1;
+        }
+        let mut command = None;
+        while let Some((ready_ns, sent)) = self.on_their_way.front()
+            && *ready_ns <= time_ns
+        {
+            command = Some(*sent);
+            self.on_their_way.pop_front();
+        }
+        self.paddle.set_gain(actuator.gain);
+        if !stuck {
+            let goal = command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(command.displacement));
+            self.paddle.advance(goal, period_s);
+        }
+        self.drive_needle(speed, period_s);
+    }
+
+    /// The needle starts with the first RUN, as in a real insertion.
+    fn drive_needle(&mut self, factor: f64, period_s: f64) {
+        let (start, end) = (self.table.validity.depth_start, self.setup.depth_end);
+        let started = self.audit.modes[Mode::Run as usize - 1] > 0;
+        let mut wish = if started { self.setup.speed * factor * self.direction } else { 0.0 };
+        let slowing = self.table.validity.needle_speed / NEEDLE_RAMP_S;
+        // The drive knows where it ends, and is at rest there.
+        let left = if wish > 0.0 { end - self.depth } else { self.depth - start }.max(0.0);
+        if left < 1e-3 * (end - start) && self.setup.shuttles && wish * self.direction > 0.0 {
+            self.direction = -self.direction;
+        }
+        let stoppable = (1.8 * slowing * left).sqrt();
+        wish = wish.clamp(-stoppable, stoppable);
+        let change = slowing * period_s;
+        let before = self.velocity;
+        self.velocity += (wish - before).clamp(-change, change);
+        self.depth = (self.depth + 0.5 * (before + self.velocity) * period_s).clamp(start, end);
+    }
+
+    /// Measures, and lets the seam pass what arrives.
+    fn sense(&mut self, time_ns: u64) {
+        let position = self.paddle.position();
+        let target = self.tissue.target(self.depth, &position);
+        self.error = self.tissue.error(&target);
+        self.max_error = self.max_error.max(self.error.abs());
+        let stopped = self.active.contains(&Fault::PeerStopped);
+        let (mut needle, mut paddle, mut seen) = (None, None, None);
+        if stopped {
+            self.injected += 1;
+        } else {
+            let identity = self.active.iter().rev().find_map(|fault| match fault {
+                Fault::PaddleIdentity(index) => Some(*index),
+                _ => None,
+            });
+            self.injected += u64::from(identity.is_some());
+            let index = identity.unwrap_or(self.table.paddle.index);
+            let samples = self.encoders.sample(time_ns, (self.depth, self.velocity), index, &position);
+            (needle, paddle) = (Some(samples.0), Some(samples.1));
+            self.target_sensor.measure(time_ns, &target);
+            seen = self.target_sensor.arrived(time_ns);
+            if let Some(sample) = &mut seen {
+                self.injected += see(sample, &self.active, &mut self.random);
+            }
+        }
+        let (tick, audit) = (self.tick, &mut self.audit);
+        self.injected += self.link.needle.pass(tick, needle, &self.active, audit)
+            + self.link.paddle.pass(tick, paddle, &self.active, audit)
+            + self.link.target.pass(tick, seen, &self.active, audit);
+    }
+
+    /// One tick of the controller.
+    fn control(&mut self, time_ns: u64) -> Exchange {
+        let period_ns = self.setup.settings.loop_period_ns;
+        let (mut back_ns, mut periods) = (0, HEALTHY_STEP);
+        for fault in &self.active {
+            match *fault {
+                Fault::ClockBack(by_ns) => back_ns = by_ns,
+                Fault::SlowStep(slow) => periods = slow,
+                _ => continue,
+            }
+            self.injected += 1;
+        }
+        // A release before this one that did not start was skipped: arithmetic of its own, not the schedule's.
+        self.audit.skipped += (time_ns - self.next_release_ns) / period_ns;
+        let release = self.schedule.begin(time_ns);
+        let before = self.state.clone();
+        let Ok((inputs, command)) =
+            run_tick(&self.controller, &mut self.state, release.tick, time_ns.saturating_sub(back_ns), &mut self.link);
+        let accepted = !self.invariants.is_backwards(&inputs);
+        for (stream, sequence) in Stream::ALL.into_iter().zip([
+            inputs.needle.map(|sample| sample.sequence),
+            inputs.target.map(|sample| sample.sequence),
+            inputs.paddle.map(|sample| sample.sequence),
+        ]) {
+            if let Some(sequence) = sequence {
+                self.audit.stream(stream).read(sequence, accepted);
+            }
+        }
+        if let Some(count) = self.audit.modes.get_mut(command.state.wrapping_sub(1) as usize) {
+            *count += 1;
+        }
+        self.invariants.check(&before, &self.state, &inputs, &command);
+        self.flagged += u64::from(command.faults != 0);
+
+        let end_ns = time_ns + (periods * period_ns as f64).round() as u64;
+        self.schedule.finish(end_ns);
+        let whole = end_ns.div_ceil(period_ns) * period_ns;
+        let next_ns = whole.max(time_ns + period_ns);
+        self.audit.skipped += (next_ns - time_ns) / period_ns - 1;
+        self.invariants.check_release(self.schedule.next_release_ns(), next_ns);
+        self.next_release_ns = next_ns;
+        self.on_their_way.push_back((end_ns, command));
+        let exchange = Exchange { inputs, command };
+        self.last = Some(exchange);
+        exchange
+    }
+}

@@ -1,0 +1,288 @@
+//! Rows 33 to 36: processes that are killed, and what the others make of it.
+
+use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use firmware::Mode;
+use rand_pcg::Pcg64;
+
+use super::stage::{Process, Stage, children, descriptors, left_behind, ms, read_json, unaccounted, wait_until};
+use crate::bench::faults::evidence::Evidence;
+use crate::bench::faults::fault::below;
+use crate::bench::faults::rows::Outcome;
+use crate::commands::controller::ControllerResult;
+use crate::commands::plant::PlantResult;
+use crate::error::SimError;
+use crate::record::recording::{Record, Recording};
+use crate::record::replay::replay;
+
+/// Pairs of processes at work at once.
+const WORKERS: u64 = 4;
+
+/// A recording that must be whole and replay bit by bit.
+fn whole_and_replayed(path: &Path, finished: bool) -> Result<Vec<Record>, String> {
+    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+    let (recording, end) = Recording::whole_records(&bytes).map_err(|error| error.to_string())?;
+    if finished && !end {
+        return Err(format!("no end mark after {} records", recording.records.len()));
+    }
+    replay(&recording, path).map_err(|error| error.to_string())?;
+    Ok(recording.records)
+}
+
+/// Row 33: the simulator is killed at 200 seeded phases, from its first millisecond on.
+pub(crate) fn plant_killed(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+    let repetitions = stage.repetitions(200);
+    let shared = Mutex::new(evidence);
+    let next = AtomicU64::new(0);
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..WORKERS)
+            .map(|_| {
+                scope.spawn(|| -> Outcome {
+                    loop {
+                        let trial = next.fetch_add(1, Ordering::Relaxed);
+                        if trial >= repetitions {
+                            return Ok(());
+                        }
+                        crate::runtime::signals::check()?;
+                        let mut random = Pcg64::new(u128::from(stage.seed) << 64 | u128::from(trial), 33);
+                        // Half of them within the start, half in the middle of things.
+                        let phase =
+                            if trial.is_multiple_of(2) { below(&mut random, 60) } else { below(&mut random, 900) };
+                        let mut own = Evidence::default();
+                        kill_plant(stage, phase, &mut own)?;
+                        if let Ok(mut shared) = shared.lock() {
+                            shared.merge(own);
+                        }
+                    }
+                })
+            })
+            .collect();
+        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or(Ok(())))
+    })
+}
+
+fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Outcome {
+    let what = || format!("killed after {phase} ms");
+    let link = stage.link();
+    let (mut controller, record, json) = stage.controller(&link, &[])?;
+    let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
+    std::thread::sleep(ms(phase));
+    plant.kill();
+    evidence.injected += 1;
+    let code = controller.code();
+    evidence.require(code == Some(1), || format!("{}: the controller ended with {code:?}", what()));
+    // Without accounts the plant had not been there yet: nothing was to be made safe.
+    if let Some(result) = read_json::<ControllerResult>(&json) {
+        let unaccounted = unaccounted(&result, None);
+        evidence.unaccounted += unaccounted;
+        evidence.require(unaccounted == 0, || format!("{}: {unaccounted} unaccounted", what()));
+        let was_run = result.handover.ticks.run > 0;
+        let expected = if was_run { "SAFE" } else { "HOLD" };
+        let state = &result.handover.final_state;
+        evidence.require(state == expected, || format!("{}: ended in {state} instead of {expected}", what()));
+        match whole_and_replayed(&record, true) {
+            Ok(records) => {
+                let fresh = records.iter().rposition(|record| record.exchange.inputs.needle.is_some());
+                let safe = records.iter().position(|record| record.exchange.command.state == Mode::Safe as u32);
+                if let (true, Some(fresh), Some(safe)) = (was_run, fresh, safe) {
+                    let ticks = records[safe].exchange.inputs.tick.saturating_sub(records[fresh].exchange.inputs.tick);
+                    evidence.ticks_to_detect = evidence.ticks_to_detect.max(Some(ticks));
+                    evidence.final_state = Some(Mode::Safe);
+                }
+                evidence.detected += 1;
+            }
+            Err(error) => evidence.require(false, || format!("{}: its record: {error}", what())),
+        }
+    } else {
+        evidence.detected += u64::from(code == Some(1));
+    }
+    let left = left_behind(&link)?;
+    evidence.require(left.is_empty(), || format!("{}: left behind {left:?}", what()));
+    Ok(())
+}
+
+/// Waits until a controller has a whole record of `mode`.
+pub(super) fn reaches(record: &Path, mode: Mode, process: &mut Process) -> bool {
+    wait_until(ms(5000), || {
+        let bytes = std::fs::read(record).unwrap_or_default();
+        let found = Recording::whole_records(&bytes)
+            .is_ok_and(|(recording, _)| recording.records.iter().any(|r| r.exchange.command.state == mode as u32));
+        found || process.wait(ms(0)).is_some()
+    })
+}
+
+/// A controller that takes over starts disarmed and does not move the paddle.
+fn takes_over_gently(records: &[Record], evidence: &mut Evidence, what: &dyn Fn() -> String) {
+    let Some(first) = records.first() else {
+        evidence.require(false, || format!("{}: no record", what()));
+        return;
+    };
+    evidence
+        .require(first.exchange.command.state == Mode::Hold as u32, || format!("{}: does not start in HOLD", what()));
+    let adopted = records.iter().find(|record| record.exchange.command.is_valid());
+    let Some(Record { exchange, .. }) = adopted else {
+        evidence.require(false, || format!("{}: never heard where the paddle is", what()));
+        return;
+    };
+    let measured = exchange.inputs.paddle.map(|sample| sample.displacement.map(f64::to_bits));
+    let commanded = Some(exchange.command.displacement.map(f64::to_bits));
+    evidence.require(measured == commanded, || format!("{}: its first command is a motion", what()));
+    evidence.detected += u64::from(measured == commanded);
+}
+
+/// Row 34: the controller is killed and restarted while the plant goes on.
+pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+    let mut random = Pcg64::new(u128::from(stage.seed), 34);
+    let link = stage.link();
+    let (mut plant, json) = stage.plant(&link, &["--keep", "--insertion-time", "6", "--duration", "16"])?;
+    let started = std::time::Instant::now();
+    let mut kills = 0;
+    for trial in 0..8 {
+        // On a busy machine fewer of them: the last one has to find the plant at work.
+        if started.elapsed() > ms(9000) {
+            break;
+        }
+        let what = || format!("controller {trial}");
+        let (mut controller, record, _) = stage.controller(&link, &[])?;
+        let armed = reaches(&record, Mode::Run, &mut controller);
+        evidence.require(armed, || format!("{}: no RUN: {}", what(), controller.message()));
+        std::thread::sleep(ms(below(&mut random, 300)));
+        if plant.wait(ms(0)).is_some() {
+            break;
+        }
+        controller.kill();
+        kills += 1;
+        evidence.injected += 1;
+        match whole_and_replayed(&record, false) {
+            Ok(records) => takes_over_gently(&records, evidence, &what),
+            Err(error) => evidence.require(false, || format!("{}: its record: {error}", what())),
+        }
+    }
+    let (mut last, record, accounts) = stage.controller(&link, &[])?;
+    let plant_code = plant.code();
+    evidence.require(plant_code == Some(0), || format!("the plant ended with {plant_code:?}: {}", plant.message()));
+    let code = last.code();
+    evidence.require(code == Some(0), || format!("the last controller ended with {code:?}: {}", last.message()));
+    let what = || "the last controller".to_owned();
+    match whole_and_replayed(&record, true) {
+        Ok(records) => takes_over_gently(&records, evidence, &what),
+        Err(error) => evidence.require(false, || format!("its record: {error}")),
+    }
+    evidence.injected += 1;
+    if let Some(result) = read_json::<ControllerResult>(&accounts) {
+        evidence.unaccounted += unaccounted(&result, None);
+        evidence.final_state = (result.handover.final_state == "RUN").then_some(Mode::Run);
+        // Without a real-time policy a busy machine may have overrun it.
+        let (state, faults) = (&result.handover.final_state, &result.handover.faults);
+        let explained = state != "SAFE" || faults.contains("OVERRUN");
+        evidence.require(explained, || format!("ended in {state}: {faults}"));
+    }
+    let limit = stage.table.paddle.max_rate * 1e-3 * (1.0 + 1e-6);
+    match read_json::<PlantResult>(&json) {
+        Some(result) => {
+            evidence.max_error = Some(result.largest_error);
+            evidence.require(result.controllers == kills + 1, || {
+                format!("the plant saw {} controllers instead of {}", result.controllers, kills + 1)
+            });
+            evidence.require(result.largest_step <= limit, || {
+                format!("the paddle moved {} in a tick, at most {limit} is allowed", result.largest_step)
+            });
+        }
+        None => evidence.require(false, || "the plant has left no account".to_owned()),
+    }
+    let left = left_behind(&link)?;
+    evidence.require(left.is_empty(), || format!("left behind {left:?}"));
+    Ok(())
+}
+
+/// Row 35: killed in the middle of creating services; the next ones get through in bounded time.
+pub(crate) fn killed_at_start(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+    let mut random = Pcg64::new(u128::from(stage.seed), 35);
+    let link = stage.link();
+    for trial in 0..stage.repetitions(100) {
+        crate::runtime::signals::check()?;
+        let mut process =
+            if trial % 2 == 0 { stage.controller(&link, &[])?.0 } else { stage.plant(&link, &["--duration", "60"])?.0 };
+        // The services are made within the first milliseconds.
+        std::thread::sleep(std::time::Duration::from_micros(below(&mut random, 30_000)));
+        process.kill();
+        evidence.injected += 1;
+    }
+    let started = std::time::Instant::now();
+    pair_works(stage, &link, evidence)?;
+    evidence.detected += evidence.injected;
+    let took = started.elapsed().as_secs_f64();
+    evidence.notes.push(format!("the pair after them took {took:.2} s for an insertion of 0.5 s"));
+    let left = left_behind(&link)?;
+    evidence.require(left.is_empty(), || format!("left behind {left:?}"));
+    Ok(())
+}
+
+/// A short insertion with fresh processes on this link must go through.
+fn pair_works(stage: &Stage<'_>, link: &str, evidence: &mut Evidence) -> Result<(), SimError> {
+    let (mut controller, _, json) = stage.controller(link, &[])?;
+    let (mut plant, plant_json) = stage.plant(link, &["--insertion-time", "0.4", "--duration", "0.5"])?;
+    let codes = [plant.code(), controller.code()];
+    evidence.require(codes == [Some(0); 2], || {
+        format!("plant and controller ended with {codes:?}: {} {}", plant.message(), controller.message())
+    });
+    if let Some(result) = read_json::<ControllerResult>(&json) {
+        let published = read_json::<PlantResult>(&plant_json).map(|plant| plant.published);
+        evidence.unaccounted += unaccounted(&result, published);
+        evidence.final_state = (result.handover.final_state == "RUN").then_some(Mode::Run);
+    }
+    Ok(())
+}
+
+/// Row 36: 100 controllers come and are killed; nothing grows.
+pub(crate) fn cycles(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+    /// Cycles after which everything has been used once.
+    const SETTLED: u64 = 5;
+    let repetitions = stage.repetitions(100).max(SETTLED + 5);
+    let before = [descriptors("self"), children()];
+    let link = stage.link();
+    let space = crate::exchange::Space::new(&link)?;
+    let (mut plant, _) = stage.plant(&link, &["--keep", "--duration", "600"])?;
+    let mut settled = [0; 2];
+    let mut now = [0; 2];
+    for cycle in 1..=repetitions {
+        crate::runtime::signals::check()?;
+        let (mut controller, record, _) = stage.controller(&link, &[])?;
+        let armed = reaches(&record, Mode::Run, &mut controller);
+        evidence.require(armed, || format!("cycle {cycle}: no RUN: {}", controller.message()));
+        now = [space.traces().len(), plant.descriptors()];
+        if cycle == SETTLED {
+            settled = now;
+        }
+        controller.kill();
+        let _ = std::fs::remove_file(record);
+        evidence.injected += 1;
+        evidence.detected += u64::from(armed);
+        if plant.wait(ms(0)).is_some() {
+            evidence.require(false, || format!("cycle {cycle}: the plant has ended: {}", plant.message()));
+            break;
+        }
+    }
+    evidence.require(now == settled, || {
+        format!("names in shared memory and descriptors of the plant went from {settled:?} to {now:?}")
+    });
+    plant.kill();
+    drop(plant);
+    let (mut last, ..) = stage.controller(&link, &[])?;
+    let _ = last.wait(ms(10_000));
+    drop(last);
+    let left = left_behind(&link)?;
+    let left_after = left.len();
+    evidence.require(left.is_empty(), || format!("left behind {left:?}"));
+    let after = [descriptors("self"), children()];
+    evidence.require(before == after, || format!("descriptors and children here went from {before:?} to {after:?}"));
+    evidence.notes.push(format!(
+        "with a controller: {} names in shared memory and {} descriptors of the plant after cycle {SETTLED}, {} and {} \
+         after cycle {repetitions}; names left at the end {left_after}; descriptors and children of this process {before:?} \
+         before, {after:?} after",
+        settled[0], settled[1], now[0], now[1]
+    ));
+    Ok(())
+}

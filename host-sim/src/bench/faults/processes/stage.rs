@@ -1,0 +1,238 @@
+//! Real processes under observation: started, signalled, waited for, and nothing of them left behind.
+
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+use firmware::contract::Table;
+use iceoryx2::service::ipc;
+use model_offline::table::to_bytes;
+use rustix::process::{Pid, Signal, kill_process, kill_process_group};
+use serde::de::DeserializeOwned;
+
+use crate::commands::controller::ControllerResult;
+use crate::error::SimError;
+use crate::exchange::{Departure, LinkError, Space};
+
+/// How long any of them may take to end.
+pub(super) const TIMEOUT: Duration = Duration::from_secs(20);
+
+/// Where the rows with real processes take place.
+#[derive(Debug)]
+pub(crate) struct Stage<'t> {
+    /// The controller's table.
+    pub(super) table: &'t Table<f64, 2>,
+    /// This program.
+    pub(super) program: PathBuf,
+    /// The table as a file.
+    pub(super) table_file: PathBuf,
+    /// Seed of the phases.
+    pub(super) seed: u64,
+    /// Part of the catalogue's number of repetitions, 1 for all.
+    pub(super) effort: f64,
+    folder: tempfile::TempDir,
+    /// Distinguishes files and links.
+    counter: AtomicU32,
+}
+
+impl<'t> Stage<'t> {
+    /// A folder with a copy of this program and the table, for other users to read.
+    pub(crate) fn new(table: &'t Table<f64, 2>, seed: u64, effort: f64) -> Result<Self, SimError> {
+        let folder = tempfile::Builder::new().prefix("stillpoint-faults-").tempdir().map_err(SimError::Spawn)?;
+        let write = |path: &Path, outcome: std::io::Result<()>| {
+            outcome.map_err(|source| SimError::Write { path: path.to_owned(), source })
+        };
+        let readable = std::fs::Permissions::from_mode(0o755);
+        write(folder.path(), std::fs::set_permissions(folder.path(), readable))?;
+        let program = folder.path().join("host-sim");
+        let current = std::env::current_exe().map_err(SimError::Spawn)?;
+        write(&program, std::fs::copy(current, &program).map(drop))?;
+        let table_file = folder.path().join("controller.table");
+        write(&table_file, std::fs::write(&table_file, to_bytes(table)?))?;
+        Ok(Self { table, program, table_file, seed, effort, folder, counter: AtomicU32::new(0) })
+    }
+
+    /// This many repetitions, or the part of them that was asked for.
+    pub(super) fn repetitions(&self, all: u64) -> u64 {
+        ((all as f64 * self.effort).ceil() as u64).max(1)
+    }
+
+    /// A name that nobody else uses.
+    pub(super) fn link(&self) -> String {
+        static LINKS: AtomicU32 = AtomicU32::new(0);
+        format!("faults-{}-{}", std::process::id(), LINKS.fetch_add(1, Ordering::Relaxed))
+    }
+
+    /// A path in the folder that nothing is at yet.
+    pub(super) fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(format!("{}-{name}", self.counter.fetch_add(1, Ordering::Relaxed)))
+    }
+
+    /// Starts this program.
+    pub(super) fn start(&self, arguments: &[&str]) -> Result<Process, SimError> {
+        let mut command = Command::new(&self.program);
+        command.args(arguments);
+        self.start_command(command)
+    }
+
+    /// Starts any program.
+    pub(super) fn start_command(&self, mut command: Command) -> Result<Process, SimError> {
+        let said = self.path("stderr");
+        let stderr = std::fs::File::create(&said).map_err(SimError::Spawn)?;
+        let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr).process_group(0).spawn();
+        Ok(Process { child: child.map_err(SimError::Spawn)?, said })
+    }
+
+    /// Starts a controller in free-run; returns where it records and where its accounts will be.
+    pub(super) fn controller(&self, link: &str, more: &[&str]) -> Result<(Process, PathBuf, PathBuf), SimError> {
+        let (record, json) = (self.path("controller.rec"), self.path("controller.json"));
+        let files = [&self.table_file, &record, &json].map(|path| path.to_string_lossy().into_owned());
+        let [table, record_text, json_text] = files.each_ref().map(String::as_str);
+        let mut arguments = vec!["controller", "--link", link, "--patience", "3"];
+        if !more.contains(&"--mode") {
+            arguments.extend(["--mode", "free-run"]);
+        }
+        arguments.extend(["--table", table, "--json", json_text, "--record", record_text]);
+        arguments.extend(more);
+        Ok((self.start(&arguments)?, record, json))
+    }
+
+    /// Starts a plant in free-run; returns where its account will be.
+    pub(super) fn plant(&self, link: &str, more: &[&str]) -> Result<(Process, PathBuf), SimError> {
+        let json = self.path("plant.json");
+        let json_text = json.to_string_lossy().into_owned();
+        let mut arguments = vec!["plant", "--mode", "free-run", "--link", link, "--paddle", "3", "--patience", "3"];
+        arguments.extend(["--json", &json_text]);
+        arguments.extend(more);
+        Ok((self.start(&arguments)?, json))
+    }
+}
+
+/// Names in shared memory and directories that a link has left behind; tidies up after looking.
+pub(super) fn left_behind(link: &str) -> Result<Vec<PathBuf>, LinkError> {
+    let root = std::env::temp_dir().join(format!("stillpoint-{link}"));
+    let existed = root.exists();
+    let space = Space::new(link)?;
+    let traces = space.traces().into_iter().filter(|path| existed || *path != root).collect();
+    space.leave::<ipc::Service>(Departure::First);
+    Ok(traces)
+}
+
+/// Reads what a process has written.
+pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {
+    serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+}
+
+/// A process of ours; ended and reaped when dropped.
+#[derive(Debug)]
+pub(super) struct Process {
+    child: Child,
+    said: PathBuf,
+}
+
+impl Process {
+    pub(super) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Sends a signal; to a process that has ended already, nothing happens.
+    pub(super) fn signal(&self, signal: Signal) {
+        if let Some(process) = Pid::from_raw(self.child.id() as i32) {
+            let _ = kill_process(process, signal);
+        }
+    }
+
+    /// Kills and reaps it: an unreaped child would count as alive in shared memory.
+    pub(super) fn kill(&mut self) {
+        // The whole group: a script may have started others.
+        if let Some(group) = Pid::from_raw(self.child.id() as i32)
+            && self.child.try_wait().is_ok_and(|ended| ended.is_none())
+        {
+            let _ = kill_process_group(group, Signal::KILL);
+        }
+        let _ = self.child.wait();
+    }
+
+    /// How it ended, if it does within `timeout`.
+    pub(super) fn wait(&mut self, timeout: Duration) -> Option<ExitStatus> {
+        let until = Instant::now() + timeout;
+        loop {
+            if let Ok(Some(status)) = self.child.try_wait() {
+                return Some(status);
+            }
+            if Instant::now() > until {
+                return None;
+            }
+            std::thread::sleep(Duration::from_millis(2));
+        }
+    }
+
+    /// Its exit code; none when a signal ended it, or nothing did.
+    pub(super) fn code(&mut self) -> Option<i32> {
+        self.wait(TIMEOUT).and_then(|status| status.code())
+    }
+
+    /// What it said on stderr, in one line.
+    pub(super) fn message(&self) -> String {
+        let text = std::fs::read_to_string(&self.said).unwrap_or_default();
+        text.replace(['│', '╰', '├', '─', '▶', '×'], " ").split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+
+    /// Open descriptors.
+    pub(super) fn descriptors(&self) -> usize {
+        descriptors(&self.id().to_string())
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+/// Open descriptors of a process (`self` for this one).
+pub(super) fn descriptors(process: &str) -> usize {
+    std::fs::read_dir(format!("/proc/{process}/fd")).map_or(0, Iterator::count)
+}
+
+/// Children of this process, zombies included.
+pub(super) fn children() -> usize {
+    let threads = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let children = threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("children")).ok());
+    children.map(|list| list.split_whitespace().count()).sum()
+}
+
+/// Samples and ticks that a controller cannot account for, given what the plant says it published, if it lived to say.
+pub(super) fn unaccounted(result: &ControllerResult, published: Option<[u64; 3]>) -> u64 {
+    let handover = &result.handover;
+    let streams = [&handover.needle, &handover.target, &handover.paddle];
+    let own: u64 = streams.iter().map(|stream| stream.unaccounted).sum();
+    let lost: u64 = published.map_or(0, |published| {
+        let entries = streams.map(|stream| {
+            stream.consumed + stream.overwritten + stream.discarded.iter().sum::<u64>() + stream.in_flight
+        });
+        published.iter().zip(entries).map(|(published, entries)| published.abs_diff(entries)).sum()
+    });
+    let record = handover.record.as_ref().map_or(0, |record| record.unaccounted());
+    own + lost + handover.ticks.unaccounted + record
+}
+
+/// Milliseconds.
+pub(super) const fn ms(milliseconds: u64) -> Duration {
+    Duration::from_millis(milliseconds)
+}
+
+/// Waits until `condition` holds.
+pub(super) fn wait_until(timeout: Duration, mut condition: impl FnMut() -> bool) -> bool {
+    let until = Instant::now() + timeout;
+    while !condition() {
+        if Instant::now() > until {
+            return false;
+        }
+        std::thread::sleep(ms(5));
+    }
+    true
+}

@@ -1,0 +1,243 @@
+//! Rows 13 to 15, 17 and 18: numbers that are no measurement, wrong units, jumps, noise.
+
+use firmware::inputs::Discard;
+use firmware::{Faults, Mode};
+
+use super::{Outcome, Trial, integral_bits, same_motion};
+use crate::bench::faults::bench::Bench;
+use crate::bench::faults::evidence::Evidence;
+use crate::bench::faults::fault::{Fault, Stream, below, between};
+
+fn refusals(bench: &Bench<'_>, stream: Stream, reason: Discard) -> u64 {
+    let ledger = bench.state.ledger();
+    match stream {
+        Stream::Needle => &ledger.needle,
+        Stream::Target => &ledger.target,
+        Stream::Paddle => &ledger.paddle,
+    }
+    .discarded_for(reason)
+}
+
+/// A single sample with `fault` is refused for one of `reasons`, does not touch the integral, and the paddle moves as
+/// if it had never arrived.
+fn refused(
+    trial: &Trial<'_>,
+    evidence: &mut Evidence,
+    random: &mut rand_pcg::Pcg64,
+    stream: Stream,
+    fault: Fault,
+    reasons: &[Discard],
+) -> Outcome {
+    let what = || format!("{fault:?}");
+    let [mut lost, mut hit] = trial.twins(random)?;
+    // Until the next sample of the target is due, so that each kind of sample is hit once.
+    let ticks = 20;
+    let ticks_hit = if stream == Stream::Target { ticks } else { 1 };
+    let before: u64 = reasons.iter().map(|reason| refusals(&hit, stream, *reason)).sum();
+    let integral = integral_bits(&hit.state);
+    lost.inject(Fault::Lost(stream), ticks_hit);
+    hit.inject(fault, ticks_hit);
+    let mut found = None;
+    let mut same = true;
+    for tick in 1..=ticks {
+        let [a, b] = [&mut lost, &mut hit].map(|bench| bench.step().map(|e| e.command.displacement.map(f64::to_bits)));
+        same &= a == b;
+        let after: u64 = reasons.iter().map(|reason| refusals(&hit, stream, *reason)).sum();
+        if found.is_none() && after > before {
+            found = Some(tick);
+        }
+    }
+    evidence.detect(found, ticks_hit, what);
+    evidence.require(same, || format!("{}: the paddle moved otherwise than without the sample", what()));
+    if stream == Stream::Target {
+        evidence.require(integral == integral_bits(&hit.state), || format!("{}: the integral changed", what()));
+    }
+    let mut twins = [lost, hit];
+    evidence.require(same_motion(&mut twins, 200), || format!("{}: it had a later effect", what()));
+    let [_, hit] = &twins;
+    evidence.expect_mode(hit, Mode::Run, what);
+    evidence.close(hit, what);
+    Ok(())
+}
+
+/// Row 13: NaN, ±Inf, a subnormal in each number, and absurd times, are refused.
+pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+    let mut random = trial.random(13);
+    for stream in Stream::ALL {
+        for field in 0..2 {
+            for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, -5e-324] {
+                let fault = Fault::Field(stream, field, value);
+                refused(trial, evidence, &mut random, stream, fault, &[Discard::NotFinite])?;
+            }
+        }
+        // Before the last one, or in the future; 20 ms is the latency of the target.
+        let ahead = if stream == Stream::Target { 25_000_000 } else { 5_000_000 };
+        for by_ns in [i64::MIN, i64::MAX, ahead] {
+            refused(trial, evidence, &mut random, stream, Fault::Stamped(stream, by_ns), &[Discard::Time])?;
+        }
+    }
+    Ok(())
+}
+
+/// Row 14: finite numbers that cannot be are refused.
+pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+    let mut random = trial.random(14);
+    let reasons = [Discard::OutOfRange, Discard::Innovation];
+    for value in [1e3, -1e3, f64::MAX, f64::MIN, 1.0, -1.0] {
+        for stream in Stream::ALL {
+            refused(trial, evidence, &mut random, stream, Fault::Field(stream, 0, value), &reasons)?;
+            if stream != Stream::Needle {
+                refused(trial, evidence, &mut random, stream, Fault::Field(stream, 1, value), &reasons)?;
+            }
+        }
+        // A speed has no range of its own: the needle is too fast, the paddle stays.
+        let mut bench = trial.running(&mut random)?;
+        bench.inject(Fault::Field(Stream::Needle, 1, value), 1);
+        let found = bench.until(1, |command| command.state == Mode::Hold as u32);
+        evidence.detect(found, 1, || format!("velocity {value}"));
+        bench.run(100);
+        evidence.expect_mode(&bench, Mode::Run, || format!("velocity {value}"));
+        evidence.close(&bench, || format!("velocity {value}"));
+    }
+    Ok(())
+}
+
+/// Row 15: units that are off by 1000 are refused for as long as they last, and move nothing.
+pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+    let mut random = trial.random(15);
+    let reasons = [Discard::OutOfRange, Discard::Innovation];
+    // A target or a paddle that is a thousand times too near its rest position is plausible by itself: what follows
+    // from it (an error that never shrinks, a paddle that does not follow) is found by the monitors of rows 21 and 23.
+    let cases = [(Stream::Needle, 1e3), (Stream::Target, 1e3), (Stream::Paddle, 1e3), (Stream::Needle, 1e-3)];
+    for (stream, factor) in cases {
+        let what = || format!("{stream:?} × {factor}");
+        let mut twins = trial.twins(&mut random)?;
+        for bench in &mut twins {
+            bench.run(1500);
+        }
+        let before: u64 = reasons.iter().map(|reason| refusals(&twins[1], stream, *reason)).sum();
+        twins[0].inject(Fault::Lost(stream), 600);
+        twins[1].inject(Fault::Scaled(stream, factor), 600);
+        evidence.require(same_motion(&mut twins, 600), || format!("{}: the paddle moved", what()));
+        let [_, bench] = &mut twins;
+        let refused = reasons.iter().map(|reason| refusals(bench, stream, *reason)).sum::<u64>() - before;
+        let sent = if stream == Stream::Target { 30 } else { 600 };
+        evidence.injected += sent;
+        evidence.detected += refused;
+        evidence.ticks_to_detect = evidence.ticks_to_detect.max(Some(1));
+        evidence.require(refused == sent, || format!("{}: {refused} of {sent} refused", what()));
+        evidence.expect_mode(bench, Mode::Safe, what);
+        evidence.close(bench, what);
+    }
+    Ok(())
+}
+
+/// Row 17: single samples of something else. 5σ is noise and taken. 50σ is refused unless the motion of the needle
+/// explains as much: then it may be taken, and moves the target by no more than the gain's part of it.
+pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+    for (name, sigmas, moving) in
+        [("default σ, needle at rest", 1.0, false), ("10 × σ", 10.0, true), ("default σ", 1.0, true)]
+    {
+        let mut setup = trial.setup();
+        setup.shuttles = true;
+        setup.noise *= sigmas;
+        setup.settings.target_noise = setup.noise;
+        if !moving {
+            setup.speed = 0.0;
+        }
+        let counts = jump_trial(trial, setup, evidence, name)?;
+        let [wrongly_accepted, wrongly_refused] = counts;
+        evidence.notes.push(format!(
+            "{name} ({:e}): {wrongly_accepted} of 200 jumps of 50σ accepted, {wrongly_refused} of 200 jumps of 5σ and \
+             healthy samples refused",
+            setup.noise
+        ));
+        // With the default noise 50σ is less than what three times the table's motion explains between two samples.
+        let explained = moving && sigmas == 1.0;
+        evidence.require(wrongly_accepted == 0 || explained, || format!("{name}: 50σ accepted"));
+        evidence.require(wrongly_refused == 0, || format!("{name}: good samples refused"));
+    }
+    Ok(())
+}
+
+/// 400 jumps, 5σ and 50σ in turns; how many were accepted and refused wrongly.
+fn jump_trial(
+    trial: &Trial<'_>,
+    setup: crate::bench::faults::bench::Setup,
+    evidence: &mut Evidence,
+    name: &str,
+) -> Result<[u64; 2], crate::error::SimError> {
+    const PER_TARGET: u64 = 20;
+    let mut random = trial.random(17);
+    let mut bench = trial.running_with(setup, &mut random)?;
+    let refusals = |bench: &Bench<'_>| refusals(bench, Stream::Target, Discard::Innovation);
+    let (mut accepted, mut detected) = (0, 0);
+    bench.max_error = 0.0;
+    let start = refusals(&bench);
+    for jump in 0..400 {
+        let sigmas = if jump % 2 == 0 { 5.0 } else { 50.0 };
+        let angle = between(&mut random, 0.0, std::f64::consts::TAU);
+        let away = [angle.cos(), angle.sin()].map(|part| part * sigmas * setup.noise);
+        bench.run(PER_TARGET * (10 + below(&mut random, 5)));
+        let before = refusals(&bench);
+        bench.inject(Fault::WrongTarget(away), PER_TARGET).run(PER_TARGET);
+        let refused = refusals(&bench) > before;
+        if sigmas > 8.0 {
+            detected += u64::from(refused);
+            accepted += u64::from(!refused);
+        }
+    }
+    evidence.injected += 200;
+    evidence.detected += detected;
+    evidence.ticks_to_detect = Some(PER_TARGET);
+    // What was accepted moves the target by the gain's part of it, once; noise adds its own.
+    let bound = bench.loop_gain() * 50.0 * setup.noise + 4.0 * setup.noise;
+    evidence.require(bench.max_error < bound, || format!("{name}: error {:e}, at most {bound:e}", bench.max_error));
+    evidence.expect_mode(&bench, Mode::Run, || name.to_owned());
+    evidence.close(&bench, || name.to_owned());
+    Ok([accepted, refusals(&bench) - start - detected])
+}
+
+/// Row 18: stated noise over five decades: the error stays in proportion, the state does not chatter.
+pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+    /// The loop averages: at g·λ = 0.2 its error has 0.35 of the noise's deviation. This is 11 of those.
+    const MOST_SIGMAS: f64 = 4.0;
+    let depth = trial.table.validity.depth_end;
+    for exponent in -6..=-2 {
+        let sigma = depth * 10f64.powi(exponent);
+        let what = || format!("σ = {sigma:e}");
+        let mut setup = trial.setup();
+        setup.noise = sigma;
+        setup.settings.target_noise = sigma;
+        let mut bench = Bench::new(trial.table, setup)?;
+        bench.run(500);
+        let (hold, injected) = (bench.audit.modes[0], bench.state.ledger().target.consumed);
+        bench.max_error = 0.0;
+        bench.run(10_000);
+        evidence.injected += bench.state.ledger().target.consumed - injected;
+        let held = bench.audit.modes[0] - hold;
+        evidence.require(held == 0, || format!("{}: {held} ticks in HOLD", what()));
+        let bound = MOST_SIGMAS * sigma + 1e-6 * depth;
+        evidence.require(bench.max_error < bound, || format!("{}: error {:e} > {bound:e}", what(), bench.max_error));
+        evidence.expect_mode(&bench, Mode::Run, what);
+        evidence.close(&bench, what);
+    }
+    // Noise that nobody has stated: refused sample by sample, or kept in proportion; the state may only get worse by
+    // age, so that it cannot change more often than samples arrive.
+    let mut bench = Bench::new(trial.table, trial.setup())?;
+    bench.inject(Fault::Noise(0.1 * depth), 4000);
+    let mut changes = 0u64;
+    let mut last = Mode::Hold;
+    for _ in 0..4000 {
+        bench.step();
+        changes += u64::from(bench.mode() != last);
+        last = bench.mode();
+    }
+    evidence.injected += 200;
+    evidence.detected +=
+        refusals(&bench, Stream::Target, Discard::Innovation) + refusals(&bench, Stream::Target, Discard::OutOfRange);
+    evidence.require(changes <= 40, || format!("unstated noise: {changes} changes of state"));
+    evidence.require(bench.state.faults() != Faults::NONE, || "unstated noise was not seen".to_owned());
+    evidence.close(&bench, || "unstated noise".to_owned());
+    Ok(())
+}

@@ -1,0 +1,383 @@
+//! The result of a run, as `run --json` prints it and `DIR/result.json` keeps it. The report is made from this alone.
+//!
+//! Lengths are in the scene's unit, times in the unit that the name ends with.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::record::recording::RunMode;
+use crate::runtime::clock::Scheduling;
+
+/// Version of this format.
+pub const FORMAT: u32 = 1;
+
+/// A whole run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RunResult {
+    /// [`FORMAT`].
+    pub format: u32,
+    /// Version of host-sim.
+    pub version: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// Labels of length and stress.
+    pub units: [String; 2],
+    /// What drove time in the comparison of strategies.
+    pub mode: RunMode,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// What was simulated.
+    pub settings: SimulationSettings,
+    /// What things look like at rest.
+    pub geometry: Geometry,
+    /// Placement studies, one per tissue.
+    pub placements: Vec<PlacementResult>,
+    /// Comparisons of strategies.
+    pub cases: Vec<CaseResult>,
+    /// Duration of the whole command, s.
+    pub wall_s: f64,
+    /// The command line, from the program's name on.
+    #[serde(default)]
+    pub command: Vec<String>,
+    /// Architecture and operating system.
+    #[serde(default)]
+    pub platform: String,
+}
+
+/// Settings of the simulation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SimulationSettings {
+    /// Rate of the loop, Hz.
+    pub rate_hz: f64,
+    /// Duration of the insertion, s.
+    pub insertion_s: f64,
+    /// Time simulated after the start of the needle, s.
+    pub duration_s: f64,
+    /// Depth of the insertion, length.
+    pub depth: f64,
+    /// Rate of the target sensor, Hz.
+    pub target_rate_hz: f64,
+    /// Latency of the target sensor, ms.
+    pub target_latency_ms: f64,
+    /// Standard deviation of the target sensor's noise per component, length.
+    pub noise: f64,
+    /// Time constant of the paddle's lag, ms.
+    pub paddle_lag_ms: f64,
+    /// Delay of the paddle, ticks.
+    pub paddle_delay_ticks: u32,
+    /// Part of its command that the paddle reaches.
+    pub paddle_gain: f64,
+    /// Largest speed of the paddle, length/s.
+    pub paddle_max_rate: f64,
+    /// Largest displacement of the paddle, length.
+    pub paddle_max_displacement: f64,
+}
+
+/// The undeformed scene.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Geometry {
+    /// The body's outline.
+    pub outline: Vec<[f64; 2]>,
+    /// Immobile parts of the boundary.
+    pub immobile: Vec<Vec<[f64; 2]>>,
+    /// Tissue that moves with the needle.
+    pub needle_contact: Vec<[f64; 2]>,
+    /// Unit direction of insertion.
+    pub needle_axis: [f64; 2],
+    /// Unit direction orthogonal to it.
+    pub orthogonal: [f64; 2],
+    /// Target at rest.
+    pub target: [f64; 2],
+    /// Paddle positions.
+    pub paddles: Vec<PaddleGeometry>,
+    /// Inclusions of the tissue `inclusion`.
+    pub inclusions: Vec<Vec<[f64; 2]>>,
+    /// Nodes at rest.
+    pub nodes: Vec<[f64; 2]>,
+}
+
+/// A paddle position.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PaddleGeometry {
+    /// Its index in the scene.
+    pub index: u32,
+    /// Its two ends.
+    pub segment: [[f64; 2]; 2],
+}
+
+/// The placement study of one tissue.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlacementResult {
+    /// `homogeneous` or `inclusion`.
+    pub tissue: String,
+    /// Nodes of the model.
+    pub nodes: usize,
+    /// Its integration rule.
+    pub integration: String,
+    /// Duration of the study, s.
+    pub wall_s: f64,
+    /// Best static paddle.
+    pub best_static: u32,
+    /// Best dynamic paddle.
+    pub best_dynamic: u32,
+    /// All paddles.
+    pub paddles: Vec<PaddlePlacement>,
+}
+
+/// One paddle in a placement study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PaddlePlacement {
+    /// Its index in the scene.
+    pub index: u32,
+    /// d(target displacement)/d(paddle displacement) at depth 0, rows target.
+    pub jacobian: [[f64; 2]; 2],
+    /// ‖J⁻¹n‖.
+    pub controllability_measure: f64,
+    /// J⁻¹n.
+    pub best_direction: [f64; 2],
+    /// Depths of the static study, length.
+    pub depth: Vec<f64>,
+    /// Orthogonal target displacement there, length.
+    pub orthogonal: Vec<f64>,
+    /// Largest of these, absolute.
+    pub max_orthogonal: f64,
+    /// Depth reached, length.
+    pub reached_depth: f64,
+    /// Why the study ended before the full depth.
+    pub failure: Option<String>,
+}
+
+/// Strategies on one tissue with one table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CaseResult {
+    /// Tissue of the simulation.
+    pub tissue: String,
+    /// Tissue that the planner and the table believed in.
+    pub table_tissue: String,
+    /// The table.
+    pub table: TableResult,
+    /// The strategies.
+    pub strategies: Strategies,
+    /// Largest error of `static` over that of `dynamic`.
+    pub improvement: Option<f64>,
+}
+
+/// A controller table in short.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TableResult {
+    /// SHA-256 of its bytes.
+    pub hash: String,
+    /// SHA-256 of the scene that it was made from.
+    pub scene_hash: String,
+    /// Its paddle.
+    pub paddle: u32,
+    /// Its depth knots.
+    pub knots: usize,
+    /// Its size, bytes.
+    pub bytes: usize,
+    /// Gain per target sample that the controller derives with it.
+    pub loop_gain: f64,
+    /// Delay of the loop, target samples.
+    pub delay_samples: u32,
+    /// Depths of its knots, length.
+    pub depth: Vec<f64>,
+    /// Feed-forward path of the paddle, length.
+    pub paddle_path: Vec<[f64; 2]>,
+}
+
+/// What was compared. Absent strategies were not asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Strategies {
+    /// No paddle.
+    pub none: Option<StrategyResult>,
+    /// The best static paddle of the table's tissue, held.
+    #[serde(rename = "static")]
+    pub fixture: Option<StrategyResult>,
+    /// The table's paddle, controlled.
+    pub dynamic: Option<StrategyResult>,
+    /// The same on the machine's clock.
+    pub dynamic_free_run: Option<StrategyResult>,
+}
+
+/// One simulated insertion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct StrategyResult {
+    /// What drove time.
+    pub mode: RunMode,
+    /// The attached paddle.
+    pub paddle: Option<u32>,
+    /// Largest true target displacement orthogonal to the needle over the whole insertion, length.
+    pub max_orthogonal_error: f64,
+    /// Depth at which it occurs, length.
+    pub max_error_depth: f64,
+    /// Its root mean square, length.
+    pub rms_orthogonal_error: f64,
+    /// Length of the paddle's way.
+    pub paddle_travel: f64,
+    /// State of the controller at the end: `RUN`, `HOLD`, `SAFE`; `none` without one.
+    pub final_state: String,
+    /// Every fault that was ever present.
+    pub faults: String,
+    /// Accounts of samples and ticks.
+    pub ledger: Option<LedgerResult>,
+    /// Timing of the controller's loop; free-run only.
+    pub timing: Option<LoopTiming>,
+    /// Timing of the plant's loop; free-run only.
+    pub plant_timing: Option<LoopTiming>,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// SHA-256 of the table's bytes.
+    pub table_hash: Option<String>,
+    /// SHA-256 of the plant's scene.
+    pub scene_hash: String,
+    /// The recording beside the result, and its SHA-256.
+    pub recording: Option<RecordingResult>,
+    /// The time series beside the result.
+    pub csv: Option<String>,
+    /// The insertion in at most 500 points.
+    pub series: Vec<SeriesPoint>,
+    /// Nodes at the end.
+    pub deformed_nodes: Vec<[f64; 2]>,
+    /// The body along the way, for drawings; results of older versions have none.
+    #[serde(default)]
+    pub frames: Vec<Frame>,
+    /// Mean duration of a plant step, µs; not part of what is reproducible.
+    pub plant_step_us: f64,
+    /// Which model answered for the tissue, and how well; results of older versions do not say.
+    #[serde(default)]
+    pub plant: crate::world::tissue::PlantAccount,
+}
+
+/// The body at one moment of the insertion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Frame {
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Nodes there.
+    pub nodes: Vec<[f64; 2]>,
+}
+
+/// A recording file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordingResult {
+    /// File name.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+    /// Its ticks.
+    pub ticks: u64,
+}
+
+/// A point of a time series.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SeriesPoint {
+    /// Time since the start of the needle, s.
+    pub time_s: f64,
+    /// Needle depth, length.
+    pub depth: f64,
+    /// True target displacement along n, length.
+    pub orthogonal_error: f64,
+    /// True target displacement along the axis, length.
+    pub axial: f64,
+    /// Paddle displacement, length.
+    pub paddle: [f64; 2],
+}
+
+/// All accounts of one run of the controller.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct LedgerResult {
+    /// Needle samples.
+    pub needle: StreamResult,
+    /// Target samples.
+    pub target: StreamResult,
+    /// Paddle samples.
+    pub paddle: StreamResult,
+    /// Commands.
+    pub command: StreamResult,
+    /// Ticks.
+    pub ticks: TickResult,
+    /// Sum of everything without an entry: 0.
+    pub unaccounted: u64,
+}
+
+/// One stream: published = consumed + overwritten + discarded + in flight.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct StreamResult {
+    /// Counted by the sender.
+    pub published: u64,
+    /// Used by the receiver.
+    pub consumed: u64,
+    /// Replaced by a newer one before anybody looked.
+    pub overwritten: u64,
+    /// Looked at and refused.
+    pub discarded: u64,
+    /// Refusals by reason, those that occurred.
+    pub discarded_for: Vec<(String, u64)>,
+    /// Published, and not looked at any more when the receiver stopped.
+    pub in_flight: u64,
+    /// Publications without an entry: 0.
+    pub unaccounted: u64,
+}
+
+/// Ticks: due = RUN + HOLD + SAFE + skipped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct TickResult {
+    /// Came due.
+    pub due: u64,
+    /// Ended in RUN.
+    pub run: u64,
+    /// Ended in HOLD.
+    pub hold: u64,
+    /// Ended in SAFE.
+    pub safe: u64,
+    /// Never started.
+    pub skipped: u64,
+    /// Due ticks without an entry: 0.
+    pub unaccounted: u64,
+}
+
+/// Timing of a loop on the machine's clock.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LoopTiming {
+    /// Rate, Hz.
+    pub rate_hz: f64,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Steps that ended more than a period after their release.
+    pub deadline_misses: u64,
+    /// Steps that ended after the next release, and wake-ups a period late.
+    pub overruns: u64,
+    /// Periods skipped.
+    pub skipped: u64,
+    /// What the operating system granted.
+    pub scheduling: Scheduling,
+    /// Start minus release.
+    pub release_lateness: Distribution,
+    /// End minus start.
+    pub execution_time: Distribution,
+    /// End minus release.
+    pub response_time: Distribution,
+}
+
+/// A distribution of durations, ns.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Distribution {
+    /// Number of values.
+    pub count: u64,
+    /// Smallest.
+    pub min_ns: u64,
+    /// Median.
+    pub p50_ns: u64,
+    /// 99 %.
+    pub p99_ns: u64,
+    /// 99.9 %.
+    pub p999_ns: u64,
+    /// 99.99 %.
+    pub p9999_ns: u64,
+    /// Largest.
+    pub max_ns: u64,
+    /// Mean.
+    pub mean_ns: f64,
+    /// Histogram: bin of 1 µs (its lower end, µs) and count; empty bins are left out.
+    pub bins_us: Vec<(u64, u64)>,
+}

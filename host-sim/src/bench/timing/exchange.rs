@@ -1,0 +1,196 @@
+//! The whole exchange with another process: sample published → command received, with both sides polling.
+
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixDatagram;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use firmware::contract::{PaddleCommand, Table};
+use iceoryx2::service::ipc;
+
+use super::peer::{Bare, DATAGRAM, Exchange};
+use super::stimulus::Stimulus;
+use crate::error::SimError;
+use crate::exchange::{Departure, PlantPorts, Space};
+use crate::runtime::clock::now_ns;
+use crate::runtime::signals;
+use crate::world::loop_settings::LoopArgs;
+
+/// How long the other process may take to be there, and to answer.
+const TIMEOUT: Duration = Duration::from_secs(10);
+
+/// What all exchanges have in common.
+#[derive(Clone, Debug)]
+pub(super) struct Partner<'t> {
+    pub(super) program: PathBuf,
+    pub(super) table: &'t Table<f64, 2>,
+    pub(super) table_file: PathBuf,
+    pub(super) loop_args: LoopArgs,
+    pub(super) cpu: Option<usize>,
+    pub(super) priority: u8,
+}
+
+/// An exchange with a process that polls.
+pub(super) struct Running {
+    ends: Ends,
+    child: Child,
+    space: Space,
+    stimulus: Stimulus,
+    last: [f64; 2],
+}
+
+enum Ends {
+    Link(Box<PlantPorts<ipc::Service>>),
+    Bare(Bare),
+    Socket(UnixDatagram),
+    Closed,
+}
+
+fn child(partner: &Partner<'_>, exchange: &str, space: &Space, stdin: Stdio) -> Result<Child, SimError> {
+    let mut command = Command::new(&partner.program);
+    command.args(["timing-peer", "--exchange", exchange, "--link", space.name()]);
+    command.arg("--table").arg::<&Path>(&partner.table_file);
+    command.args(["--rate", &partner.loop_args.rate.to_string(), "--priority", &partner.priority.to_string()]);
+    if let Some(cpu) = partner.cpu {
+        command.args(["--cpu", &cpu.to_string()]);
+    }
+    command.stdin(stdin).stdout(Stdio::null()).spawn().map_err(SimError::Spawn)
+}
+
+fn wait(child: &mut Child, ready: impl Fn() -> bool) -> Result<(), SimError> {
+    let until = Instant::now() + TIMEOUT;
+    while !ready() {
+        signals::check()?;
+        if let Ok(Some(status)) = child.try_wait() {
+            return Err(SimError::PeerDied { peer: "timing", how: crate::runtime::peer::describe(&status) });
+        }
+        if Instant::now() > until {
+            return Err(SimError::PeerSilent { peer: "timing", silent_s: TIMEOUT.as_secs_f64() });
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    Ok(())
+}
+
+impl Running {
+    /// Starts the other process and waits until it polls.
+    pub(super) fn start(partner: &Partner<'_>, exchange: Exchange) -> Result<Self, SimError> {
+        let space = Space::unique()?;
+        let stimulus = Stimulus::new(partner.table, &partner.loop_args);
+        let (ends, mut child) = match exchange {
+            Exchange::Link => {
+                let ports = PlantPorts::open(&space)?;
+                (Ends::Link(Box::new(ports)), child(partner, "link", &space, Stdio::null())?)
+            }
+            Exchange::Bare => {
+                let bare = Bare::open(&space, "ping", "pong")?;
+                (Ends::Bare(bare), child(partner, "bare", &space, Stdio::null())?)
+            }
+            Exchange::Socket => {
+                let (ours, theirs) = UnixDatagram::pair().map_err(SimError::Spawn)?;
+                ours.set_nonblocking(true).map_err(SimError::Spawn)?;
+                (Ends::Socket(ours), child(partner, "socket", &space, OwnedFd::from(theirs).into())?)
+            }
+        };
+        match &ends {
+            Ends::Link(ports) => {
+                wait(&mut child, || ports.has_peer())?;
+                ports.connect()?;
+            }
+            Ends::Bare(bare) => wait(&mut child, || bare.has_peer())?,
+            Ends::Socket(_) | Ends::Closed => {}
+        }
+        // It has to reach its polling loop.
+        std::thread::sleep(Duration::from_millis(20));
+        Ok(Self { ends, child, space, stimulus, last: [0.0; 2] })
+    }
+
+    /// One exchange; returns when the sample was published and when the command was received, ns.
+    pub(super) fn once(&mut self) -> Result<(u64, u64), SimError> {
+        let measured_ns = now_ns();
+        let samples = self.stimulus.samples(measured_ns, self.last);
+        let silent = || SimError::PeerSilent { peer: "timing", silent_s: TIMEOUT.as_secs_f64() };
+        match &mut self.ends {
+            Ends::Link(ports) => {
+                // The needle is what the other side polls: it comes last, when all is there.
+                ports.paddle.send(samples.paddle)?;
+                if let Some(target) = samples.target {
+                    ports.target.send(target)?;
+                }
+                let start_ns = now_ns();
+                ports.needle.send(samples.needle)?;
+                let mut outcome = Ok(None);
+                spin(|| {
+                    outcome = ports.command.oldest();
+                    !matches!(outcome, Ok(None))
+                });
+                let end_ns = now_ns();
+                self.last = outcome?.ok_or_else(silent)?.displacement;
+                Ok((start_ns, end_ns))
+            }
+            Ends::Bare(bare) => {
+                let start_ns = now_ns();
+                bare.send([measured_ns; 8])?;
+                let mut outcome = Ok(None);
+                spin(|| {
+                    outcome = bare.receive();
+                    !matches!(outcome, Ok(None))
+                });
+                let end_ns = now_ns();
+                outcome?.ok_or_else(silent)?;
+                Ok((start_ns, end_ns))
+            }
+            Ends::Socket(socket) => {
+                let mut buffer = [0; DATAGRAM];
+                let start_ns = now_ns();
+                let datagram = (samples.needle, samples.target, samples.paddle);
+                let bytes = postcard::to_slice(&datagram, &mut buffer).map_err(|_| silent())?;
+                socket.send(bytes).map_err(SimError::Spawn)?;
+                let mut answer = [0; DATAGRAM];
+                let mut length = None;
+                spin(|| {
+                    length = socket.recv(&mut answer).ok();
+                    length.is_some()
+                });
+                let command = length.and_then(|length| postcard::from_bytes::<PaddleCommand>(&answer[..length]).ok());
+                let end_ns = now_ns();
+                self.last = command.ok_or_else(silent)?.displacement;
+                Ok((start_ns, end_ns))
+            }
+            Ends::Closed => Err(silent()),
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Ends::Socket(socket) = &self.ends {
+            let _ = socket.send(&[]);
+        }
+        self.ends = Ends::Closed;
+        // It has seen by itself that nobody is left; an unreaped child would count as alive.
+        let until = Instant::now() + Duration::from_secs(2);
+        while !matches!(self.child.try_wait(), Ok(Some(_))) {
+            if Instant::now() > until {
+                let _ = self.child.kill();
+                let _ = self.child.wait();
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        self.space.leave::<ipc::Service>(Departure::Last);
+    }
+}
+
+fn spin(mut done: impl FnMut() -> bool) {
+    let mut polls: u32 = 0;
+    let mut since = None;
+    while !done() {
+        std::hint::spin_loop();
+        polls = polls.wrapping_add(1);
+        if polls.is_multiple_of(1 << 16) && since.get_or_insert_with(Instant::now).elapsed() > TIMEOUT {
+            return;
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! The command line.
+
+pub mod board;
+pub mod controller;
+pub mod export;
+pub mod faults;
+pub mod plant;
+pub mod schema;
+pub mod stability;
+
+use std::path::PathBuf;
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+use crate::bench::comparison::{RunArgs, run};
+use crate::bench::timing::peer::{PeerArgs, peer};
+use crate::bench::timing::{TimingArgs, timing};
+use crate::commands::board::{BoardArgs, board};
+use crate::commands::controller::{ControllerArgs, serve};
+use crate::commands::export::{ExportArgs, export};
+use crate::commands::faults::{FaultsArgs, faults};
+use crate::commands::plant::{PlantArgs, plant};
+use crate::commands::schema::{Subject, schema};
+use crate::commands::stability::{StabilityArgs, stability};
+use crate::error::SimError;
+use crate::record::replay;
+use crate::report::directory;
+
+/// Simulates needle insertions with a paddle that holds the target still. Without a command: `run` on the paper's scene
+#[derive(Debug, Parser)]
+#[command(version, about, args_conflicts_with_subcommands = true)]
+#[command(after_help = "Example: host-sim run --tissue inclusion --seed 7 --out my-report")]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Options of `run`.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Compares no paddle, the best static and the best dynamic paddle, and writes a report
+    #[command(
+        after_help = "Examples:\n  host-sim run\n  host-sim run --tissue inclusion --table-tissue homogeneous --noise 0\n  host-sim run --scene my.toml --mode free-run --rate 500 --json result.json"
+    )]
+    Run(Box<RunArgs>),
+    /// The controller's side of a link by hand
+    #[command(
+        after_help = "Example, in two terminals:\n  model-offline table paper -o paper.table && host-sim controller --table paper.table\n  host-sim plant --scene paper"
+    )]
+    Controller(ControllerArgs),
+    /// The plant's side of a link by hand
+    #[command(
+        after_help = "Example, in two terminals:\n  host-sim controller --table paper.table --mode free-run\n  host-sim plant --scene paper --mode free-run"
+    )]
+    Plant(Box<PlantArgs>),
+    /// Checks the fixed-rate loop against an empty one
+    #[command(
+        after_help = "Examples:\n  host-sim timing --rate 1000 --seconds 10 --out timing\n  host-sim timing --sweep --cpu 0"
+    )]
+    Timing(TimingArgs),
+    /// The other process of `timing`
+    #[command(hide = true)]
+    TimingPeer(PeerArgs),
+    /// Injects every fault of the catalogue and accounts for everything
+    #[command(
+        after_help = "Examples:\n  host-sim faults --out faults\n  host-sim faults --only 16,23 --seed 7\n  nice host-sim faults --only 1 --seeds 4000"
+    )]
+    Faults(FaultsArgs),
+    /// Where the closed loop stops being stable: simulated beside theory
+    #[command(after_help = "Example: host-sim stability --out stability --quick")]
+    Stability(StabilityArgs),
+    /// Runs the controller again on recorded inputs and compares bit by bit
+    #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
+    Replay {
+        /// Recording, as `run` writes it
+        recording: PathBuf,
+    },
+    /// Measures the controller's bare-metal images on a Cortex-M7 in QEMU
+    #[command(
+        after_help = "Example:\n  host-sim run --tissue inclusion --mode lockstep --insertion-time 1.5 --out short\n  host-sim board short/inclusion-dynamic.rec --budget firmware/image/budget.toml"
+    )]
+    Board(BoardArgs),
+    /// Writes a recording as MCAP (Foxglove, Lichtblick) or CSV with a time column (PlotJuggler)
+    #[command(
+        after_help = "Example: host-sim export stillpoint-report/inclusion-dynamic.rec --mcap run.mcap --csv run.csv"
+    )]
+    Export(ExportArgs),
+    /// Prints the JSON Schema of what is written as JSON
+    #[command(after_help = "Example: host-sim schema result > result.schema.json")]
+    Schema {
+        /// What the schema is about
+        #[arg(value_enum, default_value_t)]
+        of: Subject,
+    },
+    /// Prints a completion script for a shell
+    #[command(after_help = "Example: host-sim completions bash > ~/.local/share/bash-completion/completions/host-sim")]
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Writes manual pages, one for every command
+    #[command(after_help = "Example: host-sim man man1 && man ./man1/host-sim.1")]
+    Man {
+        /// Directory for the pages
+        directory: PathBuf,
+    },
+    /// Makes the report of a finished run again
+    #[command(
+        after_help = "Examples:\n  host-sim report stillpoint-report\n  host-sim report stillpoint-report --svg-dir figures"
+    )]
+    Report {
+        /// Directory of the run
+        directory: PathBuf,
+        /// Also write the charts here, as SVG files
+        #[arg(long, value_name = "DIR")]
+        svg_dir: Option<PathBuf>,
+    },
+}
+
+/// Does what was asked for.
+///
+/// # Errors
+/// [`SimError`], with its exit code.
+pub fn execute(cli: Cli) -> Result<(), SimError> {
+    match cli.command {
+        None => run(&cli.run).map(drop),
+        Some(Command::Run(args)) => run(&args).map(drop),
+        Some(Command::Controller(args)) => serve(&args),
+        Some(Command::Plant(args)) => plant(&args),
+        Some(Command::Timing(args)) => timing(&args).map(drop),
+        Some(Command::Stability(args)) => stability(&args).map(drop),
+        Some(Command::TimingPeer(args)) => peer(&args),
+        Some(Command::Export(args)) => export(&args),
+        Some(Command::Schema { of }) => {
+            println!("{:#}", schema(of));
+            Ok(())
+        }
+        Some(Command::Completions { shell }) => {
+            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut std::io::stdout());
+            Ok(())
+        }
+        Some(Command::Man { directory }) => {
+            let write = |source| SimError::Write { path: directory.clone(), source };
+            std::fs::create_dir_all(&directory).map_err(write)?;
+            clap_mangen::generate_to(Cli::command(), &directory).map_err(write)?;
+            println!("{}", directory.join("host-sim.1").display());
+            Ok(())
+        }
+        Some(Command::Faults(args)) => faults(&args).map(drop),
+        Some(Command::Board(args)) => board(&args),
+        Some(Command::Replay { recording }) => {
+            let replayed = replay::replay_file(&recording)?;
+            println!(
+                "{} of {} commands agree bit by bit ({}, seed {})",
+                replayed.ticks, replayed.ticks, replayed.mode, replayed.seed
+            );
+            Ok(())
+        }
+        Some(Command::Report { directory, svg_dir }) => {
+            directory::rebuild_report(&directory)?;
+            println!("{}", directory.join("report.html").display());
+            for path in svg_dir.map_or_else(|| Ok(Vec::new()), |into| directory::write_pictures(&directory, &into))? {
+                println!("{}", path.display());
+            }
+            Ok(())
+        }
+    }
+}
+
+/// Commands of the other program of this project, for those who mix them up.
+const ELSEWHERE: [&str; 8] = ["place", "solve", "table", "inspect", "new", "fit", "pareto", "stability"];
+
+/// Reads the command line; ends the process with help, or with what is wrong and what was meant.
+pub fn parse() -> Cli {
+    Cli::try_parse().unwrap_or_else(|error| {
+        let wrong = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
+        // `run` is also what happens without a command: a wrong word is then an argument that is not expected.
+        let word = wrong.or_else(|| error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string));
+        let _ = error.print();
+        if let Some(word) = word {
+            if ELSEWHERE.contains(&word.as_str()) {
+                eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
+            } else {
+                model_offline::output::terminal::suggest(&error, &word, &Cli::command());
+            }
+        }
+        std::process::exit(error.exit_code());
+    })
+}

@@ -1,0 +1,24 @@
+//! The shared memory between plant and controller: five publish–subscribe services of iceoryx2, and nothing else.
+//!
+//! | service | from | to | when |
+//! |---|---|---|---|
+//! | `needle`, `paddle` | plant | controller | at loop rate |
+//! | `target` | plant | controller | at the sensor's own rate, late by its latency |
+//! | `clock` | plant | controller | lockstep: every tick; free-run: start and stop |
+//! | `command` | controller | plant | one per tick |
+//!
+//! Everything is generic over the service variant: `ipc::Service` between processes, `local::Service` in tests.
+
+pub mod board;
+pub mod bytes;
+mod error;
+mod ports;
+mod space;
+mod stream;
+mod wire;
+
+pub use error::LinkError;
+pub use ports::{ControllerPorts, PlantPorts, ReceiveCounts};
+pub use space::{Departure, Space};
+pub use stream::{Receiver, Sender};
+pub use wire::{ClockFrame, ClockKind, Frame, Wire};

@@ -1,0 +1,212 @@
+//! The ports of both sides. Ports belong to the thread that uses them: create them there.
+
+use std::time::{Duration, Instant};
+
+use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
+use firmware::io::{CommandSink, SampleSource};
+use iceoryx2::node::{Node, NodeBuilder};
+use iceoryx2::prelude::SignalHandlingMode;
+use iceoryx2::service::Service;
+use serde::{Deserialize, Serialize};
+
+use super::{ClockFrame, LinkError, Receiver, Sender, Space};
+
+fn node<S: Service>(space: &Space) -> Result<Node<S>, LinkError> {
+    NodeBuilder::new()
+        .config(space.config())
+        // Signals are ours: see `crate::runtime::signals`.
+        .signal_handling_mode(SignalHandlingMode::Disabled)
+        .create::<S>()
+        .map_err(LinkError::Node)
+}
+
+/// How long a place is tried that the dead still hold, and how often.
+const DEAD_TIMEOUT: Duration = Duration::from_secs(5);
+const BETWEEN_TRIALS: Duration = Duration::from_millis(20);
+
+/// Opens a side. Where a process that was killed still holds its place, or has left it half made, clears that and tries
+/// again, for a bounded time.
+fn patiently<S: Service, P>(space: &Space, open: impl Fn() -> Result<P, LinkError>) -> Result<P, LinkError> {
+    space.check_room()?;
+    let until = Instant::now() + DEAD_TIMEOUT;
+    loop {
+        // One at a time: whoever finds something half made knows that nobody is at it.
+        let lock = space.lock()?;
+        match open() {
+            Err(_) if Instant::now() < until && space.clear_if_dead::<S>()? => {
+                drop(lock);
+                std::thread::sleep(BETWEEN_TRIALS);
+            }
+            Err(error) => return Err(error),
+            Ok(ports) => {
+                space.secure()?;
+                return Ok(ports);
+            }
+        }
+    }
+}
+
+/// The side of tissue, sensors and actuator.
+#[derive(Debug)]
+pub struct PlantPorts<S: Service> {
+    /// Needle samples out.
+    pub needle: Sender<S, NeedleSample>,
+    /// Target samples out.
+    pub target: Sender<S, TargetSample>,
+    /// Paddle samples out.
+    pub paddle: Sender<S, PaddleSample>,
+    /// Clock frames out.
+    pub clock: Sender<S, ClockFrame>,
+    /// Commands in.
+    pub command: Receiver<S, PaddleCommand>,
+    space: Space,
+    // Ports go before their node.
+    _node: Node<S>,
+}
+
+impl<S: Service> PlantPorts<S> {
+    /// Opens the plant's side.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn open(space: &Space) -> Result<Self, LinkError> {
+        patiently::<S, _>(space, || {
+            let node = node::<S>(space)?;
+            Ok(Self {
+                command: Receiver::new(&node)?,
+                needle: Sender::new(&node)?,
+                target: Sender::new(&node)?,
+                paddle: Sender::new(&node)?,
+                clock: Sender::new(&node)?,
+                space: space.clone(),
+                _node: node,
+            })
+        })
+    }
+
+    /// Whether the controller has opened its side.
+    pub fn has_peer(&self) -> bool {
+        self.needle.has_reader()
+            && self.target.has_reader()
+            && self.paddle.has_reader()
+            && self.clock.has_reader()
+            && self.command.has_writer()
+    }
+
+    /// Connects to the controller; call once it is there and before the first frame.
+    ///
+    /// # Errors
+    /// [`LinkError::Connect`].
+    pub fn connect(&self) -> Result<(), LinkError> {
+        self.needle.connect()?;
+        self.target.connect()?;
+        self.paddle.connect()?;
+        self.clock.connect()?;
+        self.space.secure()
+    }
+}
+
+/// What a receiver counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReceiveCounts {
+    /// Frames taken out of the buffer.
+    pub received: u64,
+    /// Of these, received together with a newer one and not used.
+    pub superseded: u64,
+}
+
+/// The side of the controller.
+#[derive(Debug)]
+pub struct ControllerPorts<S: Service> {
+    needle: Receiver<S, NeedleSample>,
+    target: Receiver<S, TargetSample>,
+    paddle: Receiver<S, PaddleSample>,
+    /// Clock frames in.
+    pub clock: Receiver<S, ClockFrame>,
+    /// Commands out.
+    pub command: Sender<S, PaddleCommand>,
+    /// First failure of a read: the traits of `firmware` cannot return it, the next send does.
+    failed: Option<LinkError>,
+    space: Space,
+    _node: Node<S>,
+}
+
+impl<S: Service> ControllerPorts<S> {
+    /// Opens the controller's side; its command publisher comes last and tells the plant that all is ready.
+    ///
+    /// # Errors
+    /// [`LinkError`]; [`LinkError::Taken`] for a second controller.
+    pub fn open(space: &Space) -> Result<Self, LinkError> {
+        patiently::<S, _>(space, || {
+            let node = node::<S>(space)?;
+            Ok(Self {
+                needle: Receiver::new(&node)?,
+                target: Receiver::new(&node)?,
+                paddle: Receiver::new(&node)?,
+                clock: Receiver::new(&node)?,
+                command: Sender::new(&node)?,
+                failed: None,
+                space: space.clone(),
+                _node: node,
+            })
+        })
+    }
+
+    /// Whether the plant has opened its side.
+    pub fn has_peer(&self) -> bool {
+        self.command.has_reader() && self.clock.has_writer()
+    }
+
+    /// Connects to the plant; call once it is there.
+    ///
+    /// # Errors
+    /// [`LinkError::Connect`].
+    pub fn connect(&self) -> Result<(), LinkError> {
+        self.command.connect()?;
+        self.space.secure()
+    }
+
+    /// What the receivers of needle, target and paddle samples counted.
+    pub fn counts(&self) -> [ReceiveCounts; 3] {
+        [counts(&self.needle), counts(&self.target), counts(&self.paddle)]
+    }
+
+    fn keep<F>(&mut self, outcome: Result<Option<F>, LinkError>) -> Option<F> {
+        outcome.unwrap_or_else(|error| {
+            self.failed.get_or_insert(error);
+            None
+        })
+    }
+}
+
+fn counts<S: Service, F: super::Frame>(receiver: &Receiver<S, F>) -> ReceiveCounts {
+    ReceiveCounts { received: receiver.received(), superseded: receiver.superseded() }
+}
+
+impl<S: Service> SampleSource for ControllerPorts<S> {
+    fn needle(&mut self) -> Option<NeedleSample> {
+        let outcome = self.needle.newest();
+        self.keep(outcome)
+    }
+
+    fn target(&mut self) -> Option<TargetSample> {
+        let outcome = self.target.newest();
+        self.keep(outcome)
+    }
+
+    fn paddle(&mut self) -> Option<PaddleSample> {
+        let outcome = self.paddle.newest();
+        self.keep(outcome)
+    }
+}
+
+impl<S: Service> CommandSink for ControllerPorts<S> {
+    type Error = LinkError;
+
+    fn send(&mut self, command: &PaddleCommand) -> Result<(), LinkError> {
+        if let Some(error) = self.failed.take() {
+            return Err(error);
+        }
+        self.command.send(*command)
+    }
+}

@@ -1,6 +1,0 @@
-//! Files that other tools open: MCAP for Foxglove and Lichtblick, VTU series for ParaView, tables for everything else.
-
-pub mod command;
-pub mod mcap;
-pub mod paraview;
-pub mod schema;

@@ -1,0 +1,237 @@
+//! A recording as [MCAP](https://mcap.dev): five topics of JSON messages, each with its JSON Schema.
+//!
+//! | topic | one message per | log time |
+//! |---|---|---|
+//! | `/needle`, `/target`, `/paddle` | sample that the controller used, with the time of its measurement | arrival |
+//! | `/command` | tick of the controller | tick |
+//! | `/truth` | tick of the plant | tick |
+//!
+//! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
+//! free-run. A metadata record `stillpoint` says which, with seed and hashes.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::sync::Arc;
+
+use ::mcap::records::Metadata;
+use ::mcap::{Channel, McapError, Message, Schema, Writer};
+use firmware::{Faults, Mode};
+use schemars::{JsonSchema, schema_for};
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use crate::bench::strategy::hex;
+use crate::commands::controller::mode_name;
+use crate::record::recording::{Recording, RunMode};
+
+/// A sample of the needle's encoder.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct NeedleMessage {
+    /// Number of the sample.
+    pub sequence: u32,
+    /// Time of the measurement, s.
+    pub measured_s: f64,
+    /// Depth, length.
+    pub depth: f64,
+    /// Velocity, length/s.
+    pub velocity: f64,
+}
+
+/// A sample of the target sensor.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TargetMessage {
+    /// Number of the sample.
+    pub sequence: u32,
+    /// Time of the measurement, s.
+    pub measured_s: f64,
+    /// Measured displacement along x, length.
+    pub x: f64,
+    /// Measured displacement along y, length.
+    pub y: f64,
+}
+
+/// A sample of the paddle's encoder.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PaddleMessage {
+    /// Number of the sample.
+    pub sequence: u32,
+    /// Time of the measurement, s.
+    pub measured_s: f64,
+    /// Index of the attached paddle.
+    pub paddle_index: u32,
+    /// Displacement along x, length.
+    pub x: f64,
+    /// Displacement along y, length.
+    pub y: f64,
+}
+
+/// A command of the controller.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct CommandMessage {
+    /// Tick.
+    pub tick: u64,
+    /// RUN, HOLD or SAFE.
+    pub state: String,
+    /// Faults present, by name.
+    pub faults: String,
+    /// Commanded displacement along x, length; none before the paddle's place is known.
+    pub x: Option<f64>,
+    /// Commanded displacement along y, length.
+    pub y: Option<f64>,
+}
+
+/// What really happened, which the controller does not see.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct TruthMessage {
+    /// Tick.
+    pub tick: u64,
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Target displacement along x, length.
+    pub target_x: f64,
+    /// Target displacement along y, length.
+    pub target_y: f64,
+    /// Target displacement orthogonal to the needle, length.
+    pub orthogonal_error: f64,
+    /// Paddle displacement along x, length.
+    pub paddle_x: f64,
+    /// Paddle displacement along y, length.
+    pub paddle_y: f64,
+}
+
+/// Topic and schema of every kind of message.
+pub fn schemas() -> [(&'static str, schemars::Schema); 5] {
+    [
+        ("/needle", schema_for!(NeedleMessage)),
+        ("/target", schema_for!(TargetMessage)),
+        ("/paddle", schema_for!(PaddleMessage)),
+        ("/command", schema_for!(CommandMessage)),
+        ("/truth", schema_for!(TruthMessage)),
+    ]
+}
+
+fn seconds(time_ns: u64) -> f64 {
+    time_ns as f64 * 1e-9
+}
+
+/// Channels by topic, with a running number each.
+struct Topics(BTreeMap<&'static str, (Arc<Channel<'static>>, u32)>);
+
+impl Topics {
+    fn new() -> Self {
+        let channels = schemas().into_iter().enumerate().map(|(i, (topic, schema))| {
+            let name = schema.as_value()["title"].as_str().unwrap_or("Message").to_owned();
+            let schema = Schema {
+                id: i as u16 + 1,
+                name: format!("stillpoint.{name}"),
+                encoding: "jsonschema".to_owned(),
+                data: Cow::Owned(schema.as_value().to_string().into_bytes()),
+            };
+            let channel = Channel {
+                id: i as u16 + 1,
+                topic: topic.to_owned(),
+                schema: Some(Arc::new(schema)),
+                message_encoding: "json".to_owned(),
+                metadata: BTreeMap::new(),
+            };
+            (topic, (Arc::new(channel), 0))
+        });
+        Self(channels.collect())
+    }
+
+    fn write(
+        &mut self,
+        writer: &mut Writer<Cursor<Vec<u8>>>,
+        topic: &str,
+        log_time: u64,
+        publish_time: u64,
+        message: &impl Serialize,
+    ) -> Result<(), McapError> {
+        let Some((channel, sequence)) = self.0.get_mut(topic) else { return Ok(()) };
+        *sequence += 1;
+        let data = serde_json::to_vec(message).unwrap_or_default();
+        writer.write(&Message {
+            channel: Arc::clone(channel),
+            sequence: *sequence,
+            log_time,
+            publish_time,
+            data: Cow::Owned(data),
+        })
+    }
+}
+
+/// The recording as an MCAP file; `orthogonal` is n.
+///
+/// # Errors
+/// [`McapError`] of the writer.
+pub fn encode(recording: &Recording, orthogonal: [f64; 2]) -> Result<Vec<u8>, McapError> {
+    let options = ::mcap::WriteOptions::new().compression(None).profile("").library("host-sim");
+    let mut writer = options.create(Cursor::new(Vec::new()))?;
+    let mut topics = Topics::new();
+    for record in &recording.records {
+        let (inputs, command) = (&record.exchange.inputs, &record.exchange.command);
+        let now = inputs.time_ns;
+        if let Some(s) = &inputs.needle {
+            let message = NeedleMessage {
+                sequence: s.sequence,
+                measured_s: seconds(s.time_ns),
+                depth: s.depth,
+                velocity: s.velocity,
+            };
+            topics.write(&mut writer, "/needle", now, s.time_ns, &message)?;
+        }
+        if let Some(s) = &inputs.target {
+            let [x, y] = s.displacement;
+            let message = TargetMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), x, y };
+            topics.write(&mut writer, "/target", now, s.time_ns, &message)?;
+        }
+        if let Some(s) = &inputs.paddle {
+            let (paddle_index, [x, y]) = (s.paddle_index, s.displacement);
+            let message = PaddleMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), paddle_index, x, y };
+            topics.write(&mut writer, "/paddle", now, s.time_ns, &message)?;
+        }
+        let place = command.is_valid().then_some(command.displacement);
+        let message = CommandMessage {
+            tick: inputs.tick,
+            state: Mode::from_wire(command.state).map_or("?", mode_name).to_owned(),
+            faults: Faults::from_bits(command.faults).to_string(),
+            x: place.map(|place| place[0]),
+            y: place.map(|place| place[1]),
+        };
+        topics.write(&mut writer, "/command", now, now, &message)?;
+        if let Some(truth) = &record.truth {
+            let message = TruthMessage {
+                tick: truth.tick,
+                depth: truth.depth,
+                target_x: truth.target[0],
+                target_y: truth.target[1],
+                orthogonal_error: truth.target[0] * orthogonal[0] + truth.target[1] * orthogonal[1],
+                paddle_x: truth.paddle[0],
+                paddle_y: truth.paddle[1],
+            };
+            topics.write(&mut writer, "/truth", truth.time_ns, truth.time_ns, &message)?;
+        }
+    }
+    writer.write_metadata(&Metadata { name: "stillpoint".to_owned(), metadata: facts(recording) })?;
+    writer.finish()?;
+    Ok(writer.into_inner().into_inner())
+}
+
+fn facts(recording: &Recording) -> BTreeMap<String, String> {
+    let header = &recording.header;
+    let clock = match header.mode {
+        RunMode::Lockstep => "messages: ns since the start of the run",
+        RunMode::FreeRun => "steady clock of the machine, ns",
+    };
+    [
+        ("mode", header.mode.to_string()),
+        ("clock", clock.to_owned()),
+        ("seed", header.seed.to_string()),
+        ("scene_sha256", hex(&header.scene_hash)),
+        ("table_sha256", hex(&Sha256::digest(&header.table))),
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+    ]
+    .map(|(key, value)| (key.to_owned(), value))
+    .into()
+}

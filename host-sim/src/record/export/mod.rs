@@ -1,0 +1,4 @@
+//! Files that other tools open: MCAP for Foxglove and Lichtblick, VTU series for ParaView, tables for everything else.
+
+pub mod mcap;
+pub mod paraview;

@@ -1,0 +1,47 @@
+//! The body along an insertion as a VTU series, with a `.pvd` that gives ParaView the times.
+
+use std::fmt::Write as _;
+
+use model_offline::model::TissueModel;
+use model_offline::output::vtu::vtu;
+use model_offline::solver::equilibrium::NewtonSettings;
+use nalgebra::Vector2;
+
+use crate::bench::strategy::Artifact;
+use crate::record::recording::Truth;
+
+/// Files of a series.
+const FRAMES: usize = 20;
+
+/// The series of one insertion: `NAME.pvd` and `NAME-000.vtu`, `NAME-001.vtu`, … Times are seconds since the start of the
+/// needle. Solved again with the full model at some of the run's ticks; ends early where there is no equilibrium.
+pub fn series(
+    model: &TissueModel,
+    paddle: Option<u32>,
+    truths: &[Truth],
+    started_ns: u64,
+    name: &str,
+) -> Vec<Artifact> {
+    let position = paddle.and_then(|index| model.paddle_position(index));
+    let Ok(mut body) = model.body(position, NewtonSettings::default()) else { return Vec::new() };
+    let moving: Vec<&Truth> = truths.iter().filter(|truth| truth.time_ns >= started_ns).collect();
+    let Some(last) = moving.len().checked_sub(1) else { return Vec::new() };
+    let mut files = Vec::new();
+    let mut entries = String::new();
+    for i in 0..=FRAMES {
+        let truth = moving[last * i / FRAMES];
+        if body.drive(truth.depth, Vector2::from(truth.paddle)).is_err() {
+            break;
+        }
+        let file = format!("{name}-{i:03}.vtu");
+        let time_s = (truth.time_ns - started_ns) as f64 * 1e-9;
+        let _ = writeln!(entries, "    <DataSet timestep=\"{time_s}\" group=\"\" part=\"0\" file=\"{file}\"/>");
+        files.push(Artifact { name: file, bytes: vtu(model, &body).into_bytes() });
+    }
+    let collection = format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n  \
+         <Collection>\n{entries}  </Collection>\n</VTKFile>\n"
+    );
+    files.push(Artifact { name: format!("{name}.pvd"), bytes: collection.into_bytes() });
+    files
+}

@@ -1,0 +1,280 @@
+//! Recordings: every tick as the controller saw it, and what really happened, in a chain of hashes.
+//!
+//! Little-endian throughout:
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 8 | magic `STILLREC` |
+//! | 4 | format version |
+//! | 4 | 1 = lockstep, 2 = free-run |
+//! | 8 | seed |
+//! | 32 | SHA-256 of the plant's scene |
+//! | 32 | SHA-256 of the table's bytes |
+//! | 96 | settings of the controller, see [`Header`] |
+//! | 4 + L | length of the table, and the table itself |
+//! | 32 | chain value h₀ = SHA-256 of everything above |
+//! | n · 288 | records: 256 bytes b, and hᵢ = SHA-256(hᵢ₋₁ ‖ b) |
+//!
+//! The last record is an end mark with the number of ticks: nothing can be changed, dropped, exchanged or cut off
+//! without breaking the chain. Times of a lockstep recording come from its messages: no clock of the machine is in it.
+
+use std::path::Path;
+
+use firmware::Inputs;
+use firmware::Settings;
+use firmware::contract::PaddleCommand;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use crate::error::SimError;
+use crate::exchange::bytes::{Reader, Writer};
+
+mod layout;
+pub mod stream;
+
+pub use layout::EXCHANGE_BYTES;
+use layout::{decode_header, decode_record, encode_header, encode_record};
+
+const MAGIC: [u8; 8] = *b"STILLREC";
+const FORMAT_VERSION: u32 = 1;
+const BODY_BYTES: usize = 256;
+const HASH_BYTES: usize = 32;
+const RECORD_BYTES: usize = BODY_BYTES + HASH_BYTES;
+const END_MARK: u32 = u32::from_le_bytes(*b"END.");
+const TICK_MARK: u32 = u32::from_le_bytes(*b"TICK");
+
+/// Whether messages or the machine's clock drive time. Never mixed; every output says which it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[serde(rename_all = "kebab-case")]
+pub enum RunMode {
+    /// Time comes from the messages: deterministic, as fast as it goes.
+    Lockstep,
+    /// Steady clock, absolute deadlines.
+    FreeRun,
+}
+
+impl std::fmt::Display for RunMode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Lockstep => "lockstep",
+            Self::FreeRun => "free-run",
+        })
+    }
+}
+
+/// Everything that a replay needs besides the records.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// What drove time.
+    pub mode: RunMode,
+    /// Seed of the sensors' noise.
+    pub seed: u64,
+    /// SHA-256 of the plant's scene.
+    pub scene_hash: [u8; 32],
+    /// Settings of the controller.
+    pub settings: Settings,
+    /// The controller's table, as encoded.
+    pub table: Vec<u8>,
+}
+
+/// Reads and checks a recording file.
+///
+/// # Errors
+/// [`SimError::Read`], [`SimError::Recording`].
+pub fn read_recording(path: &Path) -> Result<Recording, SimError> {
+    let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: path.to_owned(), source })?;
+    Recording::decode(&bytes).map_err(|source| SimError::Recording { path: path.to_owned(), source })
+}
+
+/// What the controller saw and answered in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Exchange {
+    /// Inputs of the step.
+    pub inputs: Inputs,
+    /// Its command.
+    pub command: PaddleCommand,
+}
+
+/// What really happened at a tick, which the controller does not see.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Tick of the plant.
+    pub tick: u64,
+    /// Time of that tick, ns.
+    pub time_ns: u64,
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Target displacement, length.
+    pub target: [f64; 2],
+    /// Paddle displacement, length.
+    pub paddle: [f64; 2],
+}
+
+/// One tick of a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// The controller's side.
+    pub exchange: Exchange,
+    /// The plant's side; none where the plant skipped the tick, or was not asked.
+    pub truth: Option<Truth>,
+}
+
+/// A whole recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recording {
+    /// What it is about.
+    pub header: Header,
+    /// Its ticks.
+    pub records: Vec<Record>,
+}
+
+/// Why bytes are not a recording.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RecordingError {
+    /// The magic is not there.
+    #[error("this is not a recording of host-sim")]
+    NotARecording,
+    /// Another version.
+    #[error("its format version is {found}, this program reads {FORMAT_VERSION}")]
+    Version {
+        /// What was found.
+        found: u32,
+    },
+    /// The header does not hash to its chain value.
+    #[error("its header has been altered or cut off")]
+    Header,
+    /// A record does not continue the chain.
+    #[error("the chain breaks at record {record}: altered from there on; the records before are intact")]
+    Chain {
+        /// Number of the record, from 0.
+        record: usize,
+    },
+    /// The end mark is missing.
+    #[error("it ends after {records} whole records without an end mark: the run was cut off")]
+    Unfinished {
+        /// Whole records.
+        records: usize,
+    },
+    /// Something follows the end mark.
+    #[error("{bytes} bytes follow its end mark")]
+    Trailing {
+        /// How many.
+        bytes: usize,
+    },
+    /// A value that cannot be, although the chain is whole: written by something else.
+    #[error("record {record} holds an impossible value")]
+    Value {
+        /// Number of the record, from 0.
+        record: usize,
+    },
+}
+
+impl Recording {
+    /// The bytes of the file.
+    pub fn encode(&self) -> Vec<u8> {
+        let (mut chain, mut bytes) = Chain::start(&self.header);
+        for record in &self.records {
+            chain.record(record, &mut bytes);
+        }
+        chain.end(self.records.len() as u64, &mut bytes);
+        bytes
+    }
+
+    /// Reads a file and checks the whole chain.
+    ///
+    /// # Errors
+    /// [`RecordingError`], the first check that fails.
+    pub fn decode(bytes: &[u8]) -> Result<Self, RecordingError> {
+        match Self::whole_records(bytes)? {
+            (recording, true) => Ok(recording),
+            (recording, false) => Err(RecordingError::Unfinished { records: recording.records.len() }),
+        }
+    }
+
+    /// Reads what is whole of a file that may have been cut off, and whether its end mark is there.
+    ///
+    /// # Errors
+    /// [`RecordingError`] for everything but a missing end.
+    pub fn whole_records(bytes: &[u8]) -> Result<(Self, bool), RecordingError> {
+        let mut reader = Reader(bytes);
+        let header = decode_header(&mut reader)?;
+        let covered = bytes.len() - reader.0.len();
+        let mut chain: [u8; 32] = Sha256::digest(&bytes[..covered]).into();
+        if reader.array::<HASH_BYTES>() != Some(chain) {
+            return Err(RecordingError::Header);
+        }
+        let mut records = Vec::with_capacity(reader.0.len() / RECORD_BYTES);
+        loop {
+            let (Some(body), Some(written)) = (reader.array::<BODY_BYTES>(), reader.array::<HASH_BYTES>()) else {
+                return Ok((Self { header, records }, false));
+            };
+            chain = next_link(&chain, &body);
+            if written != chain {
+                return Err(RecordingError::Chain { record: records.len() });
+            }
+            let impossible = RecordingError::Value { record: records.len() };
+            let mut body = Reader(&body);
+            match body.u32() {
+                Some(TICK_MARK) => records.push(decode_record(&mut body).ok_or(impossible)?),
+                Some(END_MARK) => {
+                    let _ = body.u32();
+                    if body.u64() != Some(records.len() as u64) {
+                        return Err(impossible);
+                    }
+                    break;
+                }
+                _ => return Err(impossible),
+            }
+        }
+        if !reader.0.is_empty() {
+            return Err(RecordingError::Trailing { bytes: reader.0.len() });
+        }
+        Ok((Self { header, records }, true))
+    }
+}
+
+/// A recording being written, record by record.
+#[derive(Clone, Debug)]
+struct Chain([u8; HASH_BYTES]);
+
+impl Chain {
+    /// The chain of a recording, and the bytes that it starts with.
+    fn start(header: &Header) -> (Self, Vec<u8>) {
+        let mut writer = Writer::default();
+        encode_header(header, &mut writer);
+        let chain: [u8; HASH_BYTES] = Sha256::digest(&writer.0).into();
+        writer.bytes(&chain);
+        (Self(chain), writer.0)
+    }
+
+    fn record(&mut self, record: &Record, bytes: &mut Vec<u8>) {
+        let mut body = Writer::default();
+        encode_record(record, &mut body);
+        self.link(&body.0, bytes);
+    }
+
+    fn end(&mut self, records: u64, bytes: &mut Vec<u8>) {
+        let mut body = Writer::default();
+        body.u32(END_MARK);
+        body.u32(0);
+        body.u64(records);
+        self.link(&body.0, bytes);
+    }
+
+    fn link(&mut self, body: &[u8], bytes: &mut Vec<u8>) {
+        let mut padded = [0; BODY_BYTES];
+        padded[..body.len()].copy_from_slice(body);
+        self.0 = next_link(&self.0, &padded);
+        bytes.extend_from_slice(&padded);
+        bytes.extend_from_slice(&self.0);
+    }
+}
+
+fn next_link(chain: &[u8; HASH_BYTES], body: &[u8; BODY_BYTES]) -> [u8; HASH_BYTES] {
+    Sha256::new().chain_update(chain).chain_update(body).finalize().into()
+}
+
+#[cfg(test)]
+mod tests;

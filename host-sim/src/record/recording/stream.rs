@@ -1,0 +1,183 @@
+//! Recordings while they happen: the loop hands over, a thread of its own writes. The loop never waits for a disk.
+//!
+//! What does not fit into the ring, or not onto the disk, is lost and counted. A process that is killed leaves whole
+//! records behind; only the end mark is missing then.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use rtrb::{Consumer, Producer, RingBuffer};
+use serde::{Deserialize, Serialize};
+
+use super::{Chain, Exchange, Header, Record};
+use crate::error::SimError;
+
+/// Exchanges that wait for the writer: two seconds at 1 kHz, more than any disk takes to answer.
+const RING: usize = 2048;
+/// How often the writer looks.
+const NAP: Duration = Duration::from_millis(5);
+
+/// What became of the exchanges of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RecordAccount {
+    /// Handed over by the loop.
+    pub offered: u64,
+    /// Written.
+    pub written: u64,
+    /// Lost because the ring was full.
+    pub lost_in_ring: u64,
+    /// Lost because they could not be written.
+    pub lost_on_disk: u64,
+    /// Why not.
+    pub error: Option<String>,
+}
+
+impl RecordAccount {
+    /// Exchanges without an entry: 0.
+    pub fn unaccounted(&self) -> u64 {
+        self.offered.abs_diff(self.written + self.lost_in_ring + self.lost_on_disk)
+    }
+}
+
+/// A recording in the making.
+#[derive(Debug)]
+pub struct StreamRecorder {
+    producer: Producer<Exchange>,
+    offered: u64,
+    lost: u64,
+    stop: Arc<AtomicBool>,
+    writer: JoinHandle<RecordAccount>,
+}
+
+impl StreamRecorder {
+    /// Creates the file and starts its writer.
+    ///
+    /// # Errors
+    /// [`SimError::Write`] when there can be no such file.
+    pub fn create(path: &Path, header: &Header) -> Result<Self, SimError> {
+        let write_error = |source| SimError::Write { path: PathBuf::from(path), source };
+        let file = File::create(path).map_err(write_error)?;
+        let (producer, consumer) = RingBuffer::new(RING);
+        let stop = Arc::new(AtomicBool::new(false));
+        let (chain, start) = Chain::start(header);
+        let writer = Writer { file, chain, consumer, stop: Arc::clone(&stop), account: RecordAccount::default() };
+        let writer = std::thread::Builder::new()
+            .name("recorder".to_owned())
+            .spawn(move || writer.run(&start))
+            .map_err(write_error)?;
+        Ok(Self { producer, offered: 0, lost: 0, stop, writer })
+    }
+
+    /// Hands an exchange over; neither waits nor allocates.
+    pub fn record(&mut self, exchange: &Exchange) {
+        self.offered += 1;
+        self.lost += u64::from(self.producer.push(*exchange).is_err());
+    }
+
+    /// Writes what waits and the end mark.
+    pub fn finish(self) -> RecordAccount {
+        self.stop.store(true, Ordering::Release);
+        let written = self.writer.join().unwrap_or_default();
+        RecordAccount { offered: self.offered, lost_in_ring: self.lost, ..written }
+    }
+}
+
+struct Writer {
+    file: File,
+    chain: Chain,
+    consumer: Consumer<Exchange>,
+    stop: Arc<AtomicBool>,
+    account: RecordAccount,
+}
+
+impl Writer {
+    fn run(mut self, start: &[u8]) -> RecordAccount {
+        self.write(start);
+        loop {
+            // Read before draining: what was handed over before the stop is drained after it.
+            let last = self.stop.load(Ordering::Acquire);
+            let mut bytes = Vec::new();
+            let mut records = 0;
+            while let Ok(exchange) = self.consumer.pop() {
+                self.chain.record(&Record { exchange, truth: None }, &mut bytes);
+                records += 1;
+            }
+            if self.account.error.is_some() || !self.write(&bytes) {
+                self.account.lost_on_disk += records;
+            } else {
+                self.account.written += records;
+            }
+            if last {
+                let mut end = Vec::new();
+                self.chain.end(self.account.written, &mut end);
+                if self.account.error.is_none() {
+                    self.write(&end);
+                    self.keep(|file| file.sync_all());
+                }
+                return self.account;
+            }
+            std::thread::sleep(NAP);
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> bool {
+        self.keep(|file| file.write_all(bytes))
+    }
+
+    /// Remembers the first failure.
+    fn keep(&mut self, act: impl FnOnce(&mut File) -> std::io::Result<()>) -> bool {
+        match act(&mut self.file) {
+            Ok(()) => true,
+            Err(error) => {
+                self.account.error.get_or_insert(error.to_string());
+                false
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use firmware::Settings;
+
+    use super::*;
+    use crate::record::recording::{Recording, RecordingError, RunMode};
+
+    fn header() -> Header {
+        let settings = Settings::new(1_000_000, 20_000_000, 0);
+        Header { mode: RunMode::FreeRun, seed: 1, scene_hash: [0; 32], settings, table: vec![1, 2, 3] }
+    }
+
+    #[test]
+    fn what_is_streamed_is_a_recording() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stream.rec");
+        let mut recorder = StreamRecorder::create(&path, &header()).unwrap();
+        let exchange =
+            |tick| Exchange { inputs: firmware::Inputs { tick, ..Default::default() }, ..Default::default() };
+        (0..500).for_each(|tick| recorder.record(&exchange(tick)));
+        let account = recorder.finish();
+        assert_eq!((account.offered, account.written, account.unaccounted()), (500, 500, 0));
+        let bytes = std::fs::read(&path).unwrap();
+        let records = (0..500).map(|tick| Record { exchange: exchange(tick), truth: None }).collect();
+        assert_eq!(bytes, Recording { header: header(), records }.encode(), "the same bytes as written at once");
+        let cut = &bytes[..bytes.len() - 1000];
+        assert!(matches!(Recording::decode(cut), Err(RecordingError::Unfinished { .. })));
+        let (kept, finished) = Recording::whole_records(cut).unwrap();
+        assert!(!finished && kept.records.len() > 490);
+    }
+
+    #[test]
+    fn a_full_disk_is_counted_and_nothing_else() {
+        let mut recorder = StreamRecorder::create(Path::new("/dev/full"), &header()).unwrap();
+        (0..500).for_each(|_| recorder.record(&Exchange::default()));
+        let account = recorder.finish();
+        assert_eq!((account.written, account.lost_on_disk + account.lost_in_ring), (0, 500));
+        assert!(account.error.is_some() && account.unaccounted() == 0);
+    }
+}

@@ -1,0 +1,273 @@
+//! The closed loop's stability as CSV, as a chart, and on one screen.
+
+use std::fmt::Write as _;
+
+use firmware::stability::gain_limit;
+use model_offline::output::chart::{Axis, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
+
+use crate::bench::stability::Behaviour;
+use crate::bench::stability::cells::{ANGLES, Boundary, DELAYS};
+use crate::bench::stability::mismatch::{Mismatch, Tissue};
+use crate::bench::stability::rate_limit::{self, Law};
+use crate::commands::stability::ClosedLoop;
+
+/// One table for the three parts; columns that do not belong to a part are empty.
+pub(crate) fn csv(result: &ClosedLoop) -> String {
+    let mut out = String::from(
+        "part,delay_samples,gain,lambda_abs,lambda_arg_degrees,theory_gain_limit,theory_stable_cells,\
+         simulated_stable_cells,disagreeing_cells,paddle,table_tissue,tissue,depth,lambda_abs_max,lambda_orthogonal,\
+         theory_margin,simulated_margin,law,gain_over_limit,error_over_reach,remaining,behaviour\n",
+    );
+    for b in &result.boundaries {
+        let _ = writeln!(
+            out,
+            "gain-delay-jacobian,{},,{},{},{:.6},{},{},{},{},,,,,,,,,,,,",
+            b.delay, b.size, b.angle, b.theory, b.theory_cells, b.simulated_cells, b.disagreeing, result.paddle
+        );
+    }
+    for m in &result.mismatches {
+        let _ = writeln!(
+            out,
+            "table-mismatch,{},{:.6},{:.6},{:.4},{:.6},,,,{},{},{},{:.6},{:.6},{:.6},{:.4},{:.4},,,,,{}",
+            m.gain.1,
+            m.gain.0,
+            m.eigenvalue.0,
+            m.eigenvalue.1,
+            m.gain.0 * m.margin,
+            m.paddle,
+            m.table.name(),
+            m.tissue.name(),
+            m.depth,
+            m.largest,
+            m.orthogonal,
+            m.margin,
+            m.simulated_margin,
+            m.behaviour.name()
+        );
+    }
+    for c in &result.cells {
+        let limit = gain_limit(0.0, c.delay);
+        let _ = writeln!(
+            out,
+            "rate-limit,{},{:.6},1,0,{limit:.6},,,,,,,,,,,,{},{:.6},{:.6},{:.6e},{}",
+            c.delay,
+            c.gain_share * limit,
+            c.law.name(),
+            c.gain_share,
+            c.amplitude,
+            c.remaining,
+            c.behaviour.name()
+        );
+    }
+    out
+}
+
+const MARKERS: [(Marker, bool); 6] = [
+    (Marker::Circle, true),
+    (Marker::Square, false),
+    (Marker::Triangle, true),
+    (Marker::Diamond, false),
+    (Marker::TriangleDown, true),
+    (Marker::Circle, false),
+];
+const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::DashDot, Dash::Dotted];
+
+/// Theory beside simulation, tables on other tissue, and rate limits.
+pub(crate) fn figure(result: &ClosedLoop) -> Figure {
+    let mut panels = vec![boundary_panel(result)];
+    if !result.mismatches.is_empty() {
+        let allowed =
+            ReferenceLine { label: "allowed for".into(), at: Place::Y(result.lambda_max), dash: Dash::Dashed };
+        let unstable = ReferenceLine { label: "unstable below".into(), at: Place::Y(1.0), dash: Dash::Dashed };
+        let size = "largest |λ| of J·Ĵ⁻¹";
+        let (plain, included) = (Tissue::Homogeneous, Tissue::Inclusion);
+        let sizes = |title, table, line| mismatch_panel(result, title, size, table, line, &|m| m.largest);
+        panels.push(sizes("Table does not know of the inclusion", plain, allowed.clone()));
+        panels.push(sizes("Table believes in an inclusion", included, allowed));
+        panels.push(mismatch_panel(
+            result,
+            "… and what that leaves of the margin",
+            "gain limit over gain",
+            included,
+            unstable,
+            &|m| m.simulated_margin,
+        ));
+    }
+    for law in [Law::Plain, Law::AntiWindup] {
+        panels.push(rate_panel(result, law, rate_limit::DELAYS[1]));
+    }
+    Figure {
+        title: format!("Where the closed loop stops being stable: {}", result.scene),
+        caption: "e⁺ = e − g·J·Ĵ⁻¹·e(k−d); lines are theory, markers are simulated".into(),
+        panels,
+        columns: 3,
+    }
+}
+
+/// Limit of the gain against the angle of the eigenvalues, by delay.
+fn boundary_panel(result: &ClosedLoop) -> Panel {
+    let mut series = Vec::new();
+    for (k, delay) in DELAYS.into_iter().enumerate() {
+        let curve = (0..=89).map(|a| (f64::from(a), gain_limit(f64::from(a).to_radians(), delay))).collect();
+        let (marker, filled) = MARKERS[k];
+        series.push(Series::curve("", DASHES[k % DASHES.len()], curve));
+        let found = result
+            .boundaries
+            .iter()
+            .filter(|b| b.delay == delay && b.size == 1.0 && b.simulated_cells > 0)
+            .map(|b| (b.angle, simulated_limit(result, b)))
+            .collect();
+        series.push(Series {
+            line: Some(DASHES[k % DASHES.len()]),
+            ..Series::scatter(&format!("delay {delay}"), marker, filled, Vec::new())
+        });
+        series.push(Series::scatter("", marker, filled, found));
+    }
+    let largest = ANGLES.iter().copied().fold(0.0, f64::max);
+    Panel {
+        series,
+        ..Panel::new(
+            "Gain, delay and Jacobian error",
+            Axis::linear("|arg λ|, degrees").range(0.0, largest),
+            Axis::log("largest stable g·|λ|").range(0.01, 3.0),
+        )
+    }
+}
+
+/// The middle between the last cell that settles and the first that does not.
+fn simulated_limit(result: &ClosedLoop, boundary: &Boundary) -> f64 {
+    let gains = result.gains();
+    let last = gains[boundary.simulated_cells - 1];
+    gains.get(boundary.simulated_cells).map_or(last, |next| (last * next).sqrt())
+}
+
+fn mismatch_panel(
+    result: &ClosedLoop,
+    title: &str,
+    label: &str,
+    table: Tissue,
+    line: ReferenceLine,
+    height: &dyn Fn(&Mismatch) -> f64,
+) -> Panel {
+    let mut paddles: Vec<u32> = result.mismatches.iter().map(|m| m.paddle).collect();
+    paddles.sort_unstable();
+    paddles.dedup();
+    let series = paddles
+        .iter()
+        .enumerate()
+        .map(|(k, &paddle)| {
+            let points = result
+                .mismatches
+                .iter()
+                .filter(|m| m.paddle == paddle && m.table == table)
+                .map(|m| (m.depth, height(m)))
+                .collect();
+            let (marker, filled) = MARKERS[(k + 1) % MARKERS.len()];
+            Series { line: Some(Dash::Dotted), ..Series::scatter(&format!("paddle {paddle}"), marker, filled, points) }
+        })
+        .collect::<Vec<_>>();
+    let top = series
+        .iter()
+        .flat_map(|s| &s.points)
+        .map(|p| p.1)
+        .chain(match line.at {
+            Place::Y(y) => Some(y),
+            Place::X(_) => None,
+        })
+        .fold(0.0, f64::max);
+    Panel {
+        series,
+        lines: vec![line],
+        ..Panel::new(title, Axis::linear("needle depth"), Axis::linear(label).range(0.0, 1.15 * top))
+    }
+}
+
+fn rate_panel(result: &ClosedLoop, law: Law, delay: u32) -> Panel {
+    let of = |behaviour| {
+        let cells = result.cells.iter().filter(|c| c.law == law && c.delay == delay && c.behaviour == behaviour);
+        cells.map(|c| (c.gain_share, c.amplitude)).collect::<Vec<_>>()
+    };
+    let title = match law {
+        Law::Plain => format!("Rate limit, plain integral, delay {delay}"),
+        Law::AntiWindup => format!("Rate limit, the controller's, delay {delay}"),
+    };
+    Panel {
+        series: vec![
+            Series::scatter("settles", Marker::Dot, false, of(Behaviour::Settles)),
+            Series::scatter("cycles", Marker::Circle, false, of(Behaviour::Cycles)),
+            Series::scatter("only bounded by the limits", Marker::Square, true, of(Behaviour::Diverges)),
+        ],
+        lines: vec![ReferenceLine { label: "linear theory".into(), at: Place::X(1.0), dash: Dash::Dashed }],
+        ..Panel::new(
+            &title,
+            Axis::log("gain over its linear limit").range(0.07, 1.8),
+            Axis::log("error over reach per sample").range(0.08, 130.0),
+        )
+    }
+}
+
+/// One screen.
+pub(crate) fn summary(result: &ClosedLoop) -> String {
+    let mut out = format!("{} · closed loop around paddle {}\n\n", result.scene, result.paddle);
+    let cells = result.boundaries.len() * result.gains().len();
+    let disagreeing: usize = result.boundaries.iter().map(|b| b.disagreeing).sum();
+    let worst = result.boundaries.iter().map(|b| b.theory_cells.abs_diff(b.simulated_cells)).max().unwrap_or(0);
+    let _ = writeln!(
+        out,
+        "gain × delay × Jacobian error: {cells} cells simulated, {disagreeing} differ from theory; no boundary is off by \
+         more than {worst} cell{}",
+        if worst == 1 { "" } else { "s" }
+    );
+    let _ = writeln!(out, "largest stable g·|λ|, simulated (theory):");
+    for angle in [0.0, 30.0, 60.0] {
+        let _ = write!(out, "  arg λ {angle:>2.0}°");
+        for delay in DELAYS {
+            let found = result.boundaries.iter().find(|b| (b.delay, b.size, b.angle) == (delay, 1.0, angle));
+            let simulated = found.filter(|b| b.simulated_cells > 0).map_or(0.0, |b| simulated_limit(result, b));
+            let _ = write!(out, "   d={delay} {simulated:.3} ({:.3})", gain_limit(angle.to_radians(), delay));
+        }
+        out.push('\n');
+    }
+    for (table, what) in [
+        (Tissue::Homogeneous, "table without the inclusion on tissue with it"),
+        (Tissue::Inclusion, "table with the inclusion on tissue without it"),
+    ] {
+        let rows: Vec<&Mismatch> = result.mismatches.iter().filter(|m| m.table == table).collect();
+        let Some(first) = rows.first() else { continue };
+        let least = rows.iter().map(|m| m.margin).fold(f64::INFINITY, f64::min);
+        let simulated = rows.iter().map(|m| m.simulated_margin).fold(f64::INFINITY, f64::min);
+        let largest = rows.iter().map(|m| m.largest).fold(0.0, f64::max);
+        let angle = rows.iter().map(|m| m.eigenvalue.1.abs()).fold(0.0, f64::max);
+        let settled = rows.iter().filter(|m| m.behaviour == Behaviour::Settles).count();
+        let _ = writeln!(
+            out,
+            "\n{what}: {settled} of {} loops settle (gain {:.3}, delay {})\n  |λ| up to {largest:.3} (the gain allows for \
+             {}), angle up to {angle:.1}°, gain could grow {least:.2} times (simulated {simulated:.2})",
+            rows.len(),
+            first.gain.0,
+            first.gain.1,
+            result.lambda_max
+        );
+    }
+    for (paddle, reason) in &result.refused {
+        let _ = writeln!(out, "paddle {paddle} has no table: {reason}");
+    }
+    out.push_str("\nrate limit with delay, gains below the linear limit, errors up to 100 times what a sample's motion can undo:\n");
+    for delay in rate_limit::DELAYS {
+        for law in [Law::Plain, Law::AntiWindup] {
+            let below: Vec<_> =
+                result.cells.iter().filter(|c| c.law == law && c.delay == delay && c.gain_share < 0.99).collect();
+            let bad: Vec<_> = below.iter().filter(|c| c.behaviour != Behaviour::Settles).collect();
+            let lowest = bad.iter().map(|c| c.gain_share).fold(f64::INFINITY, f64::min);
+            let from = if bad.is_empty() { String::new() } else { format!(", from {lowest:.2} of the limit up") };
+            let _ = writeln!(
+                out,
+                "  delay {delay}, {:<15} {} of {} cells do not settle{from}",
+                law.name(),
+                bad.len(),
+                below.len()
+            );
+        }
+    }
+    out
+}

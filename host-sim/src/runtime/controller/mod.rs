@@ -1,0 +1,296 @@
+//! A controller at work: ticks, watchdog, accounts.
+
+pub mod child;
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use firmware::contract::PaddleCommand;
+use firmware::io::{CommandSink, SampleSource};
+use firmware::schedule::Schedule;
+use firmware::{Faults, Inputs, Mode};
+use iceoryx2::service::Service;
+
+use crate::bench::result::{LoopTiming, TickResult};
+use crate::commands::controller::mode_name;
+use crate::error::SimError;
+use crate::exchange::{ClockKind, ControllerPorts, LinkError};
+use crate::record::recording::Exchange;
+use crate::record::recording::stream::StreamRecorder;
+use crate::runtime::accounts::{Handover, SequenceSpan};
+use crate::runtime::clock::{now_ns, release_real_time, request_real_time, sleep_until};
+use crate::runtime::durations::LoopDurations;
+use crate::runtime::executor::Core;
+use crate::runtime::peer::{Patience, Peer};
+use crate::runtime::signals;
+use crate::world::loop_settings::LoopArgs;
+
+/// Ticks in free-run between two looks at the peer and at signals.
+const TICKS_PER_LOOK: u64 = 16;
+/// Ticks that an orphaned controller stays in SAFE before it leaves: whoever watches the commands has seen it then.
+const TICKS_IN_SAFE: u64 = 20;
+
+/// A controller at work.
+pub struct Session<'c> {
+    core: Box<dyn Core + 'c>,
+    exchanges: Vec<Exchange>,
+    exchanges_lost: u64,
+    faults: Faults,
+    spans: [SequenceSpan; 3],
+    /// In free-run the schedule knows better than the ticks that happened.
+    scheduled: Option<(u64, u64)>,
+    timing: Option<LoopTiming>,
+    /// Ticks by the mode of their command: HOLD, RUN, SAFE.
+    modes: [u64; 3],
+    /// Last command, and whether the watchdog has taken over since.
+    last: PaddleCommand,
+    tripped: bool,
+    /// Where every tick is recorded while it happens.
+    pub(crate) recorder: Option<StreamRecorder>,
+    /// Tick with a panic on purpose.
+    pub(crate) panic_at: Option<u64>,
+}
+
+impl std::fmt::Debug for Session<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Session").field("exchanges", &self.exchanges.len()).finish_non_exhaustive()
+    }
+}
+
+impl<'c> Session<'c> {
+    /// A controller before its first tick, with room for the record of `capacity` ticks.
+    pub fn new(core: Box<dyn Core + 'c>, capacity: usize) -> Self {
+        Self {
+            core,
+            exchanges: Vec::with_capacity(capacity),
+            exchanges_lost: 0,
+            faults: Faults::NONE,
+            spans: [SequenceSpan::default(); 3],
+            scheduled: None,
+            timing: None,
+            modes: [0; 3],
+            last: PaddleCommand::default(),
+            tripped: false,
+            recorder: None,
+            panic_at: None,
+        }
+    }
+
+    /// Answers every step of the plant until it says stop.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn lockstep<S: Service>(
+        &mut self,
+        ports: &mut ControllerPorts<S>,
+        peer: &mut Peer,
+        timeout: Duration,
+    ) -> Result<(), SimError> {
+        let mut patience = Patience::new(timeout);
+        loop {
+            let Some(frame) = ports.clock.oldest()? else {
+                patience.wait::<S>(peer)?;
+                continue;
+            };
+            patience = Patience::new(timeout);
+            signals::check()?;
+            match frame.kind() {
+                Some(ClockKind::Step) => self.tick(ports, frame.tick, frame.time_ns)?,
+                Some(ClockKind::Stop) => return Ok(()),
+                Some(ClockKind::Start) | None => {
+                    return Err(SimError::Protocol {
+                        peer: "plant",
+                        what: format!("clock frame of kind {} in lockstep", frame.kind),
+                    });
+                }
+            }
+        }
+    }
+
+    /// Runs on the machine's clock, half a period after the plant, until it says stop.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn free_run<S: Service>(
+        &mut self,
+        ports: &mut ControllerPorts<S>,
+        peer: &mut Peer,
+        timeout: Duration,
+        loop_args: &LoopArgs,
+    ) -> Result<(), SimError> {
+        let mut patience = Patience::new(timeout);
+        let start = loop {
+            match ports.clock.oldest()? {
+                Some(frame) if frame.kind() == Some(ClockKind::Start) => break frame.time_ns,
+                Some(frame) => {
+                    return Err(SimError::Protocol {
+                        peer: "plant",
+                        what: format!("clock frame of kind {} instead of a start", frame.kind),
+                    });
+                }
+                None => patience.wait::<S>(peer)?,
+            }
+        };
+        let period_ns = loop_args.period_ns();
+        let first_release_ns = start + period_ns / 2;
+        let mut schedule = Schedule::new(first_release_ns, period_ns);
+        let mut durations = LoopDurations::default();
+        let scheduling = request_real_time();
+        let outcome = self.timed_ticks(ports, peer, &mut schedule, &mut durations);
+        release_real_time();
+        let due = (schedule.next_release_ns() - first_release_ns) / period_ns;
+        self.scheduled = Some((due, schedule.skipped()));
+        self.timing = Some(durations.timing(loop_args.rate, &schedule, &scheduling));
+        outcome
+    }
+
+    fn timed_ticks<S: Service>(
+        &mut self,
+        ports: &mut ControllerPorts<S>,
+        peer: &mut Peer,
+        schedule: &mut Schedule,
+        durations: &mut LoopDurations,
+    ) -> Result<(), SimError> {
+        let mut orphaned: Option<(SimError, u64)> = None;
+        loop {
+            sleep_until(schedule.next_release_ns());
+            if let Some(frame) = ports.clock.oldest()?
+                && frame.kind() == Some(ClockKind::Stop)
+            {
+                return Ok(());
+            }
+            let start_ns = now_ns();
+            let release = schedule.begin(start_ns);
+            self.tick(ports, release.tick, start_ns)?;
+            let end_ns = now_ns();
+            schedule.finish(end_ns);
+            durations.record(release.release_ns, start_ns, end_ns);
+            match &orphaned {
+                None if release.tick.is_multiple_of(TICKS_PER_LOOK) => {
+                    signals::check()?;
+                    // In RUN the samples are fresh: the plant lives.
+                    if self.last.state != Mode::Run as u32 {
+                        let alive = peer.check::<S>().and_then(|()| {
+                            let left =
+                                SimError::PeerDied { peer: "plant", how: "it has left without a word".to_owned() };
+                            if ports.has_peer() { Ok(()) } else { Err(left) }
+                        });
+                        orphaned = alive.err().map(|error| (error, release.tick));
+                    }
+                }
+                None => {}
+                // Without a plant the ages lead to SAFE. Before the first RUN there is nothing to make safe.
+                Some((_, since)) => {
+                    let safe_for = if self.last.state == Mode::Safe as u32 { release.tick - since } else { 0 };
+                    let was_armed = self.modes[Mode::Run as usize - 1] > 0;
+                    if let Some((error, _)) = orphaned.take_if(|_| safe_for >= TICKS_IN_SAFE || !was_armed) {
+                        return Err(error);
+                    }
+                }
+            }
+        }
+    }
+
+    fn tick<S: Service>(&mut self, ports: &mut ControllerPorts<S>, tick: u64, time_ns: u64) -> Result<(), SimError> {
+        let stepped = if self.tripped {
+            None
+        } else {
+            // A panic in the step must not end the commands: the paddle's owner hears SAFE from then on.
+            let step = || {
+                assert!(self.panic_at.is_none_or(|at| tick < at), "panic on purpose in tick {tick}");
+                let inputs =
+                    Inputs { tick, time_ns, needle: ports.needle(), target: ports.target(), paddle: ports.paddle() };
+                self.core.step(&inputs).map(|command| (inputs, command))
+            };
+            catch_unwind(AssertUnwindSafe(step)).ok()
+        };
+        let (inputs, command) = match stepped {
+            Some(outcome) => {
+                let (inputs, command) = outcome?;
+                ports.send(&command)?;
+                (inputs, command)
+            }
+            None => self.safe_command(ports, tick, time_ns)?,
+        };
+        self.last = command;
+        if let Some(count) = self.modes.get_mut(command.state.wrapping_sub(1) as usize) {
+            *count += 1;
+        }
+        let sequences = [
+            inputs.needle.map(|sample| sample.sequence),
+            inputs.target.map(|sample| sample.sequence),
+            inputs.paddle.map(|sample| sample.sequence),
+        ];
+        for (span, sequence) in self.spans.iter_mut().zip(sequences) {
+            if let Some(sequence) = sequence {
+                span.see(sequence);
+            }
+        }
+        self.faults |= Faults::from_bits(command.faults);
+        let exchange = Exchange { inputs, command };
+        if let Some(recorder) = &mut self.recorder {
+            recorder.record(&exchange);
+        }
+        // Growing would allocate in the loop.
+        if self.exchanges.len() < self.exchanges.capacity() {
+            self.exchanges.push(exchange);
+        } else {
+            self.exchanges_lost += 1;
+        }
+        Ok(())
+    }
+
+    /// The watchdog's command: SAFE, where the paddle was told to be last. Samples are not read any more.
+    fn safe_command<S: Service>(
+        &mut self,
+        ports: &mut ControllerPorts<S>,
+        tick: u64,
+        time_ns: u64,
+    ) -> Result<(Inputs, PaddleCommand), LinkError> {
+        self.tripped = true;
+        let command = PaddleCommand {
+            sequence: if self.modes == [0; 3] { 0 } else { self.last.sequence.wrapping_add(1) },
+            state: Mode::Safe as u32,
+            tick,
+            time_ns,
+            faults: Faults::WATCHDOG.bits(),
+            ..self.last
+        };
+        ports.send(&command)?;
+        Ok((Inputs { tick, time_ns, ..Inputs::default() }, command))
+    }
+
+    /// Closes the accounts, with what still waits in the buffers.
+    ///
+    /// # Errors
+    /// [`SimError::Board`] if a board does not tell its own.
+    pub fn end<S: Service>(mut self, ports: &mut ControllerPorts<S>) -> Result<(Handover, Vec<Exchange>), SimError> {
+        let ledger = self.core.ledger()?;
+        let [needle, target, paddle] = self.spans;
+        let waiting = (ports.needle(), ports.target(), ports.paddle());
+        let ticks = &ledger.ticks;
+        let (due, skipped) = self.scheduled.unwrap_or((ticks.due, ticks.skipped));
+        let [hold, run, safe] = self.modes;
+        let entries = run + hold + safe + skipped;
+        // The ledger ends where the watchdog takes over; until then it must say what the commands say.
+        let own = if self.tripped {
+            0
+        } else {
+            ticks.unaccounted() + ticks.run.abs_diff(run) + ticks.hold.abs_diff(hold) + ticks.safe.abs_diff(safe)
+        };
+        let handover = Handover {
+            needle: needle.account(&ledger.needle, waiting.0.map(|sample| sample.sequence)),
+            target: target.account(&ledger.target, waiting.1.map(|sample| sample.sequence)),
+            paddle: paddle.account(&ledger.paddle, waiting.2.map(|sample| sample.sequence)),
+            ticks: TickResult { due, run, hold, safe, skipped, unaccounted: due.abs_diff(entries) + own },
+            commands: ports.command.published(),
+            final_state: Mode::from_wire(self.last.state).map_or("HOLD", mode_name).to_owned(),
+            faults: self.faults.to_string(),
+            timing: self.timing,
+            exchanges: self.exchanges.len() as u64,
+            exchanges_lost: self.exchanges_lost,
+            record: self.recorder.map(StreamRecorder::finish),
+        };
+        Ok((handover, self.exchanges))
+    }
+}
