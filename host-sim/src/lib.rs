@@ -16,8 +16,6 @@
 //! comes out.
 
 pub mod bench;
-pub mod commands;
-pub mod error;
 pub mod exchange;
 pub mod guide;
 pub mod record;
@@ -25,3 +23,5 @@ pub mod report;
 pub mod runtime;
 pub mod view;
 pub mod world;
+
+pub use bench::error::SimError;

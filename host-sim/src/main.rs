@@ -1,12 +1,14 @@
 //! `host-sim`: see `host-sim --help`.
 
+mod commands;
+
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = host_sim::commands::parse();
+    let cli = commands::parse();
     // Two processes share one terminal: whose error is it?
-    let is_controller = matches!(cli.command, Some(host_sim::commands::Command::Controller(_)));
-    match host_sim::commands::execute(cli) {
+    let is_controller = matches!(cli.command, Some(commands::Command::Controller(_)));
+    match commands::execute(cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();

@@ -6,10 +6,13 @@ use std::cell::Cell;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::io::run_tick;
 use firmware::{Controller, Inputs, Mode, Settings, State};
-use host_sim::bench::faults::fixture;
+use host_sim::bench::fixture::fixture;
 use host_sim::exchange::{ControllerPorts, Departure, PlantPorts, Space};
+use host_sim::record::recording::Header;
 use host_sim::record::recording::stream::StreamRecorder;
-use host_sim::record::recording::{Exchange, Header, RunMode};
+use host_sim::runtime::controller::TickRecorder as _;
+use host_sim::runtime::mode::RunMode;
+use host_sim::runtime::tick::ControllerTick;
 use iceoryx2::service::ipc;
 
 thread_local! {
@@ -113,10 +116,10 @@ fn the_loop_allocates_no_more_than_its_transport() {
             plant.target.send(target).unwrap();
         }
         plant.needle.send(needle).unwrap();
-        let mut exchange = Exchange::default();
+        let mut exchange = ControllerTick::default();
         ticking += allocations(|| {
             let (inputs, command) = run_tick(&controller, &mut state, tick, tick * MS, &mut ports).unwrap();
-            exchange = Exchange { inputs, command };
+            exchange = ControllerTick { inputs, command };
         });
         recording += allocations(|| recorder.record(&exchange));
         reading += allocations(|| displacement = plant.command.newest().unwrap().unwrap().displacement);
@@ -126,7 +129,7 @@ fn the_loop_allocates_no_more_than_its_transport() {
     // Receiving gives frames back to their lender, for which it allocates now and then.
     assert!(reading <= TICKS / 10, "{reading} allocations in {TICKS} receptions");
     assert_eq!(recording, 0);
-    assert_eq!(recorder.finish().unaccounted(), 0);
+    assert_eq!(Box::new(recorder).finish().unaccounted(), 0);
     drop((plant, ports));
     space.leave::<ipc::Service>(Departure::Last);
 }

@@ -274,8 +274,8 @@ fn image(scalar: ScalarKind) -> Option<Image> {
     let image = Image::build(scalar, Processor::Double);
     let missing = match image {
         Ok(image) if host_sim::exchange::board::Qemu::is_installed() => return Some(image),
-        Ok(_) => BoardError::NoQemu,
-        Err(missing @ BoardError::NoTarget) => missing,
+        Ok(_) => BoardError::NoQemu { program: host_sim::exchange::board::qemu::PROGRAM },
+        Err(missing @ BoardError::NoTarget { .. }) => missing,
         Err(other) => panic!("{other}"),
     };
     assert!(std::env::var_os("CI_NEEDS_QEMU").is_none(), "{missing}");

@@ -152,8 +152,8 @@ fn other_hosts_other_origins_and_wrong_tokens_are_refused() {
         }
         request.call().unwrap().status().as_u16()
     };
-    let wish = |body: &Value, origin: Option<&str>| {
-        let mut request = agent.post(format!("{address}wish"));
+    let ask = |body: &Value, origin: Option<&str>| {
+        let mut request = agent.post(format!("{address}request"));
         if let Some(origin) = origin {
             request = request.header("Origin", origin);
         }
@@ -167,12 +167,12 @@ fn other_hosts_other_origins_and_wrong_tokens_are_refused() {
     assert_eq!(get(&format!("http://{host}/"), None), 403);
     assert_eq!(get(&format!("http://{host}/{}/", "0".repeat(32)), None), 403);
     assert_eq!(get(&format!("{address}absent"), None), 404);
-    assert_eq!(wish(&json!({ "pause": true }), None), 204);
-    assert_eq!(wish(&json!({ "pause": false }), Some(&format!("http://{host}"))), 204);
-    assert_eq!(wish(&json!({ "pause": true }), Some("http://stillpoint.example")), 403);
-    assert_eq!(wish(&json!({ "pause": true }), Some("null")), 403);
-    assert_eq!(wish(&json!({ "step": 0 }), None), 400);
-    assert_eq!(wish(&json!({ "launch": true }), None), 400);
+    assert_eq!(ask(&json!({ "pause": true }), None), 204);
+    assert_eq!(ask(&json!({ "pause": false }), Some(&format!("http://{host}"))), 204);
+    assert_eq!(ask(&json!({ "pause": true }), Some("http://stillpoint.example")), 403);
+    assert_eq!(ask(&json!({ "pause": true }), Some("null")), 403);
+    assert_eq!(ask(&json!({ "step": 0 }), None), 400);
+    assert_eq!(ask(&json!({ "launch": true }), None), 400);
     let knobs = json!({ "knobs": { "needle_speed": 1.0, "target_rate": 50.0, "latency": -1.0, "noise": 1.0, "stiffness": 1.0 } });
-    assert_eq!(wish(&knobs, None), 400);
+    assert_eq!(ask(&knobs, None), 400);
 }

@@ -5,8 +5,9 @@ use model_offline::model::TissueModel;
 use model_offline::placement::Placement;
 use model_offline::scene::Scene;
 
-use crate::bench::result::{Geometry, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
-use crate::world::Simulation;
+use super::result::{Geometry, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
+use super::tissue::Tissue;
+use crate::world::simulation::Simulation;
 
 fn point(point: &Point2) -> [f64; 2] {
     [point.x, point.y]
@@ -18,15 +19,15 @@ fn path(points: &[Point2]) -> Vec<[f64; 2]> {
 
 /// Settings of the simulation.
 pub fn settings(scene: &Scene, simulation: &Simulation) -> SimulationSettings {
-    let Simulation { loop_args, actuator, .. } = simulation;
+    let Simulation { loop_settings, actuator, .. } = simulation;
     SimulationSettings {
-        rate_hz: loop_args.rate,
+        rate_hz: loop_settings.rate,
         insertion_s: simulation.insertion_s,
         duration_s: simulation.duration_s,
         depth: simulation.depth,
-        target_rate_hz: loop_args.target_rate,
-        target_latency_ms: loop_args.latency,
-        noise: loop_args.noise_for(simulation.depth),
+        target_rate_hz: loop_settings.target_rate,
+        target_latency_ms: loop_settings.latency,
+        noise: loop_settings.noise_for(simulation.depth),
         paddle_lag_ms: actuator.lag_s * 1e3,
         paddle_delay_ticks: actuator.delay_ticks,
         paddle_gain: actuator.gain,
@@ -69,10 +70,10 @@ pub fn command_line() -> Vec<String> {
 }
 
 /// A placement study.
-pub fn placement(tissue: &str, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
+pub fn placement(tissue: Tissue, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
     let integration = serde_json::to_value(model.scene().discretization.method.integration);
     PlacementResult {
-        tissue: tissue.to_owned(),
+        tissue,
         nodes: model.nodes(),
         integration: integration.ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default(),
         wall_s,

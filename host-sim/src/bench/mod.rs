@@ -1,10 +1,13 @@
-//! What is tried and measured: strategies and whole runs, faults, timing, stability, boards.
+//! What is tried and measured: strategies and whole comparisons, faults, timing, stability, boards.
 
 pub mod board;
 pub mod comparison;
 pub mod describe;
+pub mod error;
 pub mod faults;
+pub mod fixture;
 pub mod result;
 pub mod stability;
 pub mod strategy;
 pub mod timing;
+pub mod tissue;

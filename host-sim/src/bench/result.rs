@@ -2,11 +2,16 @@
 //!
 //! Lengths are in the scene's unit, times in the unit that the name ends with.
 
+use firmware::{Faults, Mode};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::record::recording::RunMode;
-use crate::runtime::clock::Scheduling;
+use super::tissue::Tissue;
+use crate::runtime::durations::LoopTiming;
+use crate::runtime::ledger::LedgerResult;
+use crate::runtime::mode::RunMode;
+use crate::runtime::names;
+use crate::world::tissue::PlantAccount;
 
 /// Version of this format.
 pub const FORMAT: u32 = 1;
@@ -108,8 +113,8 @@ pub struct PaddleGeometry {
 /// The placement study of one tissue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlacementResult {
-    /// `homogeneous` or `inclusion`.
-    pub tissue: String,
+    /// Its tissue.
+    pub tissue: Tissue,
     /// Nodes of the model.
     pub nodes: usize,
     /// Its integration rule.
@@ -151,7 +156,7 @@ pub struct PaddlePlacement {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseResult {
     /// Tissue of the simulation.
-    pub tissue: String,
+    pub tissue: Tissue,
     /// Tissue that the planner and the table believed in.
     pub table_tissue: String,
     /// The table.
@@ -215,9 +220,13 @@ pub struct StrategyResult {
     /// Length of the paddle's way.
     pub paddle_travel: f64,
     /// State of the controller at the end: `RUN`, `HOLD`, `SAFE`; `none` without one.
-    pub final_state: String,
-    /// Every fault that was ever present.
-    pub faults: String,
+    #[serde(with = "names::mode")]
+    #[schemars(with = "String")]
+    pub final_state: Option<Mode>,
+    /// Every fault that was ever present: names joined by ` | `, or `NONE`.
+    #[serde(with = "names::faults")]
+    #[schemars(with = "String")]
+    pub faults: Faults,
     /// Accounts of samples and ticks.
     pub ledger: Option<LedgerResult>,
     /// Timing of the controller's loop; free-run only.
@@ -245,7 +254,7 @@ pub struct StrategyResult {
     pub plant_step_us: f64,
     /// Which model answered for the tissue, and how well; results of older versions do not say.
     #[serde(default)]
-    pub plant: crate::world::tissue::PlantAccount,
+    pub plant: PlantAccount,
 }
 
 /// The body at one moment of the insertion.
@@ -281,103 +290,4 @@ pub struct SeriesPoint {
     pub axial: f64,
     /// Paddle displacement, length.
     pub paddle: [f64; 2],
-}
-
-/// All accounts of one run of the controller.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct LedgerResult {
-    /// Needle samples.
-    pub needle: StreamResult,
-    /// Target samples.
-    pub target: StreamResult,
-    /// Paddle samples.
-    pub paddle: StreamResult,
-    /// Commands.
-    pub command: StreamResult,
-    /// Ticks.
-    pub ticks: TickResult,
-    /// Sum of everything without an entry: 0.
-    pub unaccounted: u64,
-}
-
-/// One stream: published = consumed + overwritten + discarded + in flight.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct StreamResult {
-    /// Counted by the sender.
-    pub published: u64,
-    /// Used by the receiver.
-    pub consumed: u64,
-    /// Replaced by a newer one before anybody looked.
-    pub overwritten: u64,
-    /// Looked at and refused.
-    pub discarded: u64,
-    /// Refusals by reason, those that occurred.
-    pub discarded_for: Vec<(String, u64)>,
-    /// Published, and not looked at any more when the receiver stopped.
-    pub in_flight: u64,
-    /// Publications without an entry: 0.
-    pub unaccounted: u64,
-}
-
-/// Ticks: due = RUN + HOLD + SAFE + skipped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-pub struct TickResult {
-    /// Came due.
-    pub due: u64,
-    /// Ended in RUN.
-    pub run: u64,
-    /// Ended in HOLD.
-    pub hold: u64,
-    /// Ended in SAFE.
-    pub safe: u64,
-    /// Never started.
-    pub skipped: u64,
-    /// Due ticks without an entry: 0.
-    pub unaccounted: u64,
-}
-
-/// Timing of a loop on the machine's clock.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct LoopTiming {
-    /// Rate, Hz.
-    pub rate_hz: f64,
-    /// Ticks run.
-    pub ticks: u64,
-    /// Steps that ended more than a period after their release.
-    pub deadline_misses: u64,
-    /// Steps that ended after the next release, and wake-ups a period late.
-    pub overruns: u64,
-    /// Periods skipped.
-    pub skipped: u64,
-    /// What the operating system granted.
-    pub scheduling: Scheduling,
-    /// Start minus release.
-    pub release_lateness: Distribution,
-    /// End minus start.
-    pub execution_time: Distribution,
-    /// End minus release.
-    pub response_time: Distribution,
-}
-
-/// A distribution of durations, ns.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Distribution {
-    /// Number of values.
-    pub count: u64,
-    /// Smallest.
-    pub min_ns: u64,
-    /// Median.
-    pub p50_ns: u64,
-    /// 99 %.
-    pub p99_ns: u64,
-    /// 99.9 %.
-    pub p999_ns: u64,
-    /// 99.99 %.
-    pub p9999_ns: u64,
-    /// Largest.
-    pub max_ns: u64,
-    /// Mean.
-    pub mean_ns: f64,
-    /// Histogram: bin of 1 µs (its lower end, µs) and count; empty bins are left out.
-    pub bins_us: Vec<(u64, u64)>,
 }

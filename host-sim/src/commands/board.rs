@@ -1,43 +1,41 @@
 //! `host-sim board`: measures the images and holds them against a budget.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::bench::board::measure::{self, Budget, Figures};
-use crate::error::SimError;
-use crate::exchange::board::BoardError;
-use crate::record::recording::Recording;
-use crate::report::directory;
+use host_sim::SimError;
+use host_sim::bench::board::measure::{self, Budget, Figures, MeasureError};
+use host_sim::record::error::FileError;
+use host_sim::record::files::write_bytes;
+use host_sim::record::recording::Recording;
 
 /// Options of `board`.
 #[derive(clap::Args, Clone, Debug)]
-pub struct BoardArgs {
+pub(crate) struct BoardArgs {
     /// Recording whose inputs are the corpus, as `run` writes it
-    pub recording: PathBuf,
+    pub(crate) recording: PathBuf,
     /// Fail if a figure is more than 2 % above this budget (TOML)
     #[arg(long, value_name = "FILE")]
-    pub budget: Option<PathBuf>,
+    pub(crate) budget: Option<PathBuf>,
     /// Write the measured figures here, as a budget
     #[arg(long, value_name = "FILE")]
-    pub write_budget: Option<PathBuf>,
+    pub(crate) write_budget: Option<PathBuf>,
     /// Measure everything twice and fail if any figure differs
     #[arg(long)]
-    pub twice: bool,
+    pub(crate) twice: bool,
 }
 
 /// Builds, measures, prints, compares.
 ///
 /// # Errors
-/// [`SimError::Board`], [`SimError::Read`], [`SimError::Write`], [`SimError::Recording`].
-pub fn board(args: &BoardArgs) -> Result<(), SimError> {
-    let path = &args.recording;
-    let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: path.clone(), source })?;
-    let recording = Recording::decode(&bytes).map_err(|source| SimError::Recording { path: path.clone(), source })?;
-    let budget = args.budget.as_ref().map(read_budget).transpose()?;
+/// [`SimError::Measure`], [`SimError::File`], [`SimError::Record`].
+pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
+    let recording = Recording::read(&args.recording)?;
+    let budget = args.budget.as_deref().map(read_budget).transpose()?;
     let scenarios = measure::scenarios(&recording)?;
     let mut measured = Budget::new();
     let mut complaints = Vec::new();
-    for image in measure::images()? {
+    for image in measure::images().map_err(MeasureError::from)? {
         let name = measure::name(&image);
         let figures = measure::measure(&image, &scenarios)?;
         if args.twice && measure::measure(&image, &scenarios)? != figures {
@@ -54,9 +52,9 @@ pub fn board(args: &BoardArgs) -> Result<(), SimError> {
     }
     if let Some(path) = &args.write_budget {
         let text = format!("{HEAD}{}", toml::to_string(&measured).unwrap_or_default());
-        directory::write_text(path, &text)?;
+        write_bytes(path, text.as_bytes())?;
     }
-    if complaints.is_empty() { Ok(()) } else { Err(BoardError::Budget(complaints.join("\n")).into()) }
+    if complaints.is_empty() { Ok(()) } else { Err(MeasureError::Budget { complaints }.into()) }
 }
 
 const HEAD: &str = "\
@@ -64,8 +62,8 @@ const HEAD: &str = "\
 # Bytes, and instructions per step by branch. Written by `host-sim board RECORDING --write-budget THIS`.
 ";
 
-fn read_budget(path: &PathBuf) -> Result<Budget, SimError> {
-    let text = std::fs::read_to_string(path).map_err(|source| SimError::Read { path: path.clone(), source })?;
+fn read_budget(path: &Path) -> Result<Budget, SimError> {
+    let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     toml::from_str(&text).map_err(|error| SimError::Usage(format!("the budget {}: {error}", path.display())))
 }
 

@@ -4,35 +4,38 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
-
-use crate::bench::faults::catalogue::ROWS;
-use crate::bench::faults::random::composed;
-use crate::bench::faults::report::{FaultsResult, RowResult, print_composed, print_row};
-use crate::error::SimError;
-use crate::report::directory;
-use crate::runtime::signals;
+use firmware::Mode;
+use host_sim::SimError;
+use host_sim::bench::faults::catalogue::ROWS;
+use host_sim::bench::faults::evidence::Verdict;
+use host_sim::bench::faults::random::{Composed, composed};
+use host_sim::bench::faults::report::{FaultsResult, RowResult};
+use host_sim::bench::fixture::fixture;
+use host_sim::record::error::FileError;
+use host_sim::record::files::{write_bytes, write_json};
+use host_sim::runtime::signals;
 
 /// Options of `faults`.
 #[derive(Args, Clone, Debug)]
-pub struct FaultsArgs {
+pub(crate) struct FaultsArgs {
     /// Only these rows [default: all]
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
-    pub only: Vec<u32>,
+    pub(crate) only: Vec<u32>,
     /// Seed of phases, noise and schedules
     #[arg(long, default_value_t = 1, value_name = "S")]
-    pub seed: u64,
+    pub(crate) seed: u64,
     /// Random schedules of several faults at once [default: 1000, none with --only]
     #[arg(long, value_name = "N")]
-    pub seeds: Option<u64>,
+    pub(crate) seeds: Option<u64>,
     /// Part of the repetitions of rows 33, 35 and 36 (200 kills, 100 kills, 100 cycles)
     #[arg(long, default_value_t = 1.0, value_name = "PART")]
-    pub effort: f64,
+    pub(crate) effort: f64,
     /// Write faults.csv and faults.json into this directory
     #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     /// Also write the result here, as JSON
     #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
+    pub(crate) json: Option<PathBuf>,
 }
 
 /// Random schedules without `--seeds`.
@@ -42,15 +45,15 @@ const DEFAULT_SEEDS: u64 = 1000;
 ///
 /// # Errors
 /// [`SimError::Faults`] when something does not hold; everything is written nevertheless.
-pub fn faults(args: &FaultsArgs) -> Result<FaultsResult, SimError> {
+pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     signals::install();
     if let Some(unknown) = args.only.iter().find(|id| !ROWS.iter().any(|row| row.id == **id)) {
         return Err(SimError::Usage(format!("--only {unknown}: the catalogue has rows 1 to {}", ROWS.len())));
     }
     if let Some(directory) = &args.out {
-        std::fs::create_dir_all(directory).map_err(|source| SimError::Write { path: directory.clone(), source })?;
+        std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
     }
-    let table = crate::bench::faults::fixture()?;
+    let table = fixture()?;
     let mut result = FaultsResult {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: args.seed,
@@ -78,13 +81,56 @@ pub fn faults(args: &FaultsArgs) -> Result<FaultsResult, SimError> {
         println!("seed {}: host-sim faults --seed {} shows it again", args.seed, args.seed);
         return Err(SimError::Faults { failed, rows: result.rows.len(), schedules });
     }
-    Ok(result)
+    Ok(())
 }
 
 fn write(args: &FaultsArgs, result: &FaultsResult) -> Result<(), SimError> {
     if let Some(directory) = &args.out {
-        directory::write_text(&directory.join("faults.csv"), &result.csv())?;
-        directory::write_json(&directory.join("faults.json"), result)?;
+        write_bytes(&directory.join("faults.csv"), &result.csv())?;
+        write_json(&directory.join("faults.json"), result)?;
     }
-    args.json.as_ref().map_or(Ok(()), |path| directory::write_json(path, result))
+    if let Some(path) = &args.json {
+        write_json(path, result)?;
+    }
+    Ok(())
+}
+
+/// Prints a row as soon as it is known.
+fn print_row(row: &RowResult, wall_s: f64) {
+    println!(
+        "{:>2}  {:<46} {:>8} injected {:>8} detected {:>6} ticks  {:<4} unaccounted {}  {}  ({wall_s:.1} s)",
+        row.id,
+        row.name,
+        row.injected,
+        row.detected,
+        row.ticks_to_detect.map_or_else(|| "–".to_owned(), |ticks| ticks.to_string()),
+        row.final_state.map_or("–", Mode::name),
+        row.unaccounted,
+        row.result,
+    );
+    if row.result != Verdict::Passed {
+        for note in &row.notes {
+            println!("    {note}");
+        }
+    }
+}
+
+/// Prints what became of the random schedules.
+fn print_composed(composed: &Composed, wall_s: f64) {
+    let [hold, run, safe] = composed.modes;
+    println!(
+        "{} random schedules of {} faults: {} ticks ({run} RUN, {hold} HOLD, {safe} SAFE), {} injections, {} commands \
+         with fault codes, {} re-armings, largest error {:.3e}, unaccounted {}  ({wall_s:.1} s)",
+        composed.schedules,
+        composed.faults,
+        composed.ticks,
+        composed.injected,
+        composed.flagged,
+        composed.rearmed,
+        composed.max_error,
+        composed.unaccounted,
+    );
+    for failure in &composed.failures {
+        println!("    {failure}");
+    }
 }

@@ -1,47 +1,55 @@
-//! The command line.
+//! The command line: one file per command.
 
-pub mod board;
-pub mod controller;
-pub mod export;
-pub mod faults;
-pub mod plant;
-pub mod schema;
-pub mod stability;
+mod board;
+mod controller;
+mod export;
+mod faults;
+mod plant;
+mod progress;
+mod replay;
+mod report;
+mod run;
+mod schema;
+mod stability;
+mod timing;
+mod timing_peer;
+mod world_args;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{CommandFactory as _, Parser, Subcommand};
+use host_sim::SimError;
+use host_sim::record::error::FileError;
 
-use crate::bench::comparison::{RunArgs, run};
-use crate::bench::timing::peer::{PeerArgs, peer};
-use crate::bench::timing::{TimingArgs, timing};
-use crate::commands::board::{BoardArgs, board};
-use crate::commands::controller::{ControllerArgs, serve};
-use crate::commands::export::{ExportArgs, export};
-use crate::commands::faults::{FaultsArgs, faults};
-use crate::commands::plant::{PlantArgs, plant};
-use crate::commands::schema::{Subject, schema};
-use crate::commands::stability::{StabilityArgs, stability};
-use crate::error::SimError;
-use crate::record::replay;
-use crate::report::directory;
+use self::board::{BoardArgs, board};
+use self::controller::{ControllerArgs, controller};
+use self::export::{ExportArgs, export};
+use self::faults::{FaultsArgs, faults};
+use self::plant::{PlantArgs, plant};
+use self::replay::{ReplayArgs, replay};
+use self::report::{ReportArgs, report};
+use self::run::{RunArgs, run};
+use self::schema::{Subject, schema};
+use self::stability::{StabilityArgs, stability};
+use self::timing::{TimingArgs, timing};
+use self::timing_peer::{PeerArgs, timing_peer};
 
 /// Simulates needle insertions with a paddle that holds the target still. Without a command: `run` on the paper's scene
 #[derive(Debug, Parser)]
 #[command(version, about, args_conflicts_with_subcommands = true)]
 #[command(after_help = "Example: host-sim run --tissue inclusion --seed 7 --out my-report")]
-pub struct Cli {
+pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Option<Command>,
+    pub(crate) command: Option<Command>,
     /// Options of `run`.
     #[command(flatten)]
-    pub run: RunArgs,
+    pub(crate) run: RunArgs,
 }
 
 /// What to do.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Compares no paddle, the best static and the best dynamic paddle, and writes a report
     #[command(
         after_help = "Examples:\n  host-sim run\n  host-sim run --tissue inclusion --table-tissue homogeneous --noise 0\n  host-sim run --scene my.toml --mode free-run --rate 500 --json result.json"
@@ -75,10 +83,7 @@ pub enum Command {
     Stability(StabilityArgs),
     /// Runs the controller again on recorded inputs and compares bit by bit
     #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
-    Replay {
-        /// Recording, as `run` writes it
-        recording: PathBuf,
-    },
+    Replay(ReplayArgs),
     /// Measures the controller's bare-metal images on a Cortex-M7 in QEMU
     #[command(
         after_help = "Example:\n  host-sim run --tissue inclusion --mode lockstep --insertion-time 1.5 --out short\n  host-sim board short/inclusion-dynamic.rec --budget firmware/image/budget.toml"
@@ -112,70 +117,52 @@ pub enum Command {
     #[command(
         after_help = "Examples:\n  host-sim report stillpoint-report\n  host-sim report stillpoint-report --svg-dir figures"
     )]
-    Report {
-        /// Directory of the run
-        directory: PathBuf,
-        /// Also write the charts here, as SVG files
-        #[arg(long, value_name = "DIR")]
-        svg_dir: Option<PathBuf>,
-    },
+    Report(ReportArgs),
 }
 
 /// Does what was asked for.
 ///
 /// # Errors
 /// [`SimError`], with its exit code.
-pub fn execute(cli: Cli) -> Result<(), SimError> {
-    match cli.command {
-        None => run(&cli.run).map(drop),
-        Some(Command::Run(args)) => run(&args).map(drop),
-        Some(Command::Controller(args)) => serve(&args),
-        Some(Command::Plant(args)) => plant(&args),
-        Some(Command::Timing(args)) => timing(&args).map(drop),
-        Some(Command::Stability(args)) => stability(&args).map(drop),
-        Some(Command::TimingPeer(args)) => peer(&args),
-        Some(Command::Export(args)) => export(&args),
-        Some(Command::Schema { of }) => {
+pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
+    let command = cli.command.unwrap_or_else(|| Command::Run(Box::new(cli.run)));
+    match command {
+        Command::Run(args) => run(&args),
+        Command::Controller(args) => controller(&args),
+        Command::Plant(args) => plant(&args),
+        Command::Timing(args) => timing(&args),
+        Command::TimingPeer(args) => timing_peer(&args),
+        Command::Faults(args) => faults(&args),
+        Command::Stability(args) => stability(&args),
+        Command::Replay(args) => replay(&args),
+        Command::Board(args) => board(&args),
+        Command::Export(args) => export(&args),
+        Command::Schema { of } => {
             println!("{:#}", schema(of));
             Ok(())
         }
-        Some(Command::Completions { shell }) => {
+        Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut std::io::stdout());
             Ok(())
         }
-        Some(Command::Man { directory }) => {
-            let write = |source| SimError::Write { path: directory.clone(), source };
-            std::fs::create_dir_all(&directory).map_err(write)?;
-            clap_mangen::generate_to(Cli::command(), &directory).map_err(write)?;
-            println!("{}", directory.join("host-sim.1").display());
-            Ok(())
-        }
-        Some(Command::Faults(args)) => faults(&args).map(drop),
-        Some(Command::Board(args)) => board(&args),
-        Some(Command::Replay { recording }) => {
-            let replayed = replay::replay_file(&recording)?;
-            println!(
-                "{} of {} commands agree bit by bit ({}, seed {})",
-                replayed.ticks, replayed.ticks, replayed.mode, replayed.seed
-            );
-            Ok(())
-        }
-        Some(Command::Report { directory, svg_dir }) => {
-            directory::rebuild_report(&directory)?;
-            println!("{}", directory.join("report.html").display());
-            for path in svg_dir.map_or_else(|| Ok(Vec::new()), |into| directory::write_pictures(&directory, &into))? {
-                println!("{}", path.display());
-            }
-            Ok(())
-        }
+        Command::Man { directory } => man(&directory),
+        Command::Report(args) => report(&args),
     }
+}
+
+/// Writes the manual pages.
+fn man(directory: &Path) -> Result<(), SimError> {
+    std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
+    clap_mangen::generate_to(Cli::command(), directory).map_err(FileError::write(directory))?;
+    println!("{}", directory.join("host-sim.1").display());
+    Ok(())
 }
 
 /// Commands of the other program of this project, for those who mix them up.
 const ELSEWHERE: [&str; 8] = ["place", "solve", "table", "inspect", "new", "fit", "pareto", "stability"];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
-pub fn parse() -> Cli {
+pub(crate) fn parse() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         let wrong = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
         // `run` is also what happens without a command: a wrong word is then an argument that is not expected.

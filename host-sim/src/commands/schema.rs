@@ -1,14 +1,14 @@
-//! Published schemas of what this program writes.
+//! `host-sim schema`: published schemas of what this program writes.
 
 use clap::ValueEnum;
+use host_sim::bench::result::RunResult;
+use host_sim::bench::timing::TimingResult;
+use host_sim::record::export::mcap;
 use schemars::schema_for;
-
-use crate::bench::result::RunResult;
-use crate::record::export::mcap;
 
 /// What a schema is about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Subject {
+pub(crate) enum Subject {
     /// `run --json`, `result.json`
     #[default]
     Result,
@@ -19,10 +19,10 @@ pub enum Subject {
 }
 
 /// The JSON Schema of `subject`.
-pub fn schema(subject: Subject) -> serde_json::Value {
+pub(crate) fn schema(subject: Subject) -> serde_json::Value {
     match subject {
         Subject::Result => schema_for!(RunResult).to_value(),
-        Subject::Timing => schema_for!(crate::bench::timing::TimingResult).to_value(),
+        Subject::Timing => schema_for!(TimingResult).to_value(),
         Subject::Mcap => {
             mcap::schemas().into_iter().map(|(topic, schema)| (topic.to_owned(), schema.to_value())).collect()
         }

@@ -7,10 +7,12 @@ use std::path::PathBuf;
 #[non_exhaustive]
 pub enum LinkError {
     /// The name cannot be part of a file name.
-    #[error("`{name}` cannot name a link: use 1 to {} letters, digits, `-` or `_`", super::space::LONGEST_NAME)]
+    #[error("`{name}` cannot name a link: use 1 to {longest} letters, digits, `-` or `_`")]
     Name {
         /// The name.
         name: String,
+        /// Characters that a name may have.
+        longest: usize,
     },
     /// The directory for the link's files cannot be made.
     #[error("cannot make the directory {} for shared memory", path.display())]

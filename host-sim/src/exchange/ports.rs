@@ -9,12 +9,15 @@ use iceoryx2::prelude::SignalHandlingMode;
 use iceoryx2::service::Service;
 use serde::{Deserialize, Serialize};
 
-use super::{ClockFrame, LinkError, Receiver, Sender, Space};
+use super::error::LinkError;
+use super::space::Space;
+use super::stream::{Receiver, Sender};
+use super::wire::{ClockFrame, Frame};
 
 fn node<S: Service>(space: &Space) -> Result<Node<S>, LinkError> {
     NodeBuilder::new()
         .config(space.config())
-        // Signals are ours: see `crate::runtime::signals`.
+        // Signals belong to the program.
         .signal_handling_mode(SignalHandlingMode::Disabled)
         .create::<S>()
         .map_err(LinkError::Node)
@@ -179,7 +182,7 @@ impl<S: Service> ControllerPorts<S> {
     }
 }
 
-fn counts<S: Service, F: super::Frame>(receiver: &Receiver<S, F>) -> ReceiveCounts {
+fn counts<S: Service, F: Frame>(receiver: &Receiver<S, F>) -> ReceiveCounts {
     ReceiveCounts { received: receiver.received(), superseded: receiver.superseded() }
 }
 

@@ -10,10 +10,10 @@ use iceoryx2::node::{Node, NodeState};
 use iceoryx2::prelude::CallbackProgression;
 use iceoryx2::service::Service;
 
-use super::LinkError;
+use super::error::LinkError;
 
 /// Longest name of a link: file names of iceoryx2 put a prefix and a hash around it.
-pub(super) const LONGEST_NAME: usize = 40;
+const LONGEST_NAME: usize = 40;
 
 /// Where POSIX shared memory appears as files.
 const SHARED_MEMORY: &str = "/dev/shm";
@@ -67,7 +67,7 @@ impl Space {
     /// # Errors
     /// [`LinkError::Name`], [`LinkError::Directory`], [`LinkError::Foreign`].
     pub fn new(name: &str) -> Result<Self, LinkError> {
-        let invalid = || LinkError::Name { name: name.to_owned() };
+        let invalid = || LinkError::Name { name: name.to_owned(), longest: LONGEST_NAME };
         let admitted = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(admitted) {
             return Err(invalid());

@@ -14,7 +14,8 @@ use iceoryx2::service::builder::publish_subscribe::{
 };
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
-use super::{Frame, LinkError, Wire};
+use super::error::LinkError;
+use super::wire::{Frame, Wire};
 
 /// Frames that wait at most; older ones are overwritten. Enough for a stopped reader to see that time has passed,
 /// short enough that draining never takes long.

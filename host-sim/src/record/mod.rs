@@ -1,5 +1,7 @@
-//! What is kept: recordings of every tick, their replay, and other tools' formats.
+//! What is kept: recordings of every tick, their replay, and files for other tools.
 
+pub mod error;
 pub mod export;
+pub mod files;
 pub mod recording;
 pub mod replay;

@@ -20,20 +20,19 @@
 
 use std::path::Path;
 
-use firmware::Inputs;
 use firmware::Settings;
-use firmware::contract::PaddleCommand;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use crate::error::SimError;
+use super::error::{RecordError, RecordingError};
+use super::files;
 use crate::exchange::bytes::{Reader, Writer};
+use crate::runtime::mode::RunMode;
+use crate::runtime::tick::ControllerTick;
+use crate::world::truth::Truth;
 
 mod layout;
 pub mod stream;
 
-pub use layout::EXCHANGE_BYTES;
 use layout::{decode_header, decode_record, encode_header, encode_record};
 
 const MAGIC: [u8; 8] = *b"STILLREC";
@@ -43,25 +42,6 @@ const HASH_BYTES: usize = 32;
 const RECORD_BYTES: usize = BODY_BYTES + HASH_BYTES;
 const END_MARK: u32 = u32::from_le_bytes(*b"END.");
 const TICK_MARK: u32 = u32::from_le_bytes(*b"TICK");
-
-/// Whether messages or the machine's clock drive time. Never mixed; every output says which it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
-#[serde(rename_all = "kebab-case")]
-pub enum RunMode {
-    /// Time comes from the messages: deterministic, as fast as it goes.
-    Lockstep,
-    /// Steady clock, absolute deadlines.
-    FreeRun,
-}
-
-impl std::fmt::Display for RunMode {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Lockstep => "lockstep",
-            Self::FreeRun => "free-run",
-        })
-    }
-}
 
 /// Everything that a replay needs besides the records.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,44 +58,11 @@ pub struct Header {
     pub table: Vec<u8>,
 }
 
-/// Reads and checks a recording file.
-///
-/// # Errors
-/// [`SimError::Read`], [`SimError::Recording`].
-pub fn read_recording(path: &Path) -> Result<Recording, SimError> {
-    let bytes = std::fs::read(path).map_err(|source| SimError::Read { path: path.to_owned(), source })?;
-    Recording::decode(&bytes).map_err(|source| SimError::Recording { path: path.to_owned(), source })
-}
-
-/// What the controller saw and answered in one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Exchange {
-    /// Inputs of the step.
-    pub inputs: Inputs,
-    /// Its command.
-    pub command: PaddleCommand,
-}
-
-/// What really happened at a tick, which the controller does not see.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
-    /// Tick of the plant.
-    pub tick: u64,
-    /// Time of that tick, ns.
-    pub time_ns: u64,
-    /// Needle depth, length.
-    pub depth: f64,
-    /// Target displacement, length.
-    pub target: [f64; 2],
-    /// Paddle displacement, length.
-    pub paddle: [f64; 2],
-}
-
 /// One tick of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Record {
     /// The controller's side.
-    pub exchange: Exchange,
+    pub tick: ControllerTick,
     /// The plant's side; none where the plant skipped the tick, or was not asked.
     pub truth: Option<Truth>,
 }
@@ -129,49 +76,16 @@ pub struct Recording {
     pub records: Vec<Record>,
 }
 
-/// Why bytes are not a recording.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[non_exhaustive]
-pub enum RecordingError {
-    /// The magic is not there.
-    #[error("this is not a recording of host-sim")]
-    NotARecording,
-    /// Another version.
-    #[error("its format version is {found}, this program reads {FORMAT_VERSION}")]
-    Version {
-        /// What was found.
-        found: u32,
-    },
-    /// The header does not hash to its chain value.
-    #[error("its header has been altered or cut off")]
-    Header,
-    /// A record does not continue the chain.
-    #[error("the chain breaks at record {record}: altered from there on; the records before are intact")]
-    Chain {
-        /// Number of the record, from 0.
-        record: usize,
-    },
-    /// The end mark is missing.
-    #[error("it ends after {records} whole records without an end mark: the run was cut off")]
-    Unfinished {
-        /// Whole records.
-        records: usize,
-    },
-    /// Something follows the end mark.
-    #[error("{bytes} bytes follow its end mark")]
-    Trailing {
-        /// How many.
-        bytes: usize,
-    },
-    /// A value that cannot be, although the chain is whole: written by something else.
-    #[error("record {record} holds an impossible value")]
-    Value {
-        /// Number of the record, from 0.
-        record: usize,
-    },
-}
-
 impl Recording {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`RecordError::File`], [`RecordError::Recording`].
+    pub fn read(path: &Path) -> Result<Self, RecordError> {
+        let bytes = files::read_bytes(path)?;
+        Self::decode(&bytes).map_err(|source| RecordError::Recording { path: path.to_owned(), source })
+    }
+
     /// The bytes of the file.
     pub fn encode(&self) -> Vec<u8> {
         let (mut chain, mut bytes) = Chain::start(&self.header);

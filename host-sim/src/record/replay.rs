@@ -4,9 +4,10 @@ use std::path::Path;
 
 use firmware::contract::PaddleCommand;
 
-use crate::error::SimError;
-use crate::record::recording::{Recording, RunMode, read_recording};
+use super::error::RecordError;
+use super::recording::Recording;
 use crate::runtime::executor::AnyTable;
+use crate::runtime::mode::RunMode;
 
 /// A replay without differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -22,25 +23,26 @@ pub struct Replayed {
 /// Reads and checks a recording file, then replays it.
 ///
 /// # Errors
-/// [`SimError::Read`], [`SimError::Recording`], and as [`replay`].
-pub fn replay_file(path: &Path) -> Result<Replayed, SimError> {
-    replay(&read_recording(path)?, path)
+/// [`RecordError::File`], [`RecordError::Recording`], and as [`replay`].
+pub fn replay_file(path: &Path) -> Result<Replayed, RecordError> {
+    replay(&Recording::read(path)?, path)
 }
 
 /// Replays a recording; `path` is for messages.
 ///
 /// # Errors
-/// [`SimError::ReplayDiffers`]; [`SimError::Table`], [`SimError::Settings`] if the controller cannot be built again.
-pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, SimError> {
+/// [`RecordError::ReplayDiffers`]; [`RecordError::Table`], [`RecordError::Runtime`] if the controller cannot be built again.
+pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, RecordError> {
     let header = &recording.header;
-    let table = AnyTable::decode(&header.table).map_err(|source| SimError::Table { path: path.to_owned(), source })?;
-    let mut core = table.native(&header.settings)?;
+    let table =
+        AnyTable::decode(&header.table).map_err(|source| RecordError::Table { path: path.to_owned(), source })?;
+    let mut executor = table.on_this_machine(&header.settings)?;
     let mut differences = 0;
     let mut first = None;
     for record in &recording.records {
-        let inputs = &record.exchange.inputs;
-        let command = core.step(inputs)?;
-        if let Some(detail) = difference(&record.exchange.command, &command) {
+        let inputs = &record.tick.inputs;
+        let command = executor.step(inputs)?;
+        if let Some(detail) = difference(&record.tick.command, &command) {
             differences += 1;
             first.get_or_insert((inputs.tick, detail));
         }
@@ -49,7 +51,7 @@ pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, SimError> 
     match first {
         None => Ok(Replayed { ticks, mode: header.mode, seed: header.seed }),
         Some((tick, detail)) => {
-            Err(SimError::ReplayDiffers { path: path.to_owned(), differences, ticks, tick, detail })
+            Err(RecordError::ReplayDiffers { path: path.to_owned(), differences, ticks, tick, detail })
         }
     }
 }

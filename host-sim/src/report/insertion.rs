@@ -7,6 +7,7 @@ use super::chart::Chart;
 use super::number::{NO_NUMBER, in_unit, number, plain};
 use super::svg::Drawing;
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::runtime::names;
 
 /// Strategies in the order in which they are shown: class of their line and name.
 pub(super) fn strategies(case: &CaseResult) -> Vec<(&'static str, &'static str, &StrategyResult)> {
@@ -29,7 +30,7 @@ fn is_dynamic(class: &str) -> bool {
 
 /// A case in words.
 pub(super) fn case_name(case: &CaseResult) -> String {
-    if case.tissue == case.table_tissue {
+    if case.tissue.name() == case.table_tissue {
         format!("{}, table of the same tissue", case.tissue)
     } else {
         format!("{}, table of tissue {}", case.tissue, case.table_tissue)
@@ -64,7 +65,7 @@ pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> 
         charts.drawings.push(drawing);
     };
 
-    let mismatch = case.tissue != case.table_tissue;
+    let mismatch = case.tissue.name() != case.table_tissue;
     let mut chart = Chart::new(
         &format!(
             "All strategies, {}{}",
@@ -138,7 +139,7 @@ pub(super) fn table(run: &RunResult) -> Markup {
                     td { (number(strategy.max_orthogonal_error, 4)) } td { (plain(strategy.max_error_depth)) }
                     td { (number(strategy.rms_orthogonal_error, 4)) }
                     td { (number(strategy.paddle_travel, 4)) }
-                    td.left { (strategy.final_state) } td.wrap { (strategy.faults) }
+                    td.left { (names::mode::name(strategy.final_state)) } td.wrap { (strategy.faults) }
                 }
             } } }
         } }

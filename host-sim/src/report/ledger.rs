@@ -4,14 +4,15 @@ use maud::{Markup, html};
 
 use super::insertion::strategies;
 use super::number::{NO_NUMBER, count};
-use crate::bench::result::{LedgerResult, RunResult};
+use crate::bench::result::RunResult;
+use crate::runtime::ledger::LedgerResult;
 
 fn ledgers(run: &RunResult) -> Vec<(String, &LedgerResult)> {
     run.cases
         .iter()
         .flat_map(|case| strategies(case).into_iter().map(move |shown| (case, shown)))
         .filter_map(|(case, (.., strategy))| {
-            let table = if case.tissue == case.table_tissue {
+            let table = if case.tissue.name() == case.table_tissue {
                 String::new()
             } else {
                 format!(" (table of {})", case.table_tissue)

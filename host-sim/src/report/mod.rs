@@ -21,6 +21,7 @@ mod style;
 pub mod summary;
 mod svg;
 mod timing;
+pub mod timing_summary;
 mod view;
 
 pub use self::attachments::Attachments;
@@ -33,9 +34,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::insertion::{CaseCharts, case_charts, case_name, strategies};
 use self::number::{in_unit, number, plain};
+use self::paper::{is_paper, paper_optima};
 use self::svg::{Drawing, sheet};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
-use crate::report::paper::{is_paper, paper_optima};
 
 const SCRIPT: &str = include_str!("page.js");
 /// Whatever a string in the result says, the page loads nothing.
@@ -64,7 +65,7 @@ fn dynamic(case: &CaseResult) -> Option<&StrategyResult> {
 /// The result in one sentence.
 fn sentence(run: &RunResult) -> String {
     let best = |placement: &PlacementResult| (placement.best_static, placement.best_dynamic);
-    let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, &p.tissue)).collect();
+    let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, p.tissue)).collect();
     let all_agree = paper.iter().zip(&run.placements).all(|(paper, placement)| *paper == Some(best(placement)));
     let placements: Vec<String> = run
         .placements
@@ -296,6 +297,6 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
 }
 
 /// Histograms of loops with bins of 1 µs and logarithmic axes, as one picture.
-pub fn timing_histograms(loops: &[(&str, &crate::bench::result::LoopTiming)]) -> String {
+pub fn timing_histograms(loops: &[(&str, &crate::runtime::durations::LoopTiming)]) -> String {
     sheet(&timing::histograms(loops), 3)
 }

@@ -5,9 +5,9 @@ use maud::{Markup, html};
 use super::axis::Axis;
 use super::chart::Chart;
 use super::number::{NO_NUMBER, in_unit, number, plain};
+use super::paper::{is_paper, paper_controllability, paper_optima};
 use super::svg::{Drawing, Marker};
 use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
-use crate::report::paper::{is_paper, paper_controllability, paper_optima};
 
 fn names(placement: &PlacementResult) -> impl Iterator<Item = String> {
     placement.paddles.iter().map(|paddle| paddle.index.to_string())
@@ -29,7 +29,7 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Drawing> {
     run.placements
         .iter()
         .map(|placement| {
-            let figure = match placement.tissue.as_str() {
+            let figure = match placement.tissue.name() {
                 "homogeneous" if is_paper(&run.scene) => ", as in Figure 2",
                 "inclusion" if is_paper(&run.scene) => ", as in Figure 3",
                 _ => "",
@@ -40,7 +40,7 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Drawing> {
                 Axis::places("paddle position", names(placement)),
                 Axis::linear("orthogonal displacement", &run.units[0], values.iter().copied()),
             );
-            if let Some((optimum, _)) = paper_optima(&run.scene, &placement.tissue)
+            if let Some((optimum, _)) = paper_optima(&run.scene, placement.tissue)
                 && let Some(x) = place(placement, optimum)
             {
                 chart.strip("strip", "the paper's optimum", x - 0.4, x + 0.4);
@@ -67,7 +67,7 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Drawing> {
 
 /// Controllability measures, one chart per tissue on the same scale.
 pub(super) fn controllability_charts(run: &RunResult) -> Vec<Drawing> {
-    let paper = |placement: &PlacementResult, index| paper_controllability(&run.scene, &placement.tissue, index);
+    let paper = |placement: &PlacementResult, index| paper_controllability(&run.scene, placement.tissue, index);
     let values: Vec<f64> = run
         .placements
         .iter()
@@ -118,7 +118,7 @@ fn deviation(value: f64, reference: Option<f64>) -> String {
 
 fn remark(run: &RunResult, placement: &PlacementResult, paddle: &PaddlePlacement) -> String {
     let best = (paddle.index == placement.best_static).then(|| "best here".to_owned());
-    let paper = paper_optima(&run.scene, &placement.tissue).filter(|optima| optima.0 == paddle.index);
+    let paper = paper_optima(&run.scene, placement.tissue).filter(|optima| optima.0 == paddle.index);
     let paper = paper.map(|_| "the paper's optimum".to_owned());
     let failure = paddle.failure.as_ref().map(|failure| format!("stopped early: {failure}"));
     best.into_iter().chain(paper).chain(failure).collect::<Vec<_>>().join(", ")
@@ -157,7 +157,7 @@ pub(super) fn controllability_table(run: &RunResult) -> Markup {
                 th { "J⁻¹n, x" } th { "J⁻¹n, y" }
             } }
             tbody { @for placement in &run.placements { @for paddle in &placement.paddles {
-                @let reported = paper_controllability(&run.scene, &placement.tissue, paddle.index);
+                @let reported = paper_controllability(&run.scene, placement.tissue, paddle.index);
                 tr class=[mark(paddle.index == placement.best_dynamic)] {
                     td { (placement.tissue) } td { (paddle.index) }
                     td { (number(paddle.controllability_measure, 5)) }

@@ -5,61 +5,97 @@ use std::fmt::Write as _;
 use firmware::stability::gain_limit;
 use model_offline::output::chart::{Axis, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
 
-use crate::bench::stability::Behaviour;
+use crate::bench::stability::StabilityResult;
+use crate::bench::stability::behaviour::Behaviour;
 use crate::bench::stability::cells::{ANGLES, Boundary, DELAYS};
-use crate::bench::stability::mismatch::{Mismatch, Tissue};
-use crate::bench::stability::rate_limit::{self, Law};
-use crate::commands::stability::ClosedLoop;
+use crate::bench::stability::mismatch::Mismatch;
+use crate::bench::stability::rate_limit::{self, Cell, Law};
+use crate::bench::tissue::Tissue;
+use crate::record::export::csv::table;
 
-/// One table for the three parts; columns that do not belong to a part are empty.
-pub(crate) fn csv(result: &ClosedLoop) -> String {
-    let mut out = String::from(
-        "part,delay_samples,gain,lambda_abs,lambda_arg_degrees,theory_gain_limit,theory_stable_cells,\
-         simulated_stable_cells,disagreeing_cells,paddle,table_tissue,tissue,depth,lambda_abs_max,lambda_orthogonal,\
-         theory_margin,simulated_margin,law,gain_over_limit,error_over_reach,remaining,behaviour\n",
-    );
-    for b in &result.boundaries {
-        let _ = writeln!(
-            out,
-            "gain-delay-jacobian,{},,{},{},{:.6},{},{},{},{},,,,,,,,,,,,",
-            b.delay, b.size, b.angle, b.theory, b.theory_cells, b.simulated_cells, b.disagreeing, result.paddle
-        );
-    }
-    for m in &result.mismatches {
-        let _ = writeln!(
-            out,
-            "table-mismatch,{},{:.6},{:.6},{:.4},{:.6},,,,{},{},{},{:.6},{:.6},{:.6},{:.4},{:.4},,,,,{}",
-            m.gain.1,
-            m.gain.0,
-            m.eigenvalue.0,
-            m.eigenvalue.1,
-            m.gain.0 * m.margin,
-            m.paddle,
-            m.table.name(),
-            m.tissue.name(),
-            m.depth,
-            m.largest,
-            m.orthogonal,
-            m.margin,
-            m.simulated_margin,
-            m.behaviour.name()
-        );
-    }
-    for c in &result.cells {
-        let limit = gain_limit(0.0, c.delay);
-        let _ = writeln!(
-            out,
-            "rate-limit,{},{:.6},1,0,{limit:.6},,,,,,,,,,,,{},{:.6},{:.6},{:.6e},{}",
-            c.delay,
-            c.gain_share * limit,
-            c.law.name(),
-            c.gain_share,
-            c.amplitude,
-            c.remaining,
-            c.behaviour.name()
-        );
-    }
-    out
+/// Columns of the three parts; those that do not belong to a part are empty.
+const COLUMNS: [&str; 22] = [
+    "part",
+    "delay_samples",
+    "gain",
+    "lambda_abs",
+    "lambda_arg_degrees",
+    "theory_gain_limit",
+    "theory_stable_cells",
+    "simulated_stable_cells",
+    "disagreeing_cells",
+    "paddle",
+    "table_tissue",
+    "tissue",
+    "depth",
+    "lambda_abs_max",
+    "lambda_orthogonal",
+    "theory_margin",
+    "simulated_margin",
+    "law",
+    "gain_over_limit",
+    "error_over_reach",
+    "remaining",
+    "behaviour",
+];
+
+/// One table for the three parts.
+pub fn csv(result: &StabilityResult) -> Vec<u8> {
+    let boundaries = result.boundaries.iter().map(|boundary| boundary_row(boundary, result.paddle));
+    let mismatches = result.mismatches.iter().map(mismatch_row);
+    let rows: Vec<_> = boundaries.chain(mismatches).chain(result.cells.iter().map(rate_limit_row)).collect();
+    table(COLUMNS, &rows, Clone::clone)
+}
+
+fn boundary_row(b: &Boundary, paddle: u32) -> [String; 22] {
+    let mut row: [String; 22] = Default::default();
+    row[0] = "gain-delay-jacobian".to_owned();
+    row[1] = b.delay.to_string();
+    row[3] = b.size.to_string();
+    row[4] = b.angle.to_string();
+    row[5] = format!("{:.6}", b.theory);
+    row[6] = b.theory_cells.to_string();
+    row[7] = b.simulated_cells.to_string();
+    row[8] = b.disagreeing.to_string();
+    row[9] = paddle.to_string();
+    row
+}
+
+fn mismatch_row(m: &Mismatch) -> [String; 22] {
+    let mut row: [String; 22] = Default::default();
+    row[0] = "table-mismatch".to_owned();
+    row[1] = m.gain.1.to_string();
+    row[2] = format!("{:.6}", m.gain.0);
+    row[3] = format!("{:.6}", m.eigenvalue.0);
+    row[4] = format!("{:.4}", m.eigenvalue.1);
+    row[5] = format!("{:.6}", m.gain.0 * m.margin);
+    row[9] = m.paddle.to_string();
+    row[10] = m.table.to_string();
+    row[11] = m.tissue.to_string();
+    row[12] = format!("{:.6}", m.depth);
+    row[13] = format!("{:.6}", m.largest);
+    row[14] = format!("{:.6}", m.orthogonal);
+    row[15] = format!("{:.4}", m.margin);
+    row[16] = format!("{:.4}", m.simulated_margin);
+    row[21] = m.behaviour.name().to_owned();
+    row
+}
+
+fn rate_limit_row(c: &Cell) -> [String; 22] {
+    let limit = gain_limit(0.0, c.delay);
+    let mut row: [String; 22] = Default::default();
+    row[0] = "rate-limit".to_owned();
+    row[1] = c.delay.to_string();
+    row[2] = format!("{:.6}", c.gain_share * limit);
+    row[3] = "1".to_owned();
+    row[4] = "0".to_owned();
+    row[5] = format!("{limit:.6}");
+    row[17] = c.law.name().to_owned();
+    row[18] = format!("{:.6}", c.gain_share);
+    row[19] = format!("{:.6}", c.amplitude);
+    row[20] = format!("{:.6e}", c.remaining);
+    row[21] = c.behaviour.name().to_owned();
+    row
 }
 
 const MARKERS: [(Marker, bool); 6] = [
@@ -73,7 +109,7 @@ const MARKERS: [(Marker, bool); 6] = [
 const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::DashDot, Dash::Dotted];
 
 /// Theory beside simulation, tables on other tissue, and rate limits.
-pub(crate) fn figure(result: &ClosedLoop) -> Figure {
+pub fn figure(result: &StabilityResult) -> Figure {
     let mut panels = vec![boundary_panel(result)];
     if !result.mismatches.is_empty() {
         let allowed =
@@ -105,7 +141,7 @@ pub(crate) fn figure(result: &ClosedLoop) -> Figure {
 }
 
 /// Limit of the gain against the angle of the eigenvalues, by delay.
-fn boundary_panel(result: &ClosedLoop) -> Panel {
+fn boundary_panel(result: &StabilityResult) -> Panel {
     let mut series = Vec::new();
     for (k, delay) in DELAYS.into_iter().enumerate() {
         let curve = (0..=89).map(|a| (f64::from(a), gain_limit(f64::from(a).to_radians(), delay))).collect();
@@ -135,14 +171,14 @@ fn boundary_panel(result: &ClosedLoop) -> Panel {
 }
 
 /// The middle between the last cell that settles and the first that does not.
-fn simulated_limit(result: &ClosedLoop, boundary: &Boundary) -> f64 {
+fn simulated_limit(result: &StabilityResult, boundary: &Boundary) -> f64 {
     let gains = result.gains();
     let last = gains[boundary.simulated_cells - 1];
     gains.get(boundary.simulated_cells).map_or(last, |next| (last * next).sqrt())
 }
 
 fn mismatch_panel(
-    result: &ClosedLoop,
+    result: &StabilityResult,
     title: &str,
     label: &str,
     table: Tissue,
@@ -182,7 +218,7 @@ fn mismatch_panel(
     }
 }
 
-fn rate_panel(result: &ClosedLoop, law: Law, delay: u32) -> Panel {
+fn rate_panel(result: &StabilityResult, law: Law, delay: u32) -> Panel {
     let of = |behaviour| {
         let cells = result.cells.iter().filter(|c| c.law == law && c.delay == delay && c.behaviour == behaviour);
         cells.map(|c| (c.gain_share, c.amplitude)).collect::<Vec<_>>()
@@ -207,7 +243,7 @@ fn rate_panel(result: &ClosedLoop, law: Law, delay: u32) -> Panel {
 }
 
 /// One screen.
-pub(crate) fn summary(result: &ClosedLoop) -> String {
+pub fn summary(result: &StabilityResult) -> String {
     let mut out = format!("{} · closed loop around paddle {}\n\n", result.scene, result.paddle);
     let cells = result.boundaries.len() * result.gains().len();
     let disagreeing: usize = result.boundaries.iter().map(|b| b.disagreeing).sum();

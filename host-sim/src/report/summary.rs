@@ -3,8 +3,11 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use model_offline::scene::PlantModel;
+
+use super::paper::paper_optima;
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
-use crate::report::paper::paper_optima;
+use crate::runtime::names;
 
 /// The summary of a run that is at `directory`.
 pub fn summary(run: &RunResult, directory: &Path) -> String {
@@ -19,7 +22,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     writeln!(text, "Scene {}, {}, seed {}\n", run.scene, run.mode, run.seed)?;
     writeln!(text, "Best paddle       static   dynamic")?;
     for placement in &run.placements {
-        let paper = match paper_optima(&run.scene, &placement.tissue) {
+        let paper = match paper_optima(&run.scene, placement.tissue) {
             None => String::new(),
             Some((fixture, dynamic)) => {
                 let agrees = (fixture, dynamic) == (placement.best_static, placement.best_dynamic);
@@ -27,7 +30,13 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
                 format!("      paper: {fixture} and {dynamic}, {verdict}")
             }
         };
-        writeln!(text, "  {:<15} {:>6} {:>9}{paper}", placement.tissue, placement.best_static, placement.best_dynamic)?;
+        writeln!(
+            text,
+            "  {:<15} {:>6} {:>9}{paper}",
+            placement.tissue.name(),
+            placement.best_static,
+            placement.best_dynamic
+        )?;
     }
     writeln!(
         text,
@@ -58,7 +67,7 @@ fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
     write!(
         text,
         "  {:<13} {:<13} {:>10} {:>13} {:>13}",
-        case.tissue,
+        case.tissue.name(),
         case.table_tissue,
         error(strategies.none.as_ref()),
         error(strategies.fixture.as_ref()),
@@ -66,9 +75,17 @@ fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
     )?;
     match (case.improvement, dynamic) {
         (Some(factor), Some(dynamic)) => {
-            writeln!(text, "   {factor:.0} times less, {}", dynamic.final_state)
+            writeln!(text, "   {factor:.0} times less, {}", names::mode::name(dynamic.final_state))
         }
         _ => writeln!(text),
+    }
+}
+
+const fn plant_name(model: PlantModel) -> &'static str {
+    match model {
+        PlantModel::Full => "full",
+        PlantModel::Reduced => "reduced",
+        PlantModel::Condensed => "condensed",
     }
 }
 
@@ -78,10 +95,10 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
         let strategies = &case.strategies;
         for strategy in [&strategies.dynamic, &strategies.dynamic_free_run].into_iter().flatten() {
             let plant = &strategy.plant;
-            if plant.fallbacks == 0 && plant.first_fallback.is_none() && matches!(plant.model.as_str(), "full" | "") {
+            if plant.fallbacks == 0 && plant.first_fallback.is_none() && plant.model == PlantModel::Full {
                 continue;
             }
-            write!(text, "  {}, {}: tissue {}", case.tissue, strategy.mode, plant.model)?;
+            write!(text, "  {}, {}: tissue {}", case.tissue, strategy.mode, plant_name(plant.model))?;
             if let (Some(modes), Some([points, all])) = (plant.modes, plant.points) {
                 write!(text, " ({modes} modes, {points} of {all} points)")?;
             }

@@ -2,8 +2,12 @@
 
 use super::*;
 use crate::bench::result::*;
-use crate::record::recording::RunMode;
+use crate::bench::tissue::Tissue;
 use crate::runtime::clock::Scheduling;
+use crate::runtime::durations::{Distribution, LoopTiming};
+use crate::runtime::ledger::{LedgerResult, StreamResult};
+use crate::runtime::mode::RunMode;
+use firmware::Faults;
 
 const EVIL: &str = "<script>alert(\"x\")</script>&'";
 
@@ -25,8 +29,8 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         max_error_depth: 0.1,
         rms_orthogonal_error: 0.5 * error,
         paddle_travel: 0.0,
-        final_state: EVIL.to_owned(),
-        faults: EVIL.to_owned(),
+        final_state: None,
+        faults: Faults::NONE,
         ledger: controlled.then(|| LedgerResult {
             needle: StreamResult {
                 published: 1_234_567,
@@ -89,8 +93,8 @@ fn paddle_placement(index: u32) -> PaddlePlacement {
 }
 
 fn run(scene: &str) -> RunResult {
-    let placement = |tissue: &str| PlacementResult {
-        tissue: tissue.to_owned(),
+    let placement = |tissue: Tissue| PlacementResult {
+        tissue,
         nodes: 9,
         integration: EVIL.to_owned(),
         wall_s: 0.1,
@@ -98,8 +102,8 @@ fn run(scene: &str) -> RunResult {
         best_dynamic: 1,
         paddles: vec![paddle_placement(1), paddle_placement(2)],
     };
-    let case = |tissue: &str, table_tissue: &str| CaseResult {
-        tissue: tissue.to_owned(),
+    let case = |tissue: Tissue, table_tissue: &str| CaseResult {
+        tissue,
         table_tissue: table_tissue.to_owned(),
         table: TableResult {
             hash: EVIL.to_owned(),
@@ -155,8 +159,8 @@ fn run(scene: &str) -> RunResult {
             inclusions: vec![vec![[0.6, 0.6], [0.8, 0.6], [0.8, 0.8]]],
             nodes: rest(),
         },
-        placements: vec![placement("homogeneous"), placement("inclusion")],
-        cases: vec![case("homogeneous", "homogeneous"), case(EVIL, "inclusion")],
+        placements: vec![placement(Tissue::Homogeneous), placement(Tissue::Inclusion)],
+        cases: vec![case(Tissue::Homogeneous, "homogeneous"), case(Tissue::Inclusion, EVIL)],
         wall_s: 1.0,
         command: vec!["host-sim".to_owned(), EVIL.to_owned()],
         platform: EVIL.to_owned(),

@@ -6,15 +6,16 @@ use super::axis::Axis;
 use super::chart::Chart;
 use super::number::{count, number};
 use super::svg::Drawing;
-use crate::bench::result::{Distribution, LoopTiming, RunResult};
+use crate::bench::result::RunResult;
+use crate::runtime::durations::{Distribution, LoopTiming};
 
 /// A loop on the machine's clock: whose it is, and its figures.
 fn loops(run: &RunResult) -> Vec<(String, &LoopTiming)> {
     let free_runs = run.cases.iter().filter_map(|case| case.strategies.dynamic_free_run.as_ref().map(|s| (case, s)));
     free_runs
         .flat_map(|(case, strategy)| {
-            let tissue = if case.tissue == case.table_tissue {
-                case.tissue.clone()
+            let tissue = if case.tissue.name() == case.table_tissue {
+                case.tissue.to_string()
             } else {
                 format!("{} with the table of {}", case.tissue, case.table_tissue)
             };

@@ -1,12 +1,13 @@
 //! What the controller process tells the plant when all is over: a line of JSON, then everything that it saw.
 
-use firmware::{Discard, StreamLedger};
+use firmware::inputs::StreamLedger;
+use firmware::{Discard, Faults, Mode};
 use serde::{Deserialize, Serialize};
 
-use crate::bench::result::{LedgerResult, LoopTiming, StreamResult, TickResult};
+use super::durations::LoopTiming;
+use super::ledger::{LedgerResult, StreamResult, TickResult};
+use super::tick::{ControllerTick, TICK_BYTES};
 use crate::exchange::bytes::{Reader, Writer};
-use crate::record::recording::stream::RecordAccount;
-use crate::record::recording::{EXCHANGE_BYTES, Exchange};
 
 /// Accounts of one stream at the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,9 +24,31 @@ pub struct StreamAccount {
     pub unaccounted: u64,
 }
 
-/// The controller's last words.
+/// What became of the ticks of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RecordAccount {
+    /// Handed over by the loop.
+    pub offered: u64,
+    /// Written.
+    pub written: u64,
+    /// Lost because the ring was full.
+    pub lost_in_ring: u64,
+    /// Lost because they could not be written.
+    pub lost_on_disk: u64,
+    /// Why not.
+    pub error: Option<String>,
+}
+
+impl RecordAccount {
+    /// Ticks without an entry: 0.
+    pub fn unaccounted(&self) -> u64 {
+        self.offered.abs_diff(self.written + self.lost_in_ring + self.lost_on_disk)
+    }
+}
+
+/// The controller's accounts of a whole run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Handover {
+pub struct ControllerAccounts {
     /// Needle samples.
     pub needle: StreamAccount,
     /// Target samples.
@@ -36,42 +59,46 @@ pub struct Handover {
     pub ticks: TickResult,
     /// Commands that left.
     pub commands: u64,
-    /// `RUN`, `HOLD` or `SAFE`.
-    pub final_state: String,
+    /// State at the end.
+    #[serde(with = "super::names::mode")]
+    pub final_state: Option<Mode>,
     /// Every fault that was ever present.
-    pub faults: String,
+    #[serde(with = "super::names::faults")]
+    pub faults: Faults,
     /// Timing of the loop; free-run only.
     pub timing: Option<LoopTiming>,
-    /// Exchanges that follow.
-    pub exchanges: u64,
-    /// Exchanges for which there was no room.
-    pub exchanges_lost: u64,
+    /// Ticks that were kept, and follow.
+    #[serde(rename = "exchanges")]
+    pub kept: u64,
+    /// Ticks for which there was no room.
+    #[serde(rename = "exchanges_lost")]
+    pub not_kept: u64,
     /// What became of the recording, if there was one.
     #[serde(default)]
     pub record: Option<RecordAccount>,
 }
 
-impl Handover {
-    /// The line and the exchanges. The type has only plain fields: an empty line, which nobody accepts, does not occur.
-    pub fn encode(&self, exchanges: &[Exchange]) -> Vec<u8> {
+impl ControllerAccounts {
+    /// The line and the ticks. The type has only plain fields: an empty line, which nobody accepts, does not occur.
+    pub fn encode(&self, kept: &[ControllerTick]) -> Vec<u8> {
         let mut writer = Writer(serde_json::to_vec(self).unwrap_or_default());
         writer.bytes(b"\n");
-        for exchange in exchanges {
-            exchange.encode(&mut writer);
+        for tick in kept {
+            tick.encode(&mut writer);
         }
         writer.0
     }
 
     /// Reads both; `None` for anything else.
-    pub fn decode(bytes: &[u8]) -> Option<(Self, Vec<Exchange>)> {
+    pub fn decode(bytes: &[u8]) -> Option<(Self, Vec<ControllerTick>)> {
         let end = bytes.iter().position(|byte| *byte == b'\n')?;
-        let handover: Self = serde_json::from_slice(&bytes[..end]).ok()?;
+        let accounts: Self = serde_json::from_slice(&bytes[..end]).ok()?;
         let mut reader = Reader(&bytes[end + 1..]);
-        if reader.0.len() as u64 != handover.exchanges * EXCHANGE_BYTES as u64 {
+        if reader.0.len() as u64 != accounts.kept * TICK_BYTES as u64 {
             return None;
         }
-        let exchanges = (0..handover.exchanges).map(|_| Exchange::decode(&mut reader)).collect::<Option<_>>()?;
-        Some((handover, exchanges))
+        let kept = (0..accounts.kept).map(|_| ControllerTick::decode(&mut reader)).collect::<Option<_>>()?;
+        Some((accounts, kept))
     }
 
     /// Both sides' accounts together.
@@ -196,13 +223,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_handover_survives_the_pipe() {
-        let handover = Handover { commands: 3, exchanges: 2, final_state: "RUN".to_owned(), ..Handover::default() };
-        let exchanges = vec![Exchange::default(); 2];
-        let mut bytes = handover.encode(&exchanges);
-        assert_eq!(Handover::decode(&bytes), Some((handover, exchanges)));
+    fn accounts_survive_the_pipe() {
+        let accounts =
+            ControllerAccounts { commands: 3, kept: 2, final_state: Some(Mode::Run), ..ControllerAccounts::default() };
+        let kept = vec![ControllerTick::default(); 2];
+        let mut bytes = accounts.encode(&kept);
+        assert_eq!(ControllerAccounts::decode(&bytes), Some((accounts, kept)));
         bytes.pop();
-        assert_eq!(Handover::decode(&bytes), None, "cut off");
+        assert_eq!(ControllerAccounts::decode(&bytes), None, "cut off");
     }
 
     #[test]

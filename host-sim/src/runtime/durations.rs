@@ -1,8 +1,11 @@
 //! Distributions of durations, without allocation while they are filled.
 
+use firmware::schedule::Schedule;
 use hdrhistogram::Histogram;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use crate::bench::result::Distribution;
+use super::clock::Scheduling;
 
 /// Longest duration told apart, ns: one minute.
 const LONGEST_NS: u64 = 60_000_000_000;
@@ -10,6 +13,52 @@ const LONGEST_NS: u64 = 60_000_000_000;
 const BIN_NS: u64 = 1_000;
 /// Significant digits kept.
 const DIGITS: u8 = 3;
+
+/// Timing of a loop on the machine's clock.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LoopTiming {
+    /// Rate, Hz.
+    pub rate_hz: f64,
+    /// Ticks run.
+    pub ticks: u64,
+    /// Steps that ended more than a period after their release.
+    pub deadline_misses: u64,
+    /// Steps that ended after the next release, and wake-ups a period late.
+    pub overruns: u64,
+    /// Periods skipped.
+    pub skipped: u64,
+    /// What the operating system granted.
+    pub scheduling: Scheduling,
+    /// Start minus release.
+    pub release_lateness: Distribution,
+    /// End minus start.
+    pub execution_time: Distribution,
+    /// End minus release.
+    pub response_time: Distribution,
+}
+
+/// A distribution of durations, ns.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Distribution {
+    /// Number of values.
+    pub count: u64,
+    /// Smallest.
+    pub min_ns: u64,
+    /// Median.
+    pub p50_ns: u64,
+    /// 99 %.
+    pub p99_ns: u64,
+    /// 99.9 %.
+    pub p999_ns: u64,
+    /// 99.99 %.
+    pub p9999_ns: u64,
+    /// Largest.
+    pub max_ns: u64,
+    /// Mean.
+    pub mean_ns: f64,
+    /// Histogram: bin of 1 µs (its lower end, µs) and count; empty bins are left out.
+    pub bins_us: Vec<(u64, u64)>,
+}
 
 /// Durations of one kind.
 #[derive(Clone, Debug)]
@@ -83,13 +132,8 @@ impl LoopDurations {
     }
 
     /// Durations and what the schedule counted.
-    pub fn timing(
-        &self,
-        rate_hz: f64,
-        schedule: &firmware::schedule::Schedule,
-        scheduling: &crate::runtime::clock::Scheduling,
-    ) -> crate::bench::result::LoopTiming {
-        crate::bench::result::LoopTiming {
+    pub fn timing(&self, rate_hz: f64, schedule: &Schedule, scheduling: &Scheduling) -> LoopTiming {
+        LoopTiming {
             rate_hz,
             ticks: schedule.execution_time.count,
             deadline_misses: schedule.deadline_misses(),

@@ -1,15 +1,16 @@
-//! Where the controller's steps are computed: in this process, or on a board.
+//! What computes the controller's steps: this process, or a board.
 
 use std::time::Duration;
 
 use clap::ValueEnum;
-use firmware::contract::{PaddleCommand, Table, decode, encode};
+use firmware::contract::{MAX_TABLE_BYTES, PaddleCommand, Table, TableError, decode, encode};
 use firmware::inputs::Ledger;
 use firmware::scalar::{Scalar, ScalarKind};
 use firmware::{Controller, Inputs, Settings, State};
 
-use crate::error::SimError;
-use crate::exchange::board::{BoardError, Device, Image, Processor, device::scalar_of};
+use super::error::RuntimeError;
+use crate::exchange::board::device::scalar_of;
+use crate::exchange::board::{BoardError, Device, Image, Processor};
 
 /// What computes the controller's steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -54,7 +55,7 @@ impl ScalarChoice {
     ///
     /// # Errors
     /// As [`encode_as`].
-    pub fn encode(self, table: &Table<f64, 2>, bytes: Vec<u8>) -> Result<Vec<u8>, SimError> {
+    pub fn encode(self, table: &Table<f64, 2>, bytes: Vec<u8>) -> Result<Vec<u8>, TableError> {
         match self {
             Self::F64 => Ok(bytes),
             Self::F32 => encode_as(table, ScalarKind::F32),
@@ -62,34 +63,34 @@ impl ScalarChoice {
     }
 }
 
-/// A controller at work, wherever it is.
-pub trait Core {
+/// A controller at work, wherever its steps are computed.
+pub trait StepExecutor {
     /// One tick.
     ///
     /// # Errors
-    /// [`SimError::Board`]: the step was not computed, or its command was lost.
-    fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, SimError>;
+    /// [`RuntimeError::Board`]: the step was not computed, or its command was lost.
+    fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, RuntimeError>;
 
     /// Accounts at the end.
     ///
     /// # Errors
-    /// [`SimError::Board`].
-    fn ledger(&mut self) -> Result<Ledger, SimError>;
+    /// [`RuntimeError::Board`].
+    fn ledger(&mut self) -> Result<Ledger, RuntimeError>;
 }
 
 /// The controller in this process.
 #[derive(Debug)]
-struct Native<'t, T: Scalar> {
+struct OnThisMachine<'t, T: Scalar> {
     controller: Controller<'t, T>,
     state: State<T>,
 }
 
-impl<T: Scalar> Core for Native<'_, T> {
-    fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, SimError> {
+impl<T: Scalar> StepExecutor for OnThisMachine<'_, T> {
+    fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, RuntimeError> {
         Ok(self.controller.step(&mut self.state, inputs))
     }
 
-    fn ledger(&mut self) -> Result<Ledger, SimError> {
+    fn ledger(&mut self) -> Result<Ledger, RuntimeError> {
         Ok(*self.state.ledger())
     }
 }
@@ -101,14 +102,14 @@ struct OnBoard {
     patience: Duration,
 }
 
-impl Core for OnBoard {
-    fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, SimError> {
+impl StepExecutor for OnBoard {
+    fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, RuntimeError> {
         let silent = BoardError::Silent { to: "a step", silent_s: self.patience.as_secs_f64() };
         let answer = self.device.step(inputs, self.patience)?.ok_or(silent)?;
         Ok(answer.command)
     }
 
-    fn ledger(&mut self) -> Result<Ledger, SimError> {
+    fn ledger(&mut self) -> Result<Ledger, RuntimeError> {
         Ok(self.device.account()?.ledger)
     }
 }
@@ -127,7 +128,7 @@ impl AnyTable {
     ///
     /// # Errors
     /// As [`decode`].
-    pub fn decode(bytes: &[u8]) -> Result<Self, firmware::contract::TableError> {
+    pub fn decode(bytes: &[u8]) -> Result<Self, TableError> {
         Ok(match scalar_of(bytes) {
             Some(ScalarKind::F32) => Self::F32(Box::new(decode(bytes)?)),
             _ => Self::F64(Box::new(decode(bytes)?)),
@@ -153,14 +154,17 @@ impl AnyTable {
     /// The controller in this process.
     ///
     /// # Errors
-    /// [`SimError::Settings`].
-    pub fn native(&self, settings: &Settings) -> Result<Box<dyn Core + '_>, SimError> {
-        fn core<'t, T: Scalar>(table: &'t Table<T, 2>, settings: &Settings) -> Result<Box<dyn Core + 't>, SimError> {
-            Ok(Box::new(Native { controller: Controller::new(table, settings)?, state: State::new() }))
+    /// [`RuntimeError::Settings`].
+    pub fn on_this_machine(&self, settings: &Settings) -> Result<Box<dyn StepExecutor + '_>, RuntimeError> {
+        fn executor<'t, T: Scalar>(
+            table: &'t Table<T, 2>,
+            settings: &Settings,
+        ) -> Result<Box<dyn StepExecutor + 't>, RuntimeError> {
+            Ok(Box::new(OnThisMachine { controller: Controller::new(table, settings)?, state: State::new() }))
         }
         match self {
-            Self::F32(table) => core(table, settings),
-            Self::F64(table) => core(table, settings),
+            Self::F32(table) => executor(table, settings),
+            Self::F64(table) => executor(table, settings),
         }
     }
 }
@@ -168,8 +172,12 @@ impl AnyTable {
 /// The controller on a Cortex-M7 in QEMU, with this encoded table.
 ///
 /// # Errors
-/// [`SimError::Board`].
-pub fn emulated(table: &[u8], settings: &Settings, patience: Duration) -> Result<Box<dyn Core>, SimError> {
+/// [`RuntimeError::Board`].
+pub fn on_emulated_board(
+    table: &[u8],
+    settings: &Settings,
+    patience: Duration,
+) -> Result<Box<dyn StepExecutor>, RuntimeError> {
     let scalar = scalar_of(table).unwrap_or(ScalarKind::F64);
     let mut device = Device::emulate(&Image::build(scalar, Processor::Double)?)?;
     device.begin(table, settings)?;
@@ -179,13 +187,13 @@ pub fn emulated(table: &[u8], settings: &Settings, patience: Duration) -> Result
 /// The table as another scalar, encoded.
 ///
 /// # Errors
-/// [`SimError::Table`] for knots that fall together in the other scalar.
-pub fn encode_as(table: &Table<f64, 2>, scalar: ScalarKind) -> Result<Vec<u8>, SimError> {
-    let mut bytes = vec![0; firmware::contract::MAX_TABLE_BYTES];
+/// As [`encode`]: knots that fall together in the other scalar.
+pub fn encode_as(table: &Table<f64, 2>, scalar: ScalarKind) -> Result<Vec<u8>, TableError> {
+    let mut bytes = vec![0; MAX_TABLE_BYTES];
     let length = match scalar {
         ScalarKind::F32 => encode(&table.cast::<f32>(), &mut bytes),
         ScalarKind::F64 => encode(table, &mut bytes),
     };
-    bytes.truncate(length.map_err(|source| SimError::Table { path: "as another scalar".into(), source })?);
+    bytes.truncate(length?);
     Ok(bytes)
 }

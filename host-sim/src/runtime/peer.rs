@@ -1,14 +1,14 @@
 //! The other process: is it alive, and how long is it waited for.
 
-use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 use iceoryx2::service::Service;
 use rustix::process::{Pid, getppid};
 
-use crate::error::SimError;
+use super::child::{ControllerProcess, describe_exit};
+use super::error::{Role, RuntimeError};
+use super::signals;
 use crate::exchange::Space;
-use crate::runtime::signals;
 
 /// Polls without giving the processor away: an answer usually comes within a few µs.
 const SPINS: u32 = 200;
@@ -22,54 +22,41 @@ const NAP: Duration = Duration::from_micros(500);
 #[derive(Debug)]
 pub enum Peer {
     /// The controller that the plant has started.
-    Child(crate::runtime::controller::child::ControllerProcess),
+    Child(ControllerProcess),
     /// The plant that has started this controller.
     Parent(Pid),
-    /// A process in another terminal, known by its marks in the link's space; the name is for messages.
-    Elsewhere(Box<Space>, &'static str),
+    /// A process in another terminal, known by its marks in the link's space.
+    Elsewhere(Box<Space>, Role),
     /// A thread of this process, in tests.
-    Thread,
+    Thread(Role),
 }
 
 impl Peer {
-    fn name(&self) -> &'static str {
+    fn role(&self) -> Role {
         match self {
-            Self::Child(_) => "controller",
-            Self::Parent(_) => "plant",
-            Self::Elsewhere(_, name) => name,
-            Self::Thread => "other",
+            Self::Child(_) => Role::Controller,
+            Self::Parent(_) => Role::Plant,
+            Self::Elsewhere(_, role) | Self::Thread(role) => *role,
         }
     }
 
     /// Fails if the peer is known to be dead.
     ///
     /// # Errors
-    /// [`SimError::PeerDied`].
-    pub fn check<S: Service>(&mut self) -> Result<(), SimError> {
+    /// [`RuntimeError::PeerDied`].
+    pub fn check<S: Service>(&mut self) -> Result<(), RuntimeError> {
         let how = match self {
-            Self::Child(child) => child.ended().map(|status| describe(&status)),
+            Self::Child(child) => child.ended().map(|status| describe_exit(&status)),
             Self::Parent(parent) => (getppid() != Some(*parent)).then(|| "this process was left behind".to_owned()),
             Self::Elsewhere(space, _) => {
                 space.has_dead_peer::<S>().then(|| "it left its marks in shared memory".to_owned())
             }
-            Self::Thread => None,
+            Self::Thread(_) => None,
         };
         match how {
             None => Ok(()),
-            Some(how) => Err(SimError::PeerDied { peer: self.name(), how }),
+            Some(how) => Err(RuntimeError::PeerDied { peer: self.role(), how }),
         }
-    }
-}
-
-/// How a process ended, in words.
-pub(crate) fn describe(status: &ExitStatus) -> String {
-    use std::os::unix::process::ExitStatusExt;
-    match (status.code(), status.signal()) {
-        (Some(code), _) => format!("exit code {code}"),
-        (_, Some(9)) => "killed by SIGKILL".to_owned(),
-        (_, Some(15)) => "killed by SIGTERM".to_owned(),
-        (_, Some(signal)) => format!("killed by signal {signal}"),
-        _ => status.to_string(),
     }
 }
 
@@ -90,8 +77,8 @@ impl Patience {
     /// Nothing came at this poll. Looks at signals, the peer and the time now and then.
     ///
     /// # Errors
-    /// [`SimError::Interrupted`], [`SimError::PeerDied`], [`SimError::PeerSilent`].
-    pub fn wait<S: Service>(&mut self, peer: &mut Peer) -> Result<(), SimError> {
+    /// [`RuntimeError::Interrupted`], [`RuntimeError::PeerDied`], [`RuntimeError::PeerSilent`].
+    pub fn wait<S: Service>(&mut self, peer: &mut Peer) -> Result<(), RuntimeError> {
         self.polls += 1;
         if self.polls < SPINS {
             std::hint::spin_loop();
@@ -109,7 +96,7 @@ impl Patience {
         signals::check()?;
         peer.check::<S>()?;
         if silent > self.timeout {
-            return Err(SimError::PeerSilent { peer: peer.name(), silent_s: silent.as_secs_f64() });
+            return Err(RuntimeError::PeerSilent { peer: peer.role(), silent_s: silent.as_secs_f64() });
         }
         Ok(())
     }

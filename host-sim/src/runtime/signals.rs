@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
-use crate::error::SimError;
+use super::error::RuntimeError;
 
 static RECEIVED: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
 
@@ -26,8 +26,8 @@ pub fn install() {
 /// Fails once a signal has asked for the end.
 ///
 /// # Errors
-/// [`SimError::Interrupted`].
-pub fn check() -> Result<(), SimError> {
+/// [`RuntimeError::Interrupted`].
+pub fn check() -> Result<(), RuntimeError> {
     let number = RECEIVED.get().map_or(0, |received| received.load(Ordering::Relaxed));
     let signal = match i32::try_from(number) {
         Ok(SIGINT) => "SIGINT (Ctrl-C)",
@@ -35,5 +35,5 @@ pub fn check() -> Result<(), SimError> {
         Ok(SIGHUP) => "SIGHUP",
         _ => return Ok(()),
     };
-    Err(SimError::Interrupted { signal })
+    Err(RuntimeError::Interrupted { signal })
 }

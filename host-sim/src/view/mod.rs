@@ -9,11 +9,12 @@
 //! waits; solving for the picture's nodes, JSON and sockets belong to threads of their own. In free-run nothing
 //! reaches back into the loop; in lockstep, where no clock is in the record, the page may hold time between two ticks.
 
+mod insertions;
 mod page;
 mod server;
-mod session;
-mod tap;
+mod shared;
+mod watch;
 
+pub use insertions::{Basis, insertions};
 pub use server::View;
-pub use session::{Basis, insertions};
-pub use tap::{Knobs, Moment, Pacing, Shared, Watch};
+pub use shared::{KnobOutOfRange, Knobs};

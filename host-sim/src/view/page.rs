@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::tap::{Shared, Snapshot};
+use super::shared::{Shared, ViewState};
 use crate::report::mesh;
 
 /// One file: no network but the events of its own address.
@@ -13,17 +13,17 @@ fn path(points: &[model_offline::geometry::Point2]) -> Vec<[f64; 2]> {
 }
 
 /// Everything that stays the same during an insertion.
-pub(super) fn scene(snapshot: &Snapshot, shared: &Shared) -> Value {
-    let Some(model) = &snapshot.model else { return json!({}) };
+pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
+    let Some(model) = &state.model else { return json!({}) };
     let scene = model.scene();
     let nodes = path(model.positions());
     let outline = path(scene.outline.vertices());
-    let paddle = scene.paddles.iter().find(|paddle| paddle.index == snapshot.paddle_index);
+    let paddle = scene.paddles.iter().find(|paddle| paddle.index == state.paddle_index);
     let normal = scene.needle.orthogonal();
     json!({
         "name": scene.name,
-        "title": snapshot.title,
-        "mode": snapshot.mode.map(|mode| mode.to_string()),
+        "title": state.title,
+        "mode": state.mode.map(|mode| mode.to_string()),
         "unit": scene.length_unit,
         "outline": outline,
         "triangles": mesh(&nodes, &outline),
@@ -41,25 +41,25 @@ pub(super) fn scene(snapshot: &Snapshot, shared: &Shared) -> Value {
 }
 
 /// One picture.
-pub(super) fn frame(snapshot: &Snapshot, shared: &Shared) -> Value {
-    let nodes: Vec<f64> = snapshot.model.as_ref().map_or_else(Vec::new, |model| {
+pub(super) fn frame(state: &ViewState, shared: &Shared) -> Value {
+    let nodes: Vec<f64> = state.model.as_ref().map_or_else(Vec::new, |model| {
         // Four significant digits of the depth are beyond any screen.
         let step = 10f64.powf((1e-4 * model.scene().needle.depth).log10().floor());
-        let moved = model.nodal_displacements(&snapshot.coefficients).unwrap_or_default();
+        let moved = model.nodal_displacements(&state.coefficients).unwrap_or_default();
         let rounded = |v: f64| (v / step).round() * step;
         moved.iter().flat_map(|u| [rounded(u.x), rounded(u.y)]).collect()
     });
     json!({
-        "time": snapshot.time_s,
-        "tick": snapshot.tick,
-        "depth": snapshot.depth,
-        "target": snapshot.target,
-        "paddle": snapshot.paddle,
+        "time": state.time_s,
+        "tick": state.tick,
+        "depth": state.depth,
+        "target": state.target,
+        "paddle": state.paddle,
         "moved": nodes,
-        "solve_us": snapshot.solve_ns as f64 * 1e-3,
-        "late_us": snapshot.late_ns as f64 * 1e-3,
+        "solve_us": state.solve_ns as f64 * 1e-3,
+        "late_us": state.late_ns as f64 * 1e-3,
         "paused": shared.is_paused(),
         "pace": shared.pace(),
-        "missed": shared.missed(),
+        "dropped": shared.dropped(),
     })
 }

@@ -5,12 +5,16 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
+use model_offline::output::table_text::hex;
 use serde::Deserialize;
 use tiny_http::{Header, Method, Request, Response, Server};
 
 use super::page;
-use super::tap::{FRAME_NS, Knobs, Shared, Snapshot};
-use crate::error::SimError;
+use super::shared::{FRAME_NS, KnobOutOfRange, Knobs, Shared, ViewState};
+use super::watch::Watch;
+use crate::bench::error::SimError;
+use crate::runtime::error::RuntimeError;
+use crate::runtime::plant::observer::{ObservedInsertion, Observer, Spectator};
 
 /// Pages that may look on at the same time.
 const MAX_LOOKERS: usize = 4;
@@ -29,7 +33,7 @@ pub struct View {
 /// What a button asks for.
 #[derive(Debug, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
-enum Wish {
+enum PageRequest {
     Pause(bool),
     Step(u64),
     Pace(u64),
@@ -58,12 +62,12 @@ impl View {
                     answer(request, &guard, &for_threads);
                 }
             })
-            .map_err(SimError::Spawn)?;
+            .map_err(RuntimeError::Spawn)?;
         Ok(Self { shared, address: format!("http://127.0.0.1:{port}/{token}/") })
     }
 
     /// What the loop shares with it.
-    pub fn shared(&self) -> &Arc<Shared> {
+    pub(super) fn shared(&self) -> &Arc<Shared> {
         &self.shared
     }
 
@@ -73,11 +77,17 @@ impl View {
     }
 }
 
+impl Spectator for View {
+    fn observe(&self, insertion: ObservedInsertion<'_>) -> Box<dyn Observer> {
+        Box::new(Watch::new(&self.shared, insertion))
+    }
+}
+
 /// 128 bits from the operating system, as hexadecimal digits.
 fn token() -> std::io::Result<String> {
     let mut bytes = [0; 16];
     std::fs::File::open("/dev/urandom")?.read_exact(&mut bytes)?;
-    Ok(crate::bench::strategy::hex(&bytes))
+    Ok(hex(&bytes))
 }
 
 /// Who may come in.
@@ -148,13 +158,13 @@ fn answer(mut request: Request, guard: &Arc<Guard>, shared: &Arc<Shared>) {
                 guard.lookers.fetch_sub(1, Ordering::AcqRel);
             }
         }
-        (Method::Post, "wish") => {
+        (Method::Post, "request") => {
             let mut body = Vec::new();
             if request.as_reader().take(MAX_BODY).read_to_end(&mut body).is_err() {
                 return plain(request, 400, "unreadable\n");
             }
             let outcome =
-                serde_json::from_slice(&body).map_err(|error| error.to_string()).and_then(|w| grant(w, shared));
+                serde_json::from_slice(&body).map_err(Refusal::from).and_then(|request| grant(request, shared));
             match outcome {
                 Ok(()) => plain(request, 204, ""),
                 Err(reason) => plain(request, 400, &format!("{reason}\n")),
@@ -164,24 +174,37 @@ fn answer(mut request: Request, guard: &Arc<Guard>, shared: &Arc<Shared>) {
     }
 }
 
-fn grant(wish: Wish, shared: &Shared) -> Result<(), String> {
-    match wish {
-        Wish::Pause(paused) => shared.set_paused(paused),
-        Wish::Step(ticks) if (1..=1000).contains(&ticks) => shared.step(ticks),
-        Wish::Step(ticks) => return Err(format!("{ticks} ticks; 1 to 1000 are possible")),
-        Wish::Pace(thousandths) if thousandths <= 100_000 => shared.set_pace(thousandths),
-        Wish::Pace(thousandths) => return Err(format!("a pace of {thousandths}; at most 100000 thousandths")),
-        Wish::Knobs(knobs) => {
+/// Why a button's request is not granted.
+#[derive(Debug, thiserror::Error)]
+enum Refusal {
+    #[error(transparent)]
+    Unreadable(#[from] serde_json::Error),
+    #[error("{0} ticks; 1 to 1000 are possible")]
+    Steps(u64),
+    #[error("a pace of {0}; at most 100000 thousandths")]
+    Pace(u64),
+    #[error(transparent)]
+    Knob(#[from] KnobOutOfRange),
+}
+
+fn grant(request: PageRequest, shared: &Shared) -> Result<(), Refusal> {
+    match request {
+        PageRequest::Pause(paused) => shared.set_paused(paused),
+        PageRequest::Step(ticks) if (1..=1000).contains(&ticks) => shared.step(ticks),
+        PageRequest::Step(ticks) => return Err(Refusal::Steps(ticks)),
+        PageRequest::Pace(thousandths) if thousandths <= 100_000 => shared.set_pace(thousandths),
+        PageRequest::Pace(thousandths) => return Err(Refusal::Pace(thousandths)),
+        PageRequest::Knobs(knobs) => {
             knobs.check()?;
             shared.turn(knobs);
         }
-        Wish::Restart => shared.restart(),
-        Wish::Finish => shared.finish(),
+        PageRequest::Restart => shared.restart(),
+        PageRequest::Finish => shared.finish(),
     }
     Ok(())
 }
 
-/// Server-sent events until the page goes away: `scene` at every new insertion, `frame` at every new snapshot.
+/// Server-sent events until the page goes away: `scene` at every new insertion, `frame` at every new state.
 fn events(request: Request, shared: &Shared) -> std::io::Result<()> {
     let mut writer = request.into_writer();
     writer.write_all(
@@ -191,12 +214,12 @@ fn events(request: Request, shared: &Shared) -> std::io::Result<()> {
     let (mut insertion, mut number, mut idle) = (0, 0, 0);
     loop {
         match shared.newer(insertion, number) {
-            Some(snapshot) => {
-                if snapshot.insertion != insertion {
-                    event(&mut writer, "scene", &page::scene(&snapshot, shared))?;
+            Some(state) => {
+                if state.insertion != insertion {
+                    event(&mut writer, "scene", &page::scene(&state, shared))?;
                 }
-                event(&mut writer, "frame", &page::frame(&snapshot, shared))?;
-                Snapshot { insertion, number, .. } = snapshot;
+                event(&mut writer, "frame", &page::frame(&state, shared))?;
+                ViewState { insertion, number, .. } = state;
                 idle = 0;
             }
             None => {

@@ -1,44 +1,8 @@
-//! What moves out there: the needle's drive and the paddle's actuator.
+//! How the paddle follows its commands.
 
 use std::collections::VecDeque;
 
 use nalgebra::Vector2;
-
-/// Start and stop of the needle take this long, s: no needle drive starts with a jump in speed.
-const RAMP_S: f64 = 0.1;
-
-/// The needle's way in: constant speed between two short ramps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trajectory {
-    depth: f64,
-    insertion_s: f64,
-    ramp_s: f64,
-}
-
-impl Trajectory {
-    /// To `depth` (length) in `insertion_s` seconds.
-    pub fn new(depth: f64, insertion_s: f64) -> Self {
-        Self { depth, insertion_s, ramp_s: RAMP_S.min(0.25 * insertion_s) }
-    }
-
-    /// Depth, length, and velocity, length/s, a time after the start, s (negative: not started).
-    pub fn at(&self, time_s: f64) -> (f64, f64) {
-        let (total, ramp) = (self.insertion_s, self.ramp_s);
-        let speed = self.depth / (total - ramp);
-        if time_s <= 0.0 {
-            (0.0, 0.0)
-        } else if time_s < ramp {
-            (0.5 * speed * time_s * time_s / ramp, speed * time_s / ramp)
-        } else if time_s < total - ramp {
-            (speed * (time_s - 0.5 * ramp), speed)
-        } else if time_s < total {
-            let left = total - time_s;
-            (self.depth - 0.5 * speed * left * left / ramp, speed * left / ramp)
-        } else {
-            (self.depth, 0.0)
-        }
-    }
-}
 
 /// How the paddle's actuator follows commands. The default is a servo that is there within one tick, at its rate limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,16 +17,16 @@ pub struct ActuatorModel {
     pub gain: f64,
 }
 
-/// The paddle with its actuator.
+/// The paddle and the actuator that moves it.
 #[derive(Clone, Debug)]
-pub struct Paddle {
+pub struct PaddleActuator {
     model: ActuatorModel,
     waiting: VecDeque<Vector2<f64>>,
     goal: Vector2<f64>,
     position: Vector2<f64>,
 }
 
-impl Paddle {
+impl PaddleActuator {
     /// A paddle at rest where it touches the undeformed tissue.
     pub fn new(model: ActuatorModel) -> Self {
         Self { model, waiting: VecDeque::new(), goal: Vector2::zeros(), position: Vector2::zeros() }
@@ -108,24 +72,8 @@ mod tests {
     const SERVO: ActuatorModel = ActuatorModel { max_rate: 0.1, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
 
     #[test]
-    fn the_needle_arrives_without_jumps() {
-        let trajectory = Trajectory::new(0.1, 5.0);
-        assert_eq!(trajectory.at(-1.0), (0.0, 0.0));
-        assert_eq!(trajectory.at(5.0), (0.1, 0.0));
-        let step_s = 1e-3;
-        let mut before = trajectory.at(0.0);
-        for tick in 1..=5000 {
-            let now = trajectory.at(f64::from(tick) * step_s);
-            let mean = 0.5 * (now.1 + before.1);
-            assert!((now.0 - before.0 - mean * step_s).abs() < 1e-9, "velocity is the slope");
-            assert!((now.1 - before.1).abs() < 3e-4, "no jump of the velocity");
-            before = now;
-        }
-    }
-
-    #[test]
     fn the_paddle_keeps_its_rate_limit() {
-        let mut paddle = Paddle::new(SERVO);
+        let mut paddle = PaddleActuator::new(SERVO);
         let goal = Vector2::new(0.03, 0.04);
         for _ in 0..100 {
             let before = paddle.position();
@@ -138,18 +86,18 @@ mod tests {
     #[test]
     fn delay_lag_and_gain_act() {
         let goal = Vector2::new(1e-5, 0.0);
-        let mut delayed = Paddle::new(ActuatorModel { delay_ticks: 2, ..SERVO });
+        let mut delayed = PaddleActuator::new(ActuatorModel { delay_ticks: 2, ..SERVO });
         delayed.advance(Some(goal), 1e-3);
         delayed.advance(Some(goal), 1e-3);
         assert_eq!(delayed.position(), Vector2::zeros());
         delayed.advance(Some(goal), 1e-3);
         assert_eq!(delayed.position(), goal);
 
-        let mut lagging = Paddle::new(ActuatorModel { lag_s: 1e-3, ..SERVO });
+        let mut lagging = PaddleActuator::new(ActuatorModel { lag_s: 1e-3, ..SERVO });
         lagging.advance(Some(goal), 1e-3);
         assert!((lagging.position().x / goal.x - (1.0 - (-1.0f64).exp())).abs() < 1e-12);
 
-        let mut weak = Paddle::new(ActuatorModel { gain: 0.5, ..SERVO });
+        let mut weak = PaddleActuator::new(ActuatorModel { gain: 0.5, ..SERVO });
         weak.advance(Some(goal), 1e-3);
         assert_eq!(weak.position(), goal * 0.5);
     }

@@ -3,14 +3,14 @@
 use clap::Args;
 use firmware::Settings;
 
-use crate::error::SimError;
+use super::error::{OutOfRange, not_negative, positive};
 
 /// Standard deviation of the target sensor when none is given, part of the insertion depth.
 pub const DEFAULT_NOISE_PER_DEPTH: f64 = 1e-4;
 
-/// Options of the loop.
+/// Rates, latency and noise of the loop, as command-line options.
 #[derive(Args, Clone, Copy, Debug, PartialEq)]
-pub struct LoopArgs {
+pub struct LoopSettings {
     /// Rate of the control loop, Hz
     #[arg(long, default_value_t = 1000.0, value_name = "HZ")]
     pub rate: f64,
@@ -25,12 +25,12 @@ pub struct LoopArgs {
     pub noise: Option<f64>,
 }
 
-impl LoopArgs {
+impl LoopSettings {
     /// Checks the numbers.
     ///
     /// # Errors
-    /// [`SimError::Usage`] names the option.
-    pub fn check(&self) -> Result<(), SimError> {
+    /// [`OutOfRange`] names the option.
+    pub fn check(&self) -> Result<(), OutOfRange> {
         positive("--rate", self.rate)?;
         positive("--target-rate", self.target_rate)?;
         not_negative("--latency", self.latency)?;
@@ -73,28 +73,4 @@ impl LoopArgs {
 
 fn period_ns(rate_hz: f64) -> u64 {
     (1e9 / rate_hz).round() as u64
-}
-
-/// Refuses numbers that are not above 0.
-///
-/// # Errors
-/// [`SimError::Usage`] names the option.
-pub fn positive(option: &str, value: f64) -> Result<(), SimError> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(SimError::Usage(format!("{option} must be above 0, not {value}")))
-    }
-}
-
-/// Refuses negative numbers, infinity and NaN.
-///
-/// # Errors
-/// [`SimError::Usage`] names the option.
-pub fn not_negative(option: &str, value: f64) -> Result<(), SimError> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(())
-    } else {
-        Err(SimError::Usage(format!("{option} must be 0 or above, not {value}")))
-    }
 }

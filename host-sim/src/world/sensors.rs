@@ -11,6 +11,8 @@ use nalgebra::Vector2;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 
+use super::needle::NeedleMotion;
+
 /// Stream numbers of the generator: sensors do not share random numbers.
 const TARGET_STREAM: u128 = 1;
 
@@ -87,13 +89,13 @@ impl Encoders {
     pub fn sample(
         &mut self,
         time_ns: u64,
-        (depth, velocity): (f64, f64),
+        needle: NeedleMotion,
         paddle_index: u32,
         paddle: &Vector2<f64>,
     ) -> (NeedleSample, PaddleSample) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
-        let needle = NeedleSample { sequence, reserved: 0, time_ns, depth, velocity };
+        let needle = NeedleSample { sequence, reserved: 0, time_ns, depth: needle.depth, velocity: needle.velocity };
         let paddle = PaddleSample { sequence, paddle_index, time_ns, displacement: (*paddle).into() };
         (needle, paddle)
     }

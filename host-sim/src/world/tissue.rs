@@ -11,7 +11,7 @@ use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::error::SimError;
+use super::error::WorldError;
 
 /// Newton's method for small steps from a converged state: the last factor nearly always does. What the plant's error
 /// is compared with is 1e-5 of the target's motion; a residual of 1e-7 is far below it.
@@ -40,10 +40,10 @@ pub enum PlantChoice {
 }
 
 /// Which model answered, how often it could not, and how far off it was in the end.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlantAccount {
-    /// `full`, `reduced`, or `condensed`.
-    pub model: String,
+    /// The model.
+    pub model: PlantModel,
     /// Modes of the reduced model.
     #[serde(default)]
     pub modes: Option<usize>,
@@ -64,9 +64,24 @@ pub struct PlantAccount {
     pub error_at_end: Option<f64>,
 }
 
+impl Default for PlantAccount {
+    /// The full model, which has nothing to account for.
+    fn default() -> Self {
+        Self {
+            model: PlantModel::Full,
+            modes: None,
+            points: None,
+            fallbacks: 0,
+            first_fallback: None,
+            largest_estimate: None,
+            error_at_end: None,
+        }
+    }
+}
+
 /// The tissue's answer to needle and paddle.
 #[derive(Debug)]
-pub struct TissueSolver<'m> {
+pub struct TissuePlant<'m> {
     model: &'m TissueModel,
     paddle: Option<usize>,
     kind: Kind<'m>,
@@ -87,13 +102,13 @@ enum Kind<'m> {
     Condensed(Condensed),
 }
 
-impl<'m> TissueSolver<'m> {
+impl<'m> TissuePlant<'m> {
     /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
     ///
     /// # Errors
-    /// [`SimError::Tissue`] when the body is not held; [`SimError::Reduction`] when the reduced model that was asked for
-    /// cannot be made (with [`PlantChoice::Auto`] the full one answers, and the account says why).
-    pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: PlantChoice) -> Result<Self, SimError> {
+    /// [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
+    /// the reduced model that was asked for cannot be made (with [`PlantChoice::Auto`] the full one answers, and the account says why).
+    pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: PlantChoice) -> Result<Self, WorldError> {
         let mut account = PlantAccount::default();
         let wanted = match (choice, model.scene().fit) {
             (PlantChoice::Full, _) => PlantModel::Full,
@@ -104,13 +119,13 @@ impl<'m> TissueSolver<'m> {
         let kind = match wanted {
             PlantModel::Full => Kind::Full(full(model, paddle)?),
             PlantModel::Condensed => {
-                account.model = "condensed".into();
-                let condensed = Condensed::new(model, paddle).map_err(|e| SimError::Reduction(e.to_string()))?;
+                account.model = PlantModel::Condensed;
+                let condensed = Condensed::new(model, paddle).map_err(WorldError::Condensation)?;
                 Kind::Condensed(condensed)
             }
             PlantModel::Reduced => match train(model, paddle, &TrainingOptions::default()) {
                 Ok((reduced, report)) => {
-                    account.model = "reduced".into();
+                    account.model = PlantModel::Reduced;
                     account.modes = Some(report.modes);
                     account.points = Some([report.points, report.full_points]);
                     Kind::Reduced { body: Box::new(reduced.body()), full: None, full_answers: false }
@@ -119,20 +134,17 @@ impl<'m> TissueSolver<'m> {
                     account.first_fallback = Some(error.to_string());
                     Kind::Full(full(model, paddle)?)
                 }
-                Err(error) => return Err(SimError::Reduction(error.to_string())),
+                Err(error) => return Err(WorldError::Training(error)),
             },
         };
-        if let Kind::Full(_) = kind {
-            account.model = "full".into();
-        }
         Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account })
     }
 
     /// Takes needle and paddle to where they are now; returns the target displacement.
     ///
     /// # Errors
-    /// [`SimError::Tissue`] when there is no equilibrium.
-    pub fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, SimError> {
+    /// [`WorldError::Tissue`] when there is no equilibrium.
+    pub fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
         self.at = (depth, paddle);
         match &mut self.kind {
             Kind::Full(body) => drive(body, depth, paddle),
@@ -205,20 +217,20 @@ impl<'m> TissueSolver<'m> {
         account
     }
 
-    fn solved_in_full(&self) -> Result<Box<Body<'m>>, SimError> {
+    fn solved_in_full(&self) -> Result<Box<Body<'m>>, WorldError> {
         let mut body = full(self.model, self.paddle)?;
         drive(&mut body, self.at.0, self.at.1)?;
         Ok(body)
     }
 }
 
-fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, SimError> {
-    model.body(paddle, STEP_SETTINGS).map(Box::new).map_err(|source| SimError::Tissue { depth: 0.0, source })
+fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, WorldError> {
+    model.body(paddle, STEP_SETTINGS).map(Box::new).map_err(|source| WorldError::Tissue { depth: 0.0, source })
 }
 
-fn drive(body: &mut Body<'_>, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, SimError> {
+fn drive(body: &mut Body<'_>, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
     if depth != body.depth() || paddle != body.paddle() {
-        body.drive(depth, paddle).map_err(|source| SimError::Tissue { depth, source })?;
+        body.drive(depth, paddle).map_err(|source| WorldError::Tissue { depth, source })?;
     }
     Ok(body.target_displacement())
 }
@@ -231,8 +243,8 @@ mod tests {
     #[test]
     fn where_the_reduced_model_does_not_hold_the_full_one_answers_and_it_is_counted() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let mut reduced = TissueSolver::new(&model, Some(2), PlantChoice::Reduced).unwrap();
-        let mut exact = TissueSolver::new(&model, Some(2), PlantChoice::Full).unwrap();
+        let mut reduced = TissuePlant::new(&model, Some(2), PlantChoice::Reduced).unwrap();
+        let mut exact = TissuePlant::new(&model, Some(2), PlantChoice::Full).unwrap();
         let inside = (0.05, Vector2::new(0.001, -0.002));
         let far = (0.05, Vector2::new(0.04, 0.0));
         for (depth, paddle) in [inside, far, inside] {
@@ -240,7 +252,7 @@ mod tests {
             assert!((r - e).norm() < 0.01 * e.norm(), "{r} {e}");
         }
         let account = reduced.account();
-        assert_eq!((account.model.as_str(), account.fallbacks), ("reduced", 1));
+        assert_eq!((account.model, account.fallbacks), (PlantModel::Reduced, 1));
         assert!(account.first_fallback.unwrap().contains("outside the trained range"));
         assert!(account.error_at_end.unwrap() < 0.01 * exact.step(inside.0, inside.1).unwrap().norm());
         assert_eq!(reduced.deformed_nodes().len(), model.nodes());
@@ -249,7 +261,7 @@ mod tests {
     #[test]
     fn the_condensed_model_says_how_far_off_it_is() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let mut condensed = TissueSolver::new(&model, Some(2), PlantChoice::Condensed).unwrap();
+        let mut condensed = TissuePlant::new(&model, Some(2), PlantChoice::Condensed).unwrap();
         let shallow = condensed.step(1e-4, Vector2::zeros()).unwrap();
         assert!(condensed.account().error_at_end.unwrap() < 1e-3 * shallow.norm());
         let deep = condensed.step(0.1, Vector2::zeros()).unwrap();
@@ -260,11 +272,11 @@ mod tests {
     fn auto_does_what_the_scene_says() {
         let mut scene = Scene::bundled("paper").unwrap();
         let model = TissueModel::new(&scene).unwrap();
-        let name = |model: &TissueModel| TissueSolver::new(model, None, PlantChoice::Auto).unwrap().account().model;
-        assert_eq!(name(&model), "reduced");
+        let name = |model: &TissueModel| TissuePlant::new(model, None, PlantChoice::Auto).unwrap().account().model;
+        assert_eq!(name(&model), PlantModel::Reduced);
         let section = "[fit]\nplant = \"condensed\"\ntable_knots = 9\ntable_scalar = \"f32\"\n";
         let text = format!("{}\n{section}", model_offline::scene::BUNDLED[0].1);
         scene.fit = Scene::parse(&text, "fitted.toml").unwrap().fit;
-        assert_eq!(name(&model.with_tissue_of(&scene)), "condensed");
+        assert_eq!(name(&model.with_tissue_of(&scene)), PlantModel::Condensed);
     }
 }

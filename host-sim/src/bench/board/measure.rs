@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use firmware::contract::{MAX_TABLE_BYTES, Table, encode};
+use firmware::contract::{MAX_TABLE_BYTES, Table, TableError, encode};
 use firmware::scalar::{Scalar, ScalarKind};
-use firmware::{Controller, Faults, Inputs, Mode, Settings, State};
+use firmware::{Controller, Faults, Inputs, Mode, Settings, SettingsError, State};
 use serde::{Deserialize, Serialize};
 
+use crate::exchange::board::BoardError;
 use crate::exchange::board::device::Device;
-use crate::exchange::board::error::BoardError;
 use crate::exchange::board::image::{Image, MemoryUse, Processor};
 use crate::exchange::board::qemu::ICOUNT_SHIFT;
 use crate::record::recording::Recording;
@@ -19,6 +19,64 @@ use crate::record::replay::difference;
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Ticks of each scenario besides the recorded run itself.
 const SCENARIO_TICKS: usize = 600;
+
+/// Why an image cannot be measured, or costs too much.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeasureError {
+    /// The board cannot be used.
+    #[error("the controller on the board cannot be used")]
+    Board(#[from] BoardError),
+    /// The recording is in another scalar, or its table is broken.
+    #[error("the recording's table: {0}")]
+    RecordedTable(TableError),
+    /// The recording does not have enough ticks to make scenarios of.
+    #[error("the recording has {ticks} ticks, at least {needed} are needed: make a longer one")]
+    TooShort {
+        /// Its ticks.
+        ticks: usize,
+        /// Ticks needed.
+        needed: usize,
+    },
+    /// The scenario's table cannot be given to the board.
+    #[error("{scenario}: {reason}")]
+    Table {
+        /// Name of the scenario.
+        scenario: &'static str,
+        /// Why.
+        reason: TableError,
+    },
+    /// The controller refuses the scenario's settings.
+    #[error("{scenario}: {reason}")]
+    Settings {
+        /// Name of the scenario.
+        scenario: &'static str,
+        /// Why.
+        reason: SettingsError,
+    },
+    /// A command of the board is not the host's.
+    #[error("{scenario}: tick {tick}: on the board {difference} (host first)")]
+    Differs {
+        /// Name of the scenario.
+        scenario: &'static str,
+        /// The tick.
+        tick: u64,
+        /// First field that differs.
+        difference: String,
+    },
+    /// Samples of a scenario are in no account.
+    #[error("{scenario}: samples unaccounted for")]
+    Unaccounted {
+        /// Name of the scenario.
+        scenario: &'static str,
+    },
+    /// Figures have grown past their budget, or differ from run to run.
+    #[error("{}", complaints.join("\n"))]
+    Budget {
+        /// A line for each.
+        complaints: Vec<String>,
+    },
+}
 
 /// Inputs for the controller, with the table and settings that it runs with.
 #[derive(Clone, Debug)]
@@ -33,18 +91,13 @@ pub struct Scenario {
 /// The recorded run, and variations of its end that reach the other branches of the step.
 ///
 /// # Errors
-/// [`BoardError::Budget`] for a recording that is too short, or of another scalar than `f64`.
-pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, BoardError> {
-    let table = firmware::contract::decode::<f64, 2>(&recording.header.table)
-        .map_err(|error| BoardError::Budget(format!("the recording's table: {error}")))?;
+/// [`MeasureError::TooShort`], or [`MeasureError::RecordedTable`] for another scalar than `f64`.
+pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, MeasureError> {
+    let table = firmware::contract::decode::<f64, 2>(&recording.header.table).map_err(MeasureError::RecordedTable)?;
     let settings = recording.header.settings;
-    let recorded: Vec<Inputs> = recording.records.iter().map(|record| record.exchange.inputs).collect();
+    let recorded: Vec<Inputs> = recording.records.iter().map(|record| record.tick.inputs).collect();
     if recorded.len() < 2 * SCENARIO_TICKS {
-        return Err(BoardError::Budget(format!(
-            "the recording has {} ticks, at least {} are needed: make a longer one",
-            recorded.len(),
-            2 * SCENARIO_TICKS
-        )));
+        return Err(MeasureError::TooShort { ticks: recorded.len(), needed: 2 * SCENARIO_TICKS });
     }
     // The end of the insertion: the needle still moves, then arrives.
     let end = recorded[recorded.len() - 2 * SCENARIO_TICKS..][..SCENARIO_TICKS].to_vec();
@@ -142,8 +195,8 @@ pub fn images() -> Result<Vec<Image>, BoardError> {
 /// Runs all scenarios on an image. Every command must be the host's, bit by bit.
 ///
 /// # Errors
-/// [`BoardError`]; [`BoardError::Budget`] for a command that is not the host's.
-pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, BoardError> {
+/// [`MeasureError`]; [`MeasureError::Differs`] for a command that is not the host's.
+pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, MeasureError> {
     let mut device = Device::emulate(image)?;
     let mut counted: BTreeMap<&'static str, Vec<u32>> = BTreeMap::new();
     let mut stack = 0;
@@ -155,7 +208,7 @@ pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, BoardEr
         let account = device.account()?;
         stack = stack.max(account.stack_bytes);
         if account.ledger.unaccounted() > 0 {
-            return Err(BoardError::Budget(format!("{}: samples unaccounted for", scenario.name)));
+            return Err(MeasureError::Unaccounted { scenario: scenario.name });
         }
     }
     let MemoryUse { flash, ram } = image.memory_use()?;
@@ -176,11 +229,12 @@ fn run<T: Scalar>(
     table: &Table<T, 2>,
     scenario: &Scenario,
     counted: &mut BTreeMap<&'static str, Vec<u32>>,
-) -> Result<(), BoardError> {
-    let refused = |what: String| BoardError::Budget(format!("{}: {what}", scenario.name));
+) -> Result<(), MeasureError> {
+    let name = scenario.name;
     let mut bytes = vec![0; MAX_TABLE_BYTES];
-    let length = encode(table, &mut bytes).map_err(|error| refused(error.to_string()))?;
-    let controller = Controller::new(table, &scenario.settings).map_err(|error| refused(error.to_string()))?;
+    let length = encode(table, &mut bytes).map_err(|reason| MeasureError::Table { scenario: name, reason })?;
+    let controller = Controller::new(table, &scenario.settings)
+        .map_err(|reason| MeasureError::Settings { scenario: name, reason })?;
     let mut state = State::<T>::new();
     device.begin(&bytes[..length], &scenario.settings)?;
     let counter_hz = device.identity().counter_hz;
@@ -189,8 +243,8 @@ fn run<T: Scalar>(
         let answer = device
             .step(inputs, PATIENCE)?
             .ok_or(BoardError::Silent { to: "a step", silent_s: PATIENCE.as_secs_f64() })?;
-        if let Some(what) = difference(&expected, &answer.command) {
-            return Err(refused(format!("tick {}: on the board {what} (host first)", inputs.tick)));
+        if let Some(difference) = difference(&expected, &answer.command) {
+            return Err(MeasureError::Differs { scenario: name, tick: inputs.tick, difference });
         }
         let command = &answer.command;
         let branch = branch(command.state, Faults::from_bits(command.faults));

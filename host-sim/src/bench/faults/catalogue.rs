@@ -4,39 +4,39 @@ use firmware::contract::Table;
 
 use super::evidence::Evidence;
 use super::processes::{self, Stage};
-use super::rows::{Outcome, Trial, actuation, bytes, needle, streams, time, values};
-use crate::error::SimError;
+use super::rows::{Trial, actuation, bytes, needle, streams, time, values};
+use crate::bench::error::SimError;
 
 /// How a row is tried.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Method {
     /// In lockstep and virtual time, from a seeded schedule.
-    Lockstep(fn(&Trial<'_>, &mut Evidence) -> Outcome),
+    Lockstep(fn(&Trial<'_>, &mut Evidence) -> Result<(), SimError>),
     /// With real processes, in real time.
-    Processes(fn(&Stage<'_>, &mut Evidence) -> Outcome),
+    Processes(fn(&Stage<'_>, &mut Evidence) -> Result<(), SimError>),
 }
 
 /// One row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Row {
+pub struct Row {
     /// Number in the catalogue.
-    pub(crate) id: u32,
+    pub id: u32,
     /// What goes wrong.
-    pub(crate) name: &'static str,
+    pub name: &'static str,
     /// How it is tried.
-    pub(crate) method: Method,
+    method: Method,
 }
 
-const fn lockstep(id: u32, name: &'static str, run: fn(&Trial<'_>, &mut Evidence) -> Outcome) -> Row {
+const fn lockstep(id: u32, name: &'static str, run: fn(&Trial<'_>, &mut Evidence) -> Result<(), SimError>) -> Row {
     Row { id, name, method: Method::Lockstep(run) }
 }
 
-const fn real(id: u32, name: &'static str, run: fn(&Stage<'_>, &mut Evidence) -> Outcome) -> Row {
+const fn real(id: u32, name: &'static str, run: fn(&Stage<'_>, &mut Evidence) -> Result<(), SimError>) -> Row {
     Row { id, name, method: Method::Processes(run) }
 }
 
 /// All rows in order.
-pub(crate) const ROWS: &[Row] = &[
+pub const ROWS: &[Row] = &[
     lockstep(1, "step over budget by 0.5, 1, 3.5 periods", time::overrun),
     lockstep(2, "overrun on every tick", time::overrun_on_every_tick),
     lockstep(3, "peer stopped for 100 ms", time::peer_stopped),
@@ -89,7 +89,7 @@ impl Row {
     ///
     /// # Errors
     /// [`SimError`] when it could not be set up; what does not hold is in the evidence.
-    pub(crate) fn run(&self, table: &Table<f64, 2>, seed: u64, effort: f64) -> Result<Evidence, SimError> {
+    pub fn run(&self, table: &Table<f64, 2>, seed: u64, effort: f64) -> Result<Evidence, SimError> {
         let mut evidence = Evidence::default();
         match self.method {
             Method::Lockstep(run) => run(&Trial { table, seed }, &mut evidence)?,
@@ -103,7 +103,7 @@ impl Row {
 mod tests {
     use super::*;
     use crate::bench::faults::evidence::Verdict;
-    use crate::bench::faults::fixture;
+    use crate::bench::fixture::fixture;
 
     #[test]
     fn every_lockstep_row_holds_for_several_seeds() {

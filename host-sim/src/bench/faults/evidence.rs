@@ -2,20 +2,25 @@
 
 use firmware::contract::PaddleCommand;
 use firmware::{Faults, Mode};
+use serde::{Deserialize, Serialize};
 
-use super::bench::Bench;
+use super::closed_loop::ClosedLoop;
 
 /// Failures that are kept in words, per row.
 const KEPT: usize = 5;
 
 /// Whether a row holds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Verdict {
     /// Everything that it demands was seen.
+    #[serde(rename = "passed")]
     Passed,
     /// Something was not.
+    #[serde(rename = "FAILED")]
     Failed,
     /// It could not be tried here. Never the same as passed.
+    #[default]
+    #[serde(rename = "not run")]
     NotRun,
 }
 
@@ -79,7 +84,7 @@ impl Evidence {
     }
 
     /// Takes over accounts, invariants, error and final state of a finished trial.
-    pub fn close(&mut self, bench: &Bench<'_>, what: impl Fn() -> String) {
+    pub fn close(&mut self, bench: &ClosedLoop<'_>, what: impl Fn() -> String) {
         self.max_error = Some(self.max_error.unwrap_or(0.0).max(bench.max_error));
         self.final_state = Some(bench.mode());
         let unaccounted = bench.unaccounted();
@@ -91,7 +96,7 @@ impl Evidence {
     }
 
     /// The trial must end in this state.
-    pub fn expect_mode(&mut self, bench: &Bench<'_>, mode: Mode, what: impl Fn() -> String) {
+    pub fn expect_mode(&mut self, bench: &ClosedLoop<'_>, mode: Mode, what: impl Fn() -> String) {
         self.require(bench.mode() == mode, || {
             format!("{}: ended in {:?} instead of {mode:?}: {}", what(), bench.mode(), bench.state.faults())
         });

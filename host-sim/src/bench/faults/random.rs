@@ -6,9 +6,9 @@ use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::bench::{Bench, Setup};
+use super::closed_loop::{ClosedLoop, Setup};
 use super::fault::{Event, Fault, below};
-use crate::error::SimError;
+use crate::bench::error::SimError;
 
 /// Stream of the generator that draws schedules.
 const SCHEDULE_STREAM: u128 = 11;
@@ -77,7 +77,7 @@ pub fn composed(table: &Table<f64, 2>, first: u64, count: u64, progress: &dyn Fn
         one(table, seed, &mut sum, &mut digest)?;
         progress();
     }
-    sum.digest = crate::bench::strategy::hex(&digest.finalize());
+    sum.digest = model_offline::output::table_text::hex(&digest.finalize());
     Ok(sum)
 }
 
@@ -86,7 +86,7 @@ fn one(table: &Table<f64, 2>, seed: u64, sum: &mut Composed, digest: &mut Sha256
     setup.shuttles = true;
     // Every other insertion starts right before its counters wrap.
     setup.sequence = if seed.is_multiple_of(2) { 0 } else { u32::MAX - 300 };
-    let mut bench = Bench::new(table, setup)?;
+    let mut bench = ClosedLoop::new(table, setup)?;
     let events = schedule(seed, setup.settings.loop_period_ns, table.validity.depth_end);
     for event in &events {
         bench.inject_at(*event);
@@ -143,7 +143,7 @@ fn mix(hash: u64, value: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::faults::fixture;
+    use crate::bench::fixture::fixture;
 
     #[test]
     fn random_schedules_leave_nothing_unaccounted_and_repeat_bit_by_bit() {

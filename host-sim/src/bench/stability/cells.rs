@@ -4,7 +4,7 @@ use firmware::law::Direction;
 use firmware::stability::gain_limit;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
-use super::Behaviour;
+use super::behaviour::{Behaviour, Resolution};
 
 /// Delays, target samples.
 pub const DELAYS: [u32; 6] = [0, 1, 2, 3, 5, 10];
@@ -40,8 +40,11 @@ pub struct Boundary {
 }
 
 /// The gains of the cells: evenly spaced in the logarithm.
-pub fn gains(quick: bool) -> Vec<f64> {
-    let per_decade = if quick { 15 } else { 40 };
+pub fn gains(resolution: Resolution) -> Vec<f64> {
+    let per_decade = match resolution {
+        Resolution::Quick => 15,
+        Resolution::Fine => 40,
+    };
     // From 0.002, below the least limit of all cells but those that no gain makes stable (0.0042 at 85°, |λ| = 2 and a
     // delay of 10), to 5, above the largest.
     (0..=17 * per_decade / 5).map(|i| 0.002 * 10f64.powf(f64::from(i) / f64::from(per_decade))).collect()
@@ -77,8 +80,8 @@ pub fn simulate(truth: &Matrix2<f64>, table: &Matrix2<f64>, gain: f64, delay: u3
 
 /// Simulates every cell around a table's Jacobian; the tissue's is |λ|·R(arg λ)·Ĵ, so that J·Ĵ⁻¹ has exactly the
 /// eigenvalues |λ|·e^(±i·arg λ).
-pub fn boundaries(table: &Matrix2<f64>, quick: bool) -> Vec<Boundary> {
-    let gains = gains(quick);
+pub fn boundaries(table: &Matrix2<f64>, resolution: Resolution) -> Vec<Boundary> {
+    let gains = gains(resolution);
     let mut all = Vec::new();
     for delay in DELAYS {
         for size in SIZES {
@@ -114,7 +117,7 @@ mod tests {
     #[test]
     fn simulated_cells_agree_with_theory_within_one() {
         let table = Matrix2::new(0.30, 0.05, -0.04, 0.25);
-        let all = boundaries(&table, true);
+        let all = boundaries(&table, Resolution::Quick);
         assert_eq!(all.len(), DELAYS.len() * ANGLES.len() * SIZES.len());
         for boundary in &all {
             assert!(boundary.theory_cells.abs_diff(boundary.simulated_cells) <= 1, "{boundary:?}");

@@ -10,27 +10,9 @@ use model_offline::scene::Scene;
 use model_offline::table::{TableBuildError, TableOptions, build};
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::Behaviour;
+use super::behaviour::Behaviour;
 use super::cells::simulate;
-
-/// Which tissue a table was computed for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tissue {
-    /// Without the inclusions.
-    Homogeneous,
-    /// As the scene is.
-    Inclusion,
-}
-
-impl Tissue {
-    /// Name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Homogeneous => "homogeneous",
-            Self::Inclusion => "inclusion",
-        }
-    }
-}
+use crate::bench::tissue::Tissue;
 
 /// One depth of one paddle.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,28 +5,96 @@
 //! - [`mismatch`]: a table without the inclusion on tissue with it, and the other way round, along the depth;
 //! - [`rate_limit`]: limit cycles from rate limits with delay, which linear theory does not show.
 
+pub mod behaviour;
 pub mod cells;
 pub mod mismatch;
 pub mod rate_limit;
 
-/// What a simulated loop does in the long run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Behaviour {
-    /// The error dies out.
-    Settles,
-    /// The error stays, bounded by the actuator's limits.
-    Cycles,
-    /// The error grows.
-    Diverges,
+use model_offline::model::ModelError;
+use model_offline::placement::best_dynamic;
+use model_offline::placement::discretise;
+use model_offline::scene::Scene;
+use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::table::TableOptions;
+use nalgebra::Matrix2;
+
+use self::behaviour::Resolution;
+use self::cells::{Boundary, boundaries};
+use self::mismatch::{Mismatch, Refused, mismatches};
+use self::rate_limit::Cell;
+use super::error::SimError;
+
+/// Everything that was simulated.
+#[derive(Debug)]
+pub struct StabilityResult {
+    /// The scene's name.
+    pub scene: String,
+    /// Paddle whose Jacobian the cells are simulated around.
+    pub paddle: u32,
+    /// Its Jacobian at rest.
+    pub jacobian: Matrix2<f64>,
+    /// How wide cells are.
+    pub resolution: Resolution,
+    /// Gain × delay × Jacobian error.
+    pub boundaries: Vec<Boundary>,
+    /// Table and tissue swapped, by paddle and depth; empty without inclusions.
+    pub mismatches: Vec<Mismatch>,
+    /// Paddles without a table, and why.
+    pub refused: Vec<Refused>,
+    /// Largest |λ| that the tables' gain allows for.
+    pub lambda_max: f64,
+    /// Rate limits with delay.
+    pub cells: Vec<Cell>,
 }
 
-impl Behaviour {
-    /// Name in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Settles => "settles",
-            Self::Cycles => "cycles",
-            Self::Diverges => "diverges",
-        }
+impl StabilityResult {
+    /// Gains of the cells along every boundary.
+    pub fn gains(&self) -> Vec<f64> {
+        cells::gains(self.resolution)
     }
+}
+
+/// Simulates everything, three parts; `progress` is called after each.
+///
+/// # Errors
+/// [`SimError`]: tissue that cannot be modelled.
+pub fn simulate(
+    scene: &Scene,
+    resolution: Resolution,
+    threads: usize,
+    progress: &dyn Fn(),
+) -> Result<StabilityResult, SimError> {
+    let plain = scene.without_inclusions();
+    let (model, _) = discretise(&plain)?;
+    let paddle = best_dynamic(&model)?;
+    let place = model.paddle_position(paddle);
+    let jacobian = model
+        .body(place, NewtonSettings::default())
+        .and_then(|mut body| body.actuation_jacobian())
+        .map_err(ModelError::from)?;
+    let boundaries = boundaries(&jacobian, resolution);
+    progress();
+    let (mut rows, mut refused) = (Vec::new(), Vec::new());
+    if !scene.inclusions.is_empty() {
+        let knots = match resolution {
+            Resolution::Quick => 6,
+            Resolution::Fine => 11,
+        };
+        (rows, refused) = mismatches(scene, knots, threads)?;
+    }
+    progress();
+    let cells = rate_limit::map(resolution);
+    progress();
+    let lambda_max = TableOptions::default().lambda_max;
+    Ok(StabilityResult {
+        scene: scene.name.clone(),
+        paddle,
+        jacobian,
+        resolution,
+        boundaries,
+        mismatches: rows,
+        refused,
+        lambda_max,
+        cells,
+    })
 }

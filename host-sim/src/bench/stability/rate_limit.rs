@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use firmware::limits::{Limits, PositionLimit};
 use nalgebra::Vector1;
 
-use super::Behaviour;
+use super::behaviour::{Behaviour, Resolution};
 
 /// Loop ticks per target sample.
 const TICKS_PER_SAMPLE: usize = 20;
@@ -92,8 +92,11 @@ pub fn simulate(law: Law, delay: u32, gain: f64, amplitude: f64) -> (Behaviour, 
 }
 
 /// The whole map.
-pub fn map(quick: bool) -> Vec<Cell> {
-    let (gains, amplitudes) = if quick { (9, 9) } else { (17, 17) };
+pub fn map(resolution: Resolution) -> Vec<Cell> {
+    let (gains, amplitudes) = match resolution {
+        Resolution::Quick => (9, 9),
+        Resolution::Fine => (17, 17),
+    };
     let log = |from: f64, to: f64, count: u32, i: u32| from * (to / from).powf(f64::from(i) / f64::from(count - 1));
     let mut cells = Vec::new();
     for law in [Law::Plain, Law::AntiWindup] {

@@ -5,10 +5,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::machine::Disturbance;
-use crate::bench::result::{Distribution, LoopTiming};
-use crate::error::SimError;
 use crate::runtime::clock::{Scheduling, now_ns, sleep_until};
-use crate::runtime::durations::{Durations, LoopDurations};
+use crate::runtime::durations::{Distribution, Durations, LoopDurations, LoopTiming};
+use crate::runtime::error::RuntimeError;
 use crate::runtime::signals;
 
 /// From the set-up to the first release of a block.
@@ -70,7 +69,10 @@ impl Blocks {
     }
 
     /// One block; `step` is called at every release with its number and its scheduled time.
-    pub(super) fn block(&mut self, mut step: impl FnMut(u64, u64) -> Result<Stamps, SimError>) -> Result<(), SimError> {
+    pub(super) fn block(
+        &mut self,
+        mut step: impl FnMut(u64, u64) -> Result<Stamps, RuntimeError>,
+    ) -> Result<(), RuntimeError> {
         signals::check()?;
         let period_ns = (1e9 / self.rate_hz).round() as u64;
         let before = Disturbance::now();

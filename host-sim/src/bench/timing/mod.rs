@@ -6,15 +6,13 @@
 //! turns with a bare ping-pong of iceoryx2 and with the same exchange over a Unix socket.
 
 mod blocks;
-mod exchange;
 pub mod machine;
+mod partner;
 pub mod peer;
-mod print;
 mod stimulus;
 
 use std::path::PathBuf;
 
-use clap::Args;
 use firmware::contract::{PaddleCommand, Table};
 use firmware::{Controller, Inputs, State};
 use model_offline::table::to_bytes;
@@ -23,18 +21,19 @@ use serde::{Deserialize, Serialize};
 
 pub use self::blocks::BlockResult;
 use self::blocks::{Blocks, ratios};
-use self::exchange::{Partner, Running};
 use self::machine::{Disturbance, pin, unpin};
-use self::peer::Exchange;
+use self::partner::{Partner, Running};
+use self::peer::Transport;
 use self::stimulus::Stimulus;
-use crate::bench::result::{Distribution, LoopTiming, TickResult};
-use crate::error::SimError;
-use crate::report;
-use crate::report::directory as output;
-use crate::runtime::clock::{FIFO_PRIORITY, Scheduling, now_ns, release_real_time, request_real_time_at};
-use crate::runtime::durations::Durations;
+use super::error::SimError;
+use super::fixture::fixture;
+use crate::record::error::FileError;
+use crate::runtime::clock::{Scheduling, now_ns, release_real_time, request_real_time_at};
+use crate::runtime::durations::{Distribution, Durations, LoopTiming};
+use crate::runtime::error::RuntimeError;
+use crate::runtime::ledger::TickResult;
 use crate::runtime::signals;
-use crate::world::loop_settings::{LoopArgs, positive};
+use crate::world::loop_settings::LoopSettings;
 
 /// Rounds of blocks: enough for a range of ratios.
 const ROUNDS: u64 = 5;
@@ -46,30 +45,21 @@ const EXCHANGES: u64 = 20_000;
 const SWEEP_HZ: [f64; 7] = [100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0];
 const SWEEP_S: f64 = 2.0;
 
-/// Options of `timing`.
-#[derive(Args, Clone, Debug)]
-pub struct TimingArgs {
-    /// Rate of the loop, Hz
-    #[arg(long, default_value_t = 1000.0, value_name = "HZ")]
+/// What is measured, and how.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimingOptions {
+    /// Rate of the loop, Hz.
     pub rate: f64,
-    /// Duration of the periodic measurement, s
-    #[arg(long, default_value_t = 10.0, value_name = "S")]
+    /// Duration of the periodic measurement, s.
     pub seconds: f64,
-    /// Processor of the loop; the controller process stays on the next one [default: left to the kernel]
-    #[arg(long, value_name = "N")]
+    /// Processor of the loop; the other process stays on the next one. None: left to the kernel.
     pub cpu: Option<usize>,
-    /// Real-time priority to ask for, 1 to 99; 0: the ordinary policy
-    #[arg(long, default_value_t = FIFO_PRIORITY, value_name = "P", value_parser = clap::value_parser!(u8).range(0..=99))]
+    /// Real-time priority to ask for, 1 to 99; 0: the ordinary policy.
     pub priority: u8,
-    /// Also find the highest rate at which no deadline is missed
-    #[arg(long)]
+    /// Whether the highest rate at which no deadline is missed is looked for.
     pub sweep: bool,
-    /// Also write the result here, as JSON
-    #[arg(long, value_name = "FILE")]
-    pub json: Option<PathBuf>,
-    /// Write timing.json and histograms into this directory
-    #[arg(long, value_name = "DIR")]
-    pub out: Option<PathBuf>,
+    /// The program that serves as the other process: `host-sim`.
+    pub program: PathBuf,
 }
 
 /// Result of `timing`.
@@ -107,80 +97,51 @@ pub struct TimingResult {
     pub pinned: bool,
 }
 
-/// Measures and prints.
+/// Settings of a loop at this rate: both processes of an exchange need the same.
+pub fn loop_settings(rate: f64) -> LoopSettings {
+    LoopSettings { rate, target_rate: f64::min(50.0, rate), latency: 20.0, noise: None }
+}
+
+/// Measures.
 ///
 /// # Errors
 /// [`SimError`].
-pub fn timing(args: &TimingArgs) -> Result<TimingResult, SimError> {
-    signals::install();
-    positive("--rate", args.rate)?;
-    positive("--seconds", args.seconds)?;
-    if let Some(directory) = &args.out {
-        std::fs::create_dir_all(directory).map_err(|source| SimError::Write { path: directory.clone(), source })?;
-    }
-    let table = crate::bench::faults::fixture()?;
-    let folder = tempfile::tempdir().map_err(SimError::Spawn)?;
+pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
+    let table = fixture()?;
+    let folder = tempfile::tempdir().map_err(RuntimeError::Spawn)?;
     let table_file = folder.path().join("controller.table");
-    std::fs::write(&table_file, to_bytes(&table)?)
-        .map_err(|source| SimError::Write { path: table_file.clone(), source })?;
-    let loop_args = LoopArgs { rate: args.rate, target_rate: f64::min(50.0, args.rate), latency: 20.0, noise: None };
-    let controller = Controller::new(&table, &loop_args.settings(table.validity.depth_end))?;
+    std::fs::write(&table_file, to_bytes(&table)?).map_err(FileError::write(&table_file))?;
+    let loop_settings = loop_settings(options.rate);
+    let controller = Controller::new(&table, &loop_settings.settings(table.validity.depth_end))?;
     let partner = Partner {
-        program: std::env::current_exe().map_err(SimError::Spawn)?,
+        program: options.program.clone(),
         table: &table,
         table_file,
-        loop_args,
-        cpu: args.cpu.map(|cpu| cpu + 1),
-        priority: args.priority,
+        loop_settings,
+        cpu: options.cpu.map(|cpu| cpu + 1),
+        priority: options.priority,
     };
 
     let before = Disturbance::now();
-    let pinned = args.cpu.is_some_and(pin);
-    let scheduling = request_real_time_at(args.priority);
-    let outcome = measure(args, &table, &controller, &partner, &scheduling);
+    let pinned = options.cpu.is_some_and(pin);
+    let scheduling = request_real_time_at(options.priority);
+    let measurement = Measurement { options, table: &table, controller: &controller, partner, scheduling };
+    let outcome = measurement.measure();
     release_real_time();
     unpin();
     let mut result = outcome?;
     result.pinned = pinned;
     result.steal_ms = Disturbance::now().since(&before).steal_ms;
-    print::print(&result, args.priority);
-    write(args, &result)?;
     Ok(result)
 }
 
-fn write(args: &TimingArgs, result: &TimingResult) -> Result<(), SimError> {
-    if let Some(directory) = &args.out {
-        output::write_json(&directory.join("timing.json"), result)?;
-        let loops =
-            [("empty loop", &result.empty), ("controller's loop", &result.controller), ("exchange", &result.exchange)];
-        output::write_text(&directory.join("timing.svg"), &report::timing_histograms(&loops))?;
-    }
-    args.json.as_ref().map_or(Ok(()), |path| output::write_json(path, result))
-}
-
-fn measure(
-    args: &TimingArgs,
-    table: &Table<f64, 2>,
-    controller: &Controller<'_, f64>,
-    partner: &Partner<'_>,
-    scheduling: &Scheduling,
-) -> Result<TimingResult, SimError> {
-    let mut result = TimingResult::default();
-    periodic(args, table, controller, partner, scheduling, &mut result)?;
-    (result.clock, result.step) = back_to_back(table, controller, &partner.loop_args);
-    polled(partner, &mut result)?;
-    if args.sweep {
-        for rate in SWEEP_HZ {
-            let loop_args = LoopArgs { rate, ..partner.loop_args };
-            let mut own = Own::new(table, &loop_args);
-            let controller = Controller::new(table, &loop_args.settings(table.validity.depth_end))?;
-            let mut blocks = Blocks::new(rate, (SWEEP_S * rate) as u64, scheduling);
-            blocks.block(|tick, time_ns| own.step(&controller, tick, time_ns))?;
-            let (timing, _) = blocks.finish();
-            result.sweep.push((rate, timing.ticks, timing.deadline_misses, timing.skipped));
-        }
-    }
-    Ok(result)
+/// Everything that the measurements share.
+struct Measurement<'t> {
+    options: &'t TimingOptions,
+    table: &'t Table<f64, 2>,
+    controller: &'t Controller<'t, f64>,
+    partner: Partner<'t>,
+    scheduling: Scheduling,
 }
 
 /// A controller in this thread, with its samples.
@@ -194,8 +155,8 @@ struct Own {
 }
 
 impl Own {
-    fn new(table: &Table<f64, 2>, loop_args: &LoopArgs) -> Self {
-        let stimulus = Stimulus::new(table, loop_args);
+    fn new(table: &Table<f64, 2>, loop_settings: &LoopSettings) -> Self {
+        let stimulus = Stimulus::new(table, loop_settings);
         Self { stimulus, state: State::new(), command: PaddleCommand::default(), offset: 0, next: 0 }
     }
 
@@ -204,120 +165,129 @@ impl Own {
         self.offset = self.next;
     }
 
-    /// The release `tick` of the block: skipped ones are in the ledger.
-    fn step(&mut self, controller: &Controller<'_, f64>, tick: u64, time_ns: u64) -> Result<blocks::Stamps, SimError> {
+    /// What arrives for this tick.
+    fn inputs(&mut self, tick: u64, time_ns: u64) -> Inputs {
         let samples = self.stimulus.samples(time_ns, self.command.displacement);
-        let inputs = Inputs {
-            tick: self.offset + tick,
-            time_ns,
-            needle: Some(samples.needle),
-            target: samples.target,
-            paddle: Some(samples.paddle),
-        };
-        self.next = inputs.tick + 1;
-        self.command = controller.step(&mut self.state, std::hint::black_box(&inputs));
+        Inputs { tick, time_ns, needle: Some(samples.needle), target: samples.target, paddle: Some(samples.paddle) }
+    }
+
+    fn answer(&mut self, controller: &Controller<'_, f64>, inputs: &Inputs) {
+        self.command = controller.step(&mut self.state, std::hint::black_box(inputs));
         std::hint::black_box(&self.command);
-        Ok(None)
+    }
+
+    /// The release `tick` of the block: skipped ones are in the ledger.
+    fn step(&mut self, controller: &Controller<'_, f64>, tick: u64, time_ns: u64) -> blocks::Stamps {
+        let inputs = self.inputs(self.offset + tick, time_ns);
+        self.next = inputs.tick + 1;
+        self.answer(controller, &inputs);
+        None
     }
 }
 
-/// Empty loop, controller, exchange, in turns.
-fn periodic(
-    args: &TimingArgs,
-    table: &Table<f64, 2>,
-    controller: &Controller<'_, f64>,
-    partner: &Partner<'_>,
-    scheduling: &Scheduling,
-    result: &mut TimingResult,
-) -> Result<(), SimError> {
-    let ticks = ((args.seconds * args.rate) as u64 / (3 * ROUNDS)).max(1);
-    let [mut empty, mut loaded, mut exchange] = [(); 3].map(|()| Blocks::new(args.rate, ticks, scheduling));
-    let mut own = Own::new(table, &partner.loop_args);
-    for _ in 0..ROUNDS {
-        empty.block(|_, _| Ok(None))?;
-        own.start_block();
-        loaded.block(|tick, time_ns| own.step(controller, tick, time_ns))?;
-        let mut running = Running::start(partner, Exchange::Link)?;
-        exchange.block(|_, _| running.once().map(Some))?;
-    }
-    result.lateness_ratios = ratios(&loaded.medians_ns, &empty.medians_ns);
-    result.exchange_lateness_ratios = ratios(&exchange.medians_ns, &empty.medians_ns);
-    let ledger = own.state.ledger().ticks;
-    // Periods skipped after the last tick of a block are in the schedule only: no tick has come to tell the controller.
-    let skipped = loaded.skipped();
-    let told = ROUNDS * ticks + ledger.skipped;
-    result.ledger = TickResult {
-        due: ROUNDS * ticks + skipped,
-        run: ledger.run,
-        hold: ledger.hold,
-        safe: ledger.safe,
-        skipped,
-        unaccounted: ledger.unaccounted() + ledger.due.abs_diff(told),
-    };
-    let more;
-    (result.empty, more) = empty.finish();
-    result.blocks.push(more);
-    let more;
-    (result.controller, more) = loaded.finish();
-    result.blocks.push(more);
-    let more;
-    (result.exchange, more) = exchange.finish();
-    result.blocks.push(more);
-    Ok(())
-}
-
-/// Two readings of the clock with nothing between them, and with a step between them.
-fn back_to_back(
-    table: &Table<f64, 2>,
-    controller: &Controller<'_, f64>,
-    loop_args: &LoopArgs,
-) -> (Distribution, Distribution) {
-    let (mut clock, mut step) = (Durations::default(), Durations::default());
-    let mut own = Own::new(table, loop_args);
-    for tick in 0..STEPS {
-        let start_ns = now_ns();
-        clock.record(now_ns() - start_ns);
-        let samples = own.stimulus.samples(tick * loop_args.period_ns(), own.command.displacement);
-        let inputs = Inputs {
-            tick,
-            time_ns: tick * loop_args.period_ns(),
-            needle: Some(samples.needle),
-            target: samples.target,
-            paddle: Some(samples.paddle),
-        };
-        let start_ns = now_ns();
-        own.command = controller.step(&mut own.state, std::hint::black_box(&inputs));
-        std::hint::black_box(&own.command);
-        step.record(now_ns() - start_ns);
-    }
-    (clock.distribution(), step.distribution())
-}
-
-/// The exchange with both sides polling: link, bare, socket, in turns.
-fn polled(partner: &Partner<'_>, result: &mut TimingResult) -> Result<(), SimError> {
-    let kinds = [Exchange::Link, Exchange::Bare, Exchange::Socket];
-    let mut all = kinds.map(|_| Durations::default());
-    let mut medians = kinds.map(|_| Vec::new());
-    for _ in 0..ROUNDS {
-        for ((kind, all), medians) in kinds.into_iter().zip(&mut all).zip(&mut medians) {
-            signals::check()?;
-            let mut running = Running::start(partner, kind)?;
-            let mut own = Durations::default();
-            // The first ones find cold caches on both sides.
-            for _ in 0..EXCHANGES / 10 {
-                running.once()?;
-            }
-            for _ in 0..EXCHANGES {
-                let (start_ns, end_ns) = running.once()?;
-                own.record(end_ns - start_ns);
-                all.record(end_ns - start_ns);
-            }
-            medians.push(Some(own.median_ns()));
+impl Measurement<'_> {
+    fn measure(&self) -> Result<TimingResult, SimError> {
+        let mut result = TimingResult::default();
+        self.periodic(&mut result)?;
+        (result.clock, result.step) = self.back_to_back();
+        self.polled(&mut result)?;
+        if self.options.sweep {
+            result.sweep = SWEEP_HZ.into_iter().map(|rate| self.sweep(rate)).collect::<Result<_, _>>()?;
         }
+        Ok(result)
     }
-    let [link, bare, socket] = medians;
-    result.link_over_bare = ratios(&link, &bare);
-    result.socket_over_link = ratios(&socket, &link);
-    result.polled = all.map(|durations| durations.distribution());
-    Ok(())
+
+    /// One rate of the sweep: with ticks, deadline misses and periods skipped.
+    fn sweep(&self, rate: f64) -> Result<(f64, u64, u64, u64), SimError> {
+        let loop_settings = LoopSettings { rate, ..self.partner.loop_settings };
+        let mut own = Own::new(self.table, &loop_settings);
+        let controller = Controller::new(self.table, &loop_settings.settings(self.table.validity.depth_end))?;
+        let mut blocks = Blocks::new(rate, (SWEEP_S * rate) as u64, &self.scheduling);
+        blocks.block(|tick, time_ns| Ok(own.step(&controller, tick, time_ns)))?;
+        let (timing, _) = blocks.finish();
+        Ok((rate, timing.ticks, timing.deadline_misses, timing.skipped))
+    }
+
+    /// Empty loop, controller, exchange, in turns.
+    fn periodic(&self, result: &mut TimingResult) -> Result<(), SimError> {
+        let Self { options, partner, .. } = self;
+        let ticks = ((options.seconds * options.rate) as u64 / (3 * ROUNDS)).max(1);
+        let [mut empty, mut loaded, mut exchange] =
+            [(); 3].map(|()| Blocks::new(options.rate, ticks, &self.scheduling));
+        let mut own = Own::new(self.table, &partner.loop_settings);
+        for _ in 0..ROUNDS {
+            empty.block(|_, _| Ok(None))?;
+            own.start_block();
+            loaded.block(|tick, time_ns| Ok(own.step(self.controller, tick, time_ns)))?;
+            let mut running = Running::start(partner, Transport::Link)?;
+            exchange.block(|_, _| running.once().map(Some))?;
+        }
+        result.lateness_ratios = ratios(&loaded.medians_ns, &empty.medians_ns);
+        result.exchange_lateness_ratios = ratios(&exchange.medians_ns, &empty.medians_ns);
+        let ledger = own.state.ledger().ticks;
+        // Periods skipped after the last tick of a block are in the schedule only: no tick has come to tell the
+        // controller.
+        let skipped = loaded.skipped();
+        let told = ROUNDS * ticks + ledger.skipped;
+        result.ledger = TickResult {
+            due: ROUNDS * ticks + skipped,
+            run: ledger.run,
+            hold: ledger.hold,
+            safe: ledger.safe,
+            skipped,
+            unaccounted: ledger.unaccounted() + ledger.due.abs_diff(told),
+        };
+        let timings = [&mut result.empty, &mut result.controller, &mut result.exchange];
+        for (blocks, timing) in [empty, loaded, exchange].into_iter().zip(timings) {
+            let more;
+            (*timing, more) = blocks.finish();
+            result.blocks.push(more);
+        }
+        Ok(())
+    }
+
+    /// Two readings of the clock with nothing between them, and with a step between them.
+    fn back_to_back(&self) -> (Distribution, Distribution) {
+        let (mut clock, mut step) = (Durations::default(), Durations::default());
+        let loop_settings = &self.partner.loop_settings;
+        let mut own = Own::new(self.table, loop_settings);
+        for tick in 0..STEPS {
+            let start_ns = now_ns();
+            clock.record(now_ns() - start_ns);
+            let inputs = own.inputs(tick, tick * loop_settings.period_ns());
+            let start_ns = now_ns();
+            own.answer(self.controller, &inputs);
+            step.record(now_ns() - start_ns);
+        }
+        (clock.distribution(), step.distribution())
+    }
+
+    /// The exchange with both sides polling: link, bare, socket, in turns.
+    fn polled(&self, result: &mut TimingResult) -> Result<(), SimError> {
+        let transports = [Transport::Link, Transport::Bare, Transport::Socket];
+        let mut all = transports.map(|_| Durations::default());
+        let mut medians = transports.map(|_| Vec::new());
+        for _ in 0..ROUNDS {
+            for ((transport, all), medians) in transports.into_iter().zip(&mut all).zip(&mut medians) {
+                signals::check()?;
+                let mut running = Running::start(&self.partner, transport)?;
+                let mut own = Durations::default();
+                // The first ones find cold caches on both sides.
+                for _ in 0..EXCHANGES / 10 {
+                    running.once()?;
+                }
+                for _ in 0..EXCHANGES {
+                    let (start_ns, end_ns) = running.once()?;
+                    own.record(end_ns - start_ns);
+                    all.record(end_ns - start_ns);
+                }
+                medians.push(Some(own.median_ns()));
+            }
+        }
+        let [link, bare, socket] = medians;
+        result.link_over_bare = ratios(&link, &bare);
+        result.socket_over_link = ratios(&socket, &link);
+        result.polled = all.map(|durations| durations.distribution());
+        Ok(())
+    }
 }

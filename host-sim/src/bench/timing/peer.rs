@@ -1,10 +1,9 @@
 //! The other process of an exchange: polls without sleeping, answers, ends when it is told to.
 
 use std::os::unix::net::UnixDatagram;
-use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
+use clap::ValueEnum;
+use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
 use firmware::io::{CommandSink, SampleSource};
 use firmware::{Controller, Inputs, State};
 use iceoryx2::node::{Node, NodeBuilder};
@@ -16,16 +15,15 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::machine::pin;
-use crate::commands::controller::read_table;
-use crate::error::SimError;
 use crate::exchange::{ControllerPorts, Space};
 use crate::runtime::clock::{release_real_time, request_real_time_at};
+use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::signals;
-use crate::world::loop_settings::LoopArgs;
+use crate::world::loop_settings::LoopSettings;
 
 /// What is exchanged, and over what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Exchange {
+pub enum Transport {
     /// Needle, target and paddle samples and the command over the link, with the controller's step.
     Link,
     /// 32 bytes there and 64 bytes back over iceoryx2 itself, without anything else.
@@ -37,26 +35,20 @@ pub enum Exchange {
 /// Polls between two looks at whether the other side is still there.
 const POLLS_PER_LOOK: u64 = 4096;
 
-/// Options of the peer process.
-#[derive(Args, Clone, Debug)]
-pub struct PeerArgs {
-    /// What to answer
-    #[arg(long, value_enum)]
-    pub exchange: Exchange,
-    /// Name of the link
-    #[arg(long)]
-    pub link: String,
-    /// Controller table
-    #[arg(long)]
-    pub table: PathBuf,
-    /// Loop rate, Hz
-    #[arg(long)]
-    pub rate: f64,
-    /// Processor to stay on
-    #[arg(long)]
+/// What the other process of an exchange does.
+#[derive(Clone, Copy, Debug)]
+pub struct PeerOptions<'o> {
+    /// What to answer.
+    pub transport: Transport,
+    /// Name of the link.
+    pub link: &'o str,
+    /// Table of the controller.
+    pub table: &'o Table<f64, 2>,
+    /// Rates, latency, noise.
+    pub loop_settings: LoopSettings,
+    /// Processor to stay on.
     pub cpu: Option<usize>,
-    /// Real-time priority to ask for
-    #[arg(long)]
+    /// Real-time priority to ask for.
     pub priority: u8,
 }
 
@@ -69,96 +61,103 @@ pub(super) const DATAGRAM: usize = 256;
 /// Answers until the other side has gone.
 ///
 /// # Errors
-/// [`SimError`].
-pub fn peer(args: &PeerArgs) -> Result<(), SimError> {
-    signals::install();
-    let (table, _) = read_table(&args.table)?;
-    let loop_args = LoopArgs { rate: args.rate, target_rate: f64::min(50.0, args.rate), latency: 20.0, noise: None };
-    let settings = loop_args.settings(table.validity.depth_end);
-    let controller = Controller::new(&table, &settings)?;
-    let mut state = State::new();
-    if let Some(processor) = args.cpu {
+/// [`RuntimeError`].
+pub fn answer(options: &PeerOptions<'_>) -> Result<(), RuntimeError> {
+    let settings = options.loop_settings.settings(options.table.validity.depth_end);
+    let mut stepper = Stepper { controller: Controller::new(options.table, &settings)?, state: State::new(), tick: 0 };
+    if let Some(processor) = options.cpu {
         pin(processor);
     }
-    match args.exchange {
-        Exchange::Link => {
-            let space = Space::new(&args.link)?;
-            let mut ports = ControllerPorts::<ipc::Service>::open(&space)?;
-            while !ports.has_peer() {
-                look()?;
-            }
-            ports.connect()?;
-            request_real_time_at(args.priority);
-            let mut tick = 0;
-            poll(|look| {
-                let Some(needle) = ports.needle() else { return Ok(!look || ports.has_peer()) };
-                let inputs = Inputs {
-                    tick,
-                    time_ns: needle.time_ns,
-                    needle: Some(needle),
-                    target: ports.target(),
-                    paddle: ports.paddle(),
-                };
-                tick += 1;
-                let command = controller.step(&mut state, &inputs);
-                ports.send(&command)?;
-                Ok(true)
-            })?;
-        }
-        Exchange::Bare => {
-            let space = Space::new(&args.link)?;
-            let bare = Bare::open(&space, "pong", "ping")?;
-            while !bare.has_peer() {
-                look()?;
-            }
-            request_real_time_at(args.priority);
-            poll(|look| {
-                let Some(ping) = bare.receive()? else { return Ok(!look || bare.has_peer()) };
-                bare.send(ping)?;
-                Ok(true)
-            })?;
-        }
-        Exchange::Socket => {
-            // The socket is standard input: it has no name that anybody could connect to.
-            let input = std::os::fd::AsFd::as_fd(&std::io::stdin()).try_clone_to_owned().map_err(SimError::Spawn)?;
-            let socket = UnixDatagram::from(input);
-            socket.set_nonblocking(true).map_err(SimError::Spawn)?;
-            request_real_time_at(args.priority);
-            let mut buffer = [0; DATAGRAM];
-            let mut tick = 0;
-            poll(|_| {
-                let length = match socket.recv(&mut buffer) {
-                    Ok(length) => length,
-                    Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => return Ok(true),
-                    Err(_) => return Ok(false),
-                };
-                let Ok((needle, target, paddle)) = postcard::from_bytes::<Datagram>(&buffer[..length]) else {
-                    return Ok(false); // The empty datagram is the end.
-                };
-                let inputs =
-                    Inputs { tick, time_ns: needle.time_ns, needle: Some(needle), target, paddle: Some(paddle) };
-                tick += 1;
-                let command = controller.step(&mut state, &inputs);
-                let mut answer = [0; DATAGRAM];
-                if let Ok(bytes) = postcard::to_slice(&command, &mut answer) {
-                    let _ = socket.send(bytes);
-                }
-                Ok(true)
-            })?;
-        }
+    match options.transport {
+        Transport::Link => over_link(options, &mut stepper)?,
+        Transport::Bare => over_bare(options)?,
+        Transport::Socket => over_socket(options, &mut stepper)?,
     }
     release_real_time();
     Ok(())
 }
 
-fn look() -> Result<(), SimError> {
+/// A controller that takes samples as they come.
+struct Stepper<'t> {
+    controller: Controller<'t, f64>,
+    state: State<f64>,
+    tick: u64,
+}
+
+impl Stepper<'_> {
+    fn step(
+        &mut self,
+        (needle, target, paddle): (NeedleSample, Option<TargetSample>, Option<PaddleSample>),
+    ) -> PaddleCommand {
+        let inputs = Inputs { tick: self.tick, time_ns: needle.time_ns, needle: Some(needle), target, paddle };
+        self.tick += 1;
+        self.controller.step(&mut self.state, &inputs)
+    }
+}
+
+fn over_link(options: &PeerOptions<'_>, stepper: &mut Stepper<'_>) -> Result<(), RuntimeError> {
+    let space = Space::new(options.link)?;
+    let mut ports = ControllerPorts::<ipc::Service>::open(&space)?;
+    while !ports.has_peer() {
+        look()?;
+    }
+    ports.connect()?;
+    request_real_time_at(options.priority);
+    poll(|look| {
+        let Some(needle) = ports.needle() else { return Ok(!look || ports.has_peer()) };
+        let command = stepper.step((needle, ports.target(), ports.paddle()));
+        ports.send(&command)?;
+        Ok(true)
+    })
+}
+
+fn over_bare(options: &PeerOptions<'_>) -> Result<(), RuntimeError> {
+    let space = Space::new(options.link)?;
+    let bare = Bare::open(&space, "pong", "ping")?;
+    while !bare.has_peer() {
+        look()?;
+    }
+    request_real_time_at(options.priority);
+    poll(|look| {
+        let Some(ping) = bare.receive()? else { return Ok(!look || bare.has_peer()) };
+        bare.send(ping)?;
+        Ok(true)
+    })
+}
+
+fn over_socket(options: &PeerOptions<'_>, stepper: &mut Stepper<'_>) -> Result<(), RuntimeError> {
+    // The socket is standard input: it has no name that anybody could connect to.
+    let input = std::os::fd::AsFd::as_fd(&std::io::stdin()).try_clone_to_owned().map_err(RuntimeError::Spawn)?;
+    let socket = UnixDatagram::from(input);
+    socket.set_nonblocking(true).map_err(RuntimeError::Spawn)?;
+    request_real_time_at(options.priority);
+    let mut buffer = [0; DATAGRAM];
+    poll(|_| {
+        let length = match socket.recv(&mut buffer) {
+            Ok(length) => length,
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => return Ok(true),
+            Err(_) => return Ok(false),
+        };
+        let Ok((needle, target, paddle)) = postcard::from_bytes::<Datagram>(&buffer[..length]) else {
+            return Ok(false); // The empty datagram is the end.
+        };
+        let command = stepper.step((needle, target, Some(paddle)));
+        let mut answer = [0; DATAGRAM];
+        if let Ok(bytes) = postcard::to_slice(&command, &mut answer) {
+            let _ = socket.send(bytes);
+        }
+        Ok(true)
+    })
+}
+
+fn look() -> Result<(), RuntimeError> {
     signals::check()?;
     std::thread::sleep(std::time::Duration::from_millis(1));
     Ok(())
 }
 
 /// Calls `answer` until it says that the other side has gone; it is told when it is time to look for that.
-fn poll(mut answer: impl FnMut(bool) -> Result<bool, SimError>) -> Result<(), SimError> {
+fn poll(mut answer: impl FnMut(bool) -> Result<bool, RuntimeError>) -> Result<(), RuntimeError> {
     let mut polls: u64 = 0;
     loop {
         polls += 1;
@@ -187,8 +186,9 @@ type Payload = [u64; 8];
 
 impl Bare {
     /// Publishes `out` and reads `back`.
-    pub(super) fn open(space: &Space, out: &str, back: &str) -> Result<Self, SimError> {
-        let failed = |error: &dyn std::fmt::Display| SimError::Protocol { peer: "bare", what: error.to_string() };
+    pub(super) fn open(space: &Space, out: &str, back: &str) -> Result<Self, RuntimeError> {
+        let failed =
+            |error: &dyn std::fmt::Display| RuntimeError::Protocol { peer: Role::BareService, what: error.to_string() };
         let node = NodeBuilder::new()
             .config(space.config())
             .signal_handling_mode(SignalHandlingMode::Disabled)
@@ -209,14 +209,15 @@ impl Bare {
         self.out.dynamic_config().number_of_subscribers() > 0
     }
 
-    pub(super) fn send(&self, payload: Payload) -> Result<(), SimError> {
+    pub(super) fn send(&self, payload: Payload) -> Result<(), RuntimeError> {
         let sent = self.publisher.send_copy(payload);
-        sent.map(drop).map_err(|error| SimError::Protocol { peer: "bare", what: error.to_string() })
+        sent.map(drop).map_err(|error| RuntimeError::Protocol { peer: Role::BareService, what: error.to_string() })
     }
 
-    pub(super) fn receive(&self) -> Result<Option<Payload>, SimError> {
+    pub(super) fn receive(&self) -> Result<Option<Payload>, RuntimeError> {
         let sample = self.subscriber.receive();
-        let sample = sample.map_err(|error| SimError::Protocol { peer: "bare", what: error.to_string() })?;
+        let sample =
+            sample.map_err(|error| RuntimeError::Protocol { peer: Role::BareService, what: error.to_string() })?;
         Ok(sample.map(|sample| *sample.payload()))
     }
 }

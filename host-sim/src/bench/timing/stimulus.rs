@@ -3,8 +3,8 @@
 use firmware::contract::frames::TARGET_VISIBLE;
 use firmware::contract::{NeedleSample, PaddleSample, Table, TargetSample};
 
-use crate::world::actuator::Trajectory;
-use crate::world::loop_settings::LoopArgs;
+use crate::world::loop_settings::LoopSettings;
+use crate::world::needle::{NeedleMotion, NeedleTrajectory};
 
 /// Time of one insertion, s.
 const INSERTION_S: f64 = 5.0;
@@ -23,7 +23,7 @@ pub(super) struct Samples {
 /// Makes the samples of one tick after the other.
 #[derive(Clone, Debug)]
 pub(super) struct Stimulus {
-    trajectory: Trajectory,
+    trajectory: NeedleTrajectory,
     target_ticks: u64,
     period_ns: u64,
     paddle_index: u32,
@@ -33,11 +33,11 @@ pub(super) struct Stimulus {
 
 impl Stimulus {
     /// For a controller with this table.
-    pub(super) fn new(table: &Table<f64, 2>, loop_args: &LoopArgs) -> Self {
+    pub(super) fn new(table: &Table<f64, 2>, loop_settings: &LoopSettings) -> Self {
         Self {
-            trajectory: Trajectory::new(table.validity.depth_end, INSERTION_S),
-            target_ticks: (loop_args.rate / loop_args.target_rate).round().max(1.0) as u64,
-            period_ns: loop_args.period_ns(),
+            trajectory: NeedleTrajectory::new(table.validity.depth_end, INSERTION_S),
+            target_ticks: (loop_settings.rate / loop_settings.target_rate).round().max(1.0) as u64,
+            period_ns: loop_settings.period_ns(),
             paddle_index: table.paddle.index,
             sequence: 0,
             target_sequence: 0,
@@ -48,7 +48,7 @@ impl Stimulus {
     pub(super) fn samples(&mut self, time_ns: u64, displacement: [f64; 2]) -> Samples {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
-        let (depth, velocity) = self.trajectory.at(f64::from(sequence) * self.period_ns as f64 * 1e-9);
+        let NeedleMotion { depth, velocity } = self.trajectory.at(f64::from(sequence) * self.period_ns as f64 * 1e-9);
         let target = u64::from(sequence).is_multiple_of(self.target_ticks).then(|| {
             // Alternates by an amount below every gate: a frozen value would be refused.
             let wobble = if self.target_sequence.is_multiple_of(2) { 1e-6 } else { -1e-6 };

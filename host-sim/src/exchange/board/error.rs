@@ -9,14 +9,17 @@ use firmware::serial::{Identity, Refusal};
 #[non_exhaustive]
 pub enum BoardError {
     /// The compiler cannot build for the board.
-    #[error("no Rust target for the board: run `rustup target add {}`", super::image::TARGET)]
-    NoTarget,
+    #[error("no Rust target for the board: run `rustup target add {target}`")]
+    NoTarget {
+        /// The Rust target.
+        target: &'static str,
+    },
     /// QEMU is not installed.
-    #[error(
-        "`{}` is not there: install QEMU (Debian, Ubuntu: `apt-get install qemu-system-arm`)",
-        super::qemu::PROGRAM
-    )]
-    NoQemu,
+    #[error("`{program}` is not there: install QEMU (Debian, Ubuntu: `apt-get install qemu-system-arm`)")]
+    NoQemu {
+        /// The emulator's program.
+        program: &'static str,
+    },
     /// The image does not build or, because a panic can be reached, does not link.
     #[error("the image does not build:\n{log}")]
     Build {
@@ -72,7 +75,4 @@ pub enum BoardError {
         /// Why.
         refusal: Refusal,
     },
-    /// A figure has grown past its budget, or differs from run to run or from the host.
-    #[error("{0}")]
-    Budget(String),
 }

@@ -73,7 +73,7 @@ impl Image {
     /// [`BoardError::NoTarget`], [`BoardError::Build`], [`BoardError::Io`].
     pub fn build(scalar: ScalarKind, processor: Processor) -> Result<Self, BoardError> {
         if !has_target() {
-            return Err(BoardError::NoTarget);
+            return Err(BoardError::NoTarget { target: TARGET });
         }
         let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let base = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);

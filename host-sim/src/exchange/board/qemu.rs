@@ -33,7 +33,7 @@ impl Qemu {
     /// [`BoardError::NoQemu`], [`BoardError::Io`].
     pub fn start(elf: &Path) -> Result<(Self, SerialLine), BoardError> {
         if !Self::is_installed() {
-            return Err(BoardError::NoQemu);
+            return Err(BoardError::NoQemu { program: PROGRAM });
         }
         let mut child = Command::new(PROGRAM)
             .args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none", "-monitor", "none"])

@@ -17,13 +17,15 @@ use std::sync::Arc;
 use ::mcap::records::Metadata;
 use ::mcap::{Channel, McapError, Message, Schema, Writer};
 use firmware::{Faults, Mode};
+use model_offline::output::table_text::hex;
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
-use crate::bench::strategy::hex;
-use crate::commands::controller::mode_name;
-use crate::record::recording::{Recording, RunMode};
+use crate::record::recording::Recording;
+use crate::runtime::mode::RunMode;
+use crate::runtime::tick::ControllerTick;
+use crate::world::truth::Truth;
 
 /// A sample of the needle's encoder.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -115,6 +117,9 @@ fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1e-9
 }
 
+/// The file in memory.
+type Output = Writer<Cursor<Vec<u8>>>;
+
 /// Channels by topic, with a running number each.
 struct Topics(BTreeMap<&'static str, (Arc<Channel<'static>>, u32)>);
 
@@ -142,10 +147,9 @@ impl Topics {
 
     fn write(
         &mut self,
-        writer: &mut Writer<Cursor<Vec<u8>>>,
+        writer: &mut Output,
         topic: &str,
-        log_time: u64,
-        publish_time: u64,
+        [log_time, publish_time]: [u64; 2],
         message: &impl Serialize,
     ) -> Result<(), McapError> {
         let Some((channel, sequence)) = self.0.get_mut(topic) else { return Ok(()) };
@@ -159,6 +163,50 @@ impl Topics {
             data: Cow::Owned(data),
         })
     }
+
+    /// What the controller used and answered in a tick.
+    fn write_tick(&mut self, writer: &mut Output, tick: &ControllerTick) -> Result<(), McapError> {
+        let (inputs, command) = (&tick.inputs, &tick.command);
+        let now = inputs.time_ns;
+        if let Some(s) = &inputs.needle {
+            let measured_s = seconds(s.time_ns);
+            let message = NeedleMessage { sequence: s.sequence, measured_s, depth: s.depth, velocity: s.velocity };
+            self.write(writer, "/needle", [now, s.time_ns], &message)?;
+        }
+        if let Some(s) = &inputs.target {
+            let [x, y] = s.displacement;
+            let message = TargetMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), x, y };
+            self.write(writer, "/target", [now, s.time_ns], &message)?;
+        }
+        if let Some(s) = &inputs.paddle {
+            let (paddle_index, [x, y]) = (s.paddle_index, s.displacement);
+            let message = PaddleMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), paddle_index, x, y };
+            self.write(writer, "/paddle", [now, s.time_ns], &message)?;
+        }
+        let place = command.is_valid().then_some(command.displacement);
+        let message = CommandMessage {
+            tick: inputs.tick,
+            state: Mode::from_wire(command.state).map_or("?", Mode::name).to_owned(),
+            faults: Faults::from_bits(command.faults).to_string(),
+            x: place.map(|place| place[0]),
+            y: place.map(|place| place[1]),
+        };
+        self.write(writer, "/command", [now, now], &message)
+    }
+
+    /// What really happened at a tick; `orthogonal` is n.
+    fn write_truth(&mut self, writer: &mut Output, truth: &Truth, orthogonal: [f64; 2]) -> Result<(), McapError> {
+        let message = TruthMessage {
+            tick: truth.tick,
+            depth: truth.depth,
+            target_x: truth.target[0],
+            target_y: truth.target[1],
+            orthogonal_error: truth.target[0] * orthogonal[0] + truth.target[1] * orthogonal[1],
+            paddle_x: truth.paddle[0],
+            paddle_y: truth.paddle[1],
+        };
+        self.write(writer, "/truth", [truth.time_ns; 2], &message)
+    }
 }
 
 /// The recording as an MCAP file; `orthogonal` is n.
@@ -170,47 +218,9 @@ pub fn encode(recording: &Recording, orthogonal: [f64; 2]) -> Result<Vec<u8>, Mc
     let mut writer = options.create(Cursor::new(Vec::new()))?;
     let mut topics = Topics::new();
     for record in &recording.records {
-        let (inputs, command) = (&record.exchange.inputs, &record.exchange.command);
-        let now = inputs.time_ns;
-        if let Some(s) = &inputs.needle {
-            let message = NeedleMessage {
-                sequence: s.sequence,
-                measured_s: seconds(s.time_ns),
-                depth: s.depth,
-                velocity: s.velocity,
-            };
-            topics.write(&mut writer, "/needle", now, s.time_ns, &message)?;
-        }
-        if let Some(s) = &inputs.target {
-            let [x, y] = s.displacement;
-            let message = TargetMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), x, y };
-            topics.write(&mut writer, "/target", now, s.time_ns, &message)?;
-        }
-        if let Some(s) = &inputs.paddle {
-            let (paddle_index, [x, y]) = (s.paddle_index, s.displacement);
-            let message = PaddleMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), paddle_index, x, y };
-            topics.write(&mut writer, "/paddle", now, s.time_ns, &message)?;
-        }
-        let place = command.is_valid().then_some(command.displacement);
-        let message = CommandMessage {
-            tick: inputs.tick,
-            state: Mode::from_wire(command.state).map_or("?", mode_name).to_owned(),
-            faults: Faults::from_bits(command.faults).to_string(),
-            x: place.map(|place| place[0]),
-            y: place.map(|place| place[1]),
-        };
-        topics.write(&mut writer, "/command", now, now, &message)?;
+        topics.write_tick(&mut writer, &record.tick)?;
         if let Some(truth) = &record.truth {
-            let message = TruthMessage {
-                tick: truth.tick,
-                depth: truth.depth,
-                target_x: truth.target[0],
-                target_y: truth.target[1],
-                orthogonal_error: truth.target[0] * orthogonal[0] + truth.target[1] * orthogonal[1],
-                paddle_x: truth.paddle[0],
-                paddle_y: truth.paddle[1],
-            };
-            topics.write(&mut writer, "/truth", truth.time_ns, truth.time_ns, &message)?;
+            topics.write_truth(&mut writer, truth, orthogonal)?;
         }
     }
     writer.write_metadata(&Metadata { name: "stillpoint".to_owned(), metadata: facts(recording) })?;

@@ -1,4 +1,5 @@
 //! Files that other tools open: MCAP for Foxglove and Lichtblick, VTU series for ParaView, tables for everything else.
 
+pub mod csv;
 pub mod mcap;
 pub mod paraview;

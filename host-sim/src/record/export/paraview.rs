@@ -7,8 +7,8 @@ use model_offline::output::vtu::vtu;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 
-use crate::bench::strategy::Artifact;
-use crate::record::recording::Truth;
+use crate::record::files::Artifact;
+use crate::world::truth::Truth;
 
 /// Files of a series.
 const FRAMES: usize = 20;

@@ -1,13 +1,15 @@
 //! The bytes of headers and records.
 
-use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
+use firmware::Settings;
 use firmware::law::Direction;
 use firmware::limits::PositionLimit;
-use firmware::{Inputs, Settings};
 use sha2::{Digest, Sha256};
 
-use super::{BODY_BYTES, Exchange, FORMAT_VERSION, Header, MAGIC, Record, RecordingError, RunMode, TICK_MARK, Truth};
+use super::{BODY_BYTES, FORMAT_VERSION, Header, MAGIC, Record, RecordingError, TICK_MARK};
 use crate::exchange::bytes::{Reader, Writer};
+use crate::runtime::mode::RunMode;
+use crate::runtime::tick::{ControllerTick, TICK_BYTES};
+use crate::world::truth::Truth;
 
 pub(super) fn encode_header(header: &Header, writer: &mut Writer) {
     writer.bytes(&MAGIC);
@@ -47,7 +49,7 @@ pub(super) fn decode_header(reader: &mut Reader<'_>) -> Result<Header, Recording
     }
     let found = reader.u32().ok_or(RecordingError::Header)?;
     if found != FORMAT_VERSION {
-        return Err(RecordingError::Version { found });
+        return Err(RecordingError::Version { found, known: FORMAT_VERSION });
     }
     decode_header_fields(reader).ok_or(RecordingError::Header)
 }
@@ -90,104 +92,12 @@ fn decode_header_fields(reader: &mut Reader<'_>) -> Option<Header> {
     Some(Header { mode, seed, scene_hash, settings, table })
 }
 
-/// Bytes of an encoded [`Exchange`], as the controller process hands it over.
-pub const EXCHANGE_BYTES: usize = 4 + 16 + 32 + 32 + 32 + 64;
-
-impl Exchange {
-    /// Writes the fixed-size form.
-    pub fn encode(&self, writer: &mut Writer) {
-        let (inputs, command) = (&self.inputs, &self.command);
-        let present = u32::from(inputs.needle.is_some())
-            | u32::from(inputs.target.is_some()) << 1
-            | u32::from(inputs.paddle.is_some()) << 2;
-        writer.u32(present);
-        writer.u64(inputs.tick);
-        writer.u64(inputs.time_ns);
-        let needle = inputs.needle.unwrap_or_default();
-        writer.u32(needle.sequence);
-        writer.u32(needle.reserved);
-        writer.u64(needle.time_ns);
-        writer.f64(needle.depth);
-        writer.f64(needle.velocity);
-        let target = inputs.target.unwrap_or_default();
-        writer.u32(target.sequence);
-        writer.u32(target.flags);
-        writer.u64(target.time_ns);
-        writer.vector(&target.displacement);
-        let paddle = inputs.paddle.unwrap_or_default();
-        writer.u32(paddle.sequence);
-        writer.u32(paddle.paddle_index);
-        writer.u64(paddle.time_ns);
-        writer.vector(&paddle.displacement);
-        writer.u32(command.sequence);
-        writer.u32(command.state);
-        writer.u64(command.tick);
-        writer.u64(command.time_ns);
-        writer.u64(command.faults);
-        writer.vector(&command.displacement);
-        writer.u32(command.needle_sequence);
-        writer.u32(command.target_sequence);
-        writer.u32(command.paddle_index);
-        writer.u32(command.flags);
-    }
-
-    /// Reads the fixed-size form; `None` for bytes that nobody writes.
-    pub fn decode(reader: &mut Reader<'_>) -> Option<Self> {
-        let present = reader.u32()?;
-        if present > 7 {
-            return None;
-        }
-        let (tick, time_ns) = (reader.u64()?, reader.u64()?);
-        let needle = NeedleSample {
-            sequence: reader.u32()?,
-            reserved: reader.u32()?,
-            time_ns: reader.u64()?,
-            depth: reader.f64()?,
-            velocity: reader.f64()?,
-        };
-        let target = TargetSample {
-            sequence: reader.u32()?,
-            flags: reader.u32()?,
-            time_ns: reader.u64()?,
-            displacement: reader.vector()?,
-        };
-        let paddle = PaddleSample {
-            sequence: reader.u32()?,
-            paddle_index: reader.u32()?,
-            time_ns: reader.u64()?,
-            displacement: reader.vector()?,
-        };
-        let command = PaddleCommand {
-            sequence: reader.u32()?,
-            state: reader.u32()?,
-            tick: reader.u64()?,
-            time_ns: reader.u64()?,
-            faults: reader.u64()?,
-            displacement: reader.vector()?,
-            needle_sequence: reader.u32()?,
-            target_sequence: reader.u32()?,
-            paddle_index: reader.u32()?,
-            flags: reader.u32()?,
-        };
-        Some(Self {
-            inputs: Inputs {
-                tick,
-                time_ns,
-                needle: (present & 1 != 0).then_some(needle),
-                target: (present & 2 != 0).then_some(target),
-                paddle: (present & 4 != 0).then_some(paddle),
-            },
-            command,
-        })
-    }
-}
-
 pub(super) fn encode_record(record: &Record, writer: &mut Writer) {
     writer.u32(TICK_MARK);
-    record.exchange.encode(writer);
+    record.tick.encode(writer);
     writer.u32(u32::from(record.truth.is_some()));
     if let Some(truth) = &record.truth {
-        // Tick as the exchange's: a truth belongs to the tick of its record.
+        // Number as the controller's: a truth belongs to the tick of its record.
         writer.u64(truth.time_ns);
         writer.f64(truth.depth);
         writer.vector(&truth.target);
@@ -196,11 +106,11 @@ pub(super) fn encode_record(record: &Record, writer: &mut Writer) {
 }
 
 pub(super) fn decode_record(reader: &mut Reader<'_>) -> Option<Record> {
-    let exchange = Exchange::decode(reader)?;
+    let tick = ControllerTick::decode(reader)?;
     let truth = match reader.u32()? {
         0 => None,
         1 => Some(Truth {
-            tick: exchange.inputs.tick,
+            tick: tick.inputs.tick,
             time_ns: reader.u64()?,
             depth: reader.f64()?,
             target: reader.vector()?,
@@ -208,7 +118,7 @@ pub(super) fn decode_record(reader: &mut Reader<'_>) -> Option<Record> {
         }),
         _ => return None,
     };
-    Some(Record { exchange, truth })
+    Some(Record { tick, truth })
 }
 
-const _: () = assert!(4 + EXCHANGE_BYTES + 4 + 8 + 8 + 16 + 16 <= BODY_BYTES);
+const _: () = assert!(4 + TICK_BYTES + 4 + 8 + 8 + 16 + 16 <= BODY_BYTES);

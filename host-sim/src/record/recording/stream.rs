@@ -5,49 +5,29 @@
 
 use std::fs::File;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
-use serde::{Deserialize, Serialize};
 
-use super::{Chain, Exchange, Header, Record};
-use crate::error::SimError;
+use super::{Chain, Header, Record};
+use crate::record::error::FileError;
+use crate::runtime::accounts::RecordAccount;
+use crate::runtime::controller::TickRecorder;
+use crate::runtime::tick::ControllerTick;
 
-/// Exchanges that wait for the writer: two seconds at 1 kHz, more than any disk takes to answer.
+/// Ticks that wait for the writer: two seconds at 1 kHz, more than any disk takes to answer.
 const RING: usize = 2048;
 /// How often the writer looks.
 const NAP: Duration = Duration::from_millis(5);
 
-/// What became of the exchanges of a recording.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct RecordAccount {
-    /// Handed over by the loop.
-    pub offered: u64,
-    /// Written.
-    pub written: u64,
-    /// Lost because the ring was full.
-    pub lost_in_ring: u64,
-    /// Lost because they could not be written.
-    pub lost_on_disk: u64,
-    /// Why not.
-    pub error: Option<String>,
-}
-
-impl RecordAccount {
-    /// Exchanges without an entry: 0.
-    pub fn unaccounted(&self) -> u64 {
-        self.offered.abs_diff(self.written + self.lost_in_ring + self.lost_on_disk)
-    }
-}
-
 /// A recording in the making.
 #[derive(Debug)]
 pub struct StreamRecorder {
-    producer: Producer<Exchange>,
+    producer: Producer<ControllerTick>,
     offered: u64,
     lost: u64,
     stop: Arc<AtomicBool>,
@@ -58,10 +38,9 @@ impl StreamRecorder {
     /// Creates the file and starts its writer.
     ///
     /// # Errors
-    /// [`SimError::Write`] when there can be no such file.
-    pub fn create(path: &Path, header: &Header) -> Result<Self, SimError> {
-        let write_error = |source| SimError::Write { path: PathBuf::from(path), source };
-        let file = File::create(path).map_err(write_error)?;
+    /// [`FileError::Write`] when there can be no such file.
+    pub fn create(path: &Path, header: &Header) -> Result<Self, FileError> {
+        let file = File::create(path).map_err(FileError::write(path))?;
         let (producer, consumer) = RingBuffer::new(RING);
         let stop = Arc::new(AtomicBool::new(false));
         let (chain, start) = Chain::start(header);
@@ -69,18 +48,20 @@ impl StreamRecorder {
         let writer = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || writer.run(&start))
-            .map_err(write_error)?;
+            .map_err(FileError::write(path))?;
         Ok(Self { producer, offered: 0, lost: 0, stop, writer })
     }
+}
 
-    /// Hands an exchange over; neither waits nor allocates.
-    pub fn record(&mut self, exchange: &Exchange) {
+impl TickRecorder for StreamRecorder {
+    /// Hands a tick over; neither waits nor allocates.
+    fn record(&mut self, tick: &ControllerTick) {
         self.offered += 1;
-        self.lost += u64::from(self.producer.push(*exchange).is_err());
+        self.lost += u64::from(self.producer.push(*tick).is_err());
     }
 
     /// Writes what waits and the end mark.
-    pub fn finish(self) -> RecordAccount {
+    fn finish(self: Box<Self>) -> RecordAccount {
         self.stop.store(true, Ordering::Release);
         let written = self.writer.join().unwrap_or_default();
         RecordAccount { offered: self.offered, lost_in_ring: self.lost, ..written }
@@ -90,7 +71,7 @@ impl StreamRecorder {
 struct Writer {
     file: File,
     chain: Chain,
-    consumer: Consumer<Exchange>,
+    consumer: Consumer<ControllerTick>,
     stop: Arc<AtomicBool>,
     account: RecordAccount,
 }
@@ -103,8 +84,8 @@ impl Writer {
             let last = self.stop.load(Ordering::Acquire);
             let mut bytes = Vec::new();
             let mut records = 0;
-            while let Ok(exchange) = self.consumer.pop() {
-                self.chain.record(&Record { exchange, truth: None }, &mut bytes);
+            while let Ok(tick) = self.consumer.pop() {
+                self.chain.record(&Record { tick, truth: None }, &mut bytes);
                 records += 1;
             }
             if self.account.error.is_some() || !self.write(&bytes) {
@@ -146,7 +127,9 @@ mod tests {
     use firmware::Settings;
 
     use super::*;
-    use crate::record::recording::{Recording, RecordingError, RunMode};
+    use crate::record::error::RecordingError;
+    use crate::record::recording::Recording;
+    use crate::runtime::mode::RunMode;
 
     fn header() -> Header {
         let settings = Settings::new(1_000_000, 20_000_000, 0);
@@ -158,13 +141,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("stream.rec");
         let mut recorder = StreamRecorder::create(&path, &header()).unwrap();
-        let exchange =
-            |tick| Exchange { inputs: firmware::Inputs { tick, ..Default::default() }, ..Default::default() };
-        (0..500).for_each(|tick| recorder.record(&exchange(tick)));
-        let account = recorder.finish();
+        let at =
+            |tick| ControllerTick { inputs: firmware::Inputs { tick, ..Default::default() }, ..Default::default() };
+        (0..500).for_each(|tick| recorder.record(&at(tick)));
+        let account = Box::new(recorder).finish();
         assert_eq!((account.offered, account.written, account.unaccounted()), (500, 500, 0));
         let bytes = std::fs::read(&path).unwrap();
-        let records = (0..500).map(|tick| Record { exchange: exchange(tick), truth: None }).collect();
+        let records = (0..500).map(|tick| Record { tick: at(tick), truth: None }).collect();
         assert_eq!(bytes, Recording { header: header(), records }.encode(), "the same bytes as written at once");
         let cut = &bytes[..bytes.len() - 1000];
         assert!(matches!(Recording::decode(cut), Err(RecordingError::Unfinished { .. })));
@@ -175,8 +158,8 @@ mod tests {
     #[test]
     fn a_full_disk_is_counted_and_nothing_else() {
         let mut recorder = StreamRecorder::create(Path::new("/dev/full"), &header()).unwrap();
-        (0..500).for_each(|_| recorder.record(&Exchange::default()));
-        let account = recorder.finish();
+        (0..500).for_each(|_| recorder.record(&ControllerTick::default()));
+        let account = Box::new(recorder).finish();
         assert_eq!((account.written, account.lost_on_disk + account.lost_in_ring), (0, 500));
         assert!(account.error.is_some() && account.unaccounted() == 0);
     }

@@ -1,12 +1,12 @@
-use firmware::Settings;
-use firmware::contract::{NeedleSample, TargetSample};
+use firmware::contract::{NeedleSample, PaddleCommand, TargetSample};
+use firmware::{Inputs, Settings};
 
 use super::*;
 
 fn recording(ticks: u64) -> Recording {
     let records = (0..ticks)
         .map(|tick| Record {
-            exchange: Exchange {
+            tick: ControllerTick {
                 inputs: Inputs {
                     tick,
                     time_ns: tick * 1_000_000,

@@ -1,6 +1,6 @@
-//! A controller at work: ticks, watchdog, accounts.
+//! The controller's side of the loop: ticks, watchdog, accounts.
 
-pub mod child;
+pub mod process;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
@@ -11,19 +11,26 @@ use firmware::schedule::Schedule;
 use firmware::{Faults, Inputs, Mode};
 use iceoryx2::service::Service;
 
-use crate::bench::result::{LoopTiming, TickResult};
-use crate::commands::controller::mode_name;
-use crate::error::SimError;
+use super::accounts::{ControllerAccounts, RecordAccount, SequenceSpan};
+use super::clock::{now_ns, release_real_time, request_real_time, sleep_until};
+use super::durations::{LoopDurations, LoopTiming};
+use super::error::{Role, RuntimeError};
+use super::executor::StepExecutor;
+use super::ledger::TickResult;
+use super::peer::{Patience, Peer};
+use super::signals;
+use super::tick::ControllerTick;
 use crate::exchange::{ClockKind, ControllerPorts, LinkError};
-use crate::record::recording::Exchange;
-use crate::record::recording::stream::StreamRecorder;
-use crate::runtime::accounts::{Handover, SequenceSpan};
-use crate::runtime::clock::{now_ns, release_real_time, request_real_time, sleep_until};
-use crate::runtime::durations::LoopDurations;
-use crate::runtime::executor::Core;
-use crate::runtime::peer::{Patience, Peer};
-use crate::runtime::signals;
-use crate::world::loop_settings::LoopArgs;
+use crate::world::loop_settings::LoopSettings;
+
+/// Keeps every tick while it happens.
+pub trait TickRecorder {
+    /// Takes a tick; neither waits nor allocates.
+    fn record(&mut self, tick: &ControllerTick);
+
+    /// Writes what waits, and says what became of everything.
+    fn finish(self: Box<Self>) -> RecordAccount;
+}
 
 /// Ticks in free-run between two looks at the peer and at signals.
 const TICKS_PER_LOOK: u64 = 16;
@@ -31,10 +38,10 @@ const TICKS_PER_LOOK: u64 = 16;
 const TICKS_IN_SAFE: u64 = 20;
 
 /// A controller at work.
-pub struct Session<'c> {
-    core: Box<dyn Core + 'c>,
-    exchanges: Vec<Exchange>,
-    exchanges_lost: u64,
+pub struct ControlLoop<'c> {
+    executor: Box<dyn StepExecutor + 'c>,
+    kept: Vec<ControllerTick>,
+    not_kept: u64,
     faults: Faults,
     spans: [SequenceSpan; 3],
     /// In free-run the schedule knows better than the ticks that happened.
@@ -46,24 +53,24 @@ pub struct Session<'c> {
     last: PaddleCommand,
     tripped: bool,
     /// Where every tick is recorded while it happens.
-    pub(crate) recorder: Option<StreamRecorder>,
+    recorder: Option<Box<dyn TickRecorder>>,
     /// Tick with a panic on purpose.
-    pub(crate) panic_at: Option<u64>,
+    panic_at: Option<u64>,
 }
 
-impl std::fmt::Debug for Session<'_> {
+impl std::fmt::Debug for ControlLoop<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Session").field("exchanges", &self.exchanges.len()).finish_non_exhaustive()
+        f.debug_struct("ControlLoop").field("kept", &self.kept.len()).finish_non_exhaustive()
     }
 }
 
-impl<'c> Session<'c> {
+impl<'c> ControlLoop<'c> {
     /// A controller before its first tick, with room for the record of `capacity` ticks.
-    pub fn new(core: Box<dyn Core + 'c>, capacity: usize) -> Self {
+    pub fn new(executor: Box<dyn StepExecutor + 'c>, capacity: usize) -> Self {
         Self {
-            core,
-            exchanges: Vec::with_capacity(capacity),
-            exchanges_lost: 0,
+            executor,
+            kept: Vec::with_capacity(capacity),
+            not_kept: 0,
             faults: Faults::NONE,
             spans: [SequenceSpan::default(); 3],
             scheduled: None,
@@ -76,16 +83,30 @@ impl<'c> Session<'c> {
         }
     }
 
+    /// Has every tick recorded while it happens.
+    #[must_use]
+    pub fn recorded_by(mut self, recorder: Box<dyn TickRecorder>) -> Self {
+        self.recorder = Some(recorder);
+        self
+    }
+
+    /// Panics on purpose in this tick, to see the watchdog.
+    #[must_use]
+    pub fn with_panic_at(mut self, tick: u64) -> Self {
+        self.panic_at = Some(tick);
+        self
+    }
+
     /// Answers every step of the plant until it says stop.
     ///
     /// # Errors
-    /// [`SimError`].
+    /// [`RuntimeError`].
     pub fn lockstep<S: Service>(
         &mut self,
         ports: &mut ControllerPorts<S>,
         peer: &mut Peer,
         timeout: Duration,
-    ) -> Result<(), SimError> {
+    ) -> Result<(), RuntimeError> {
         let mut patience = Patience::new(timeout);
         loop {
             let Some(frame) = ports.clock.oldest()? else {
@@ -98,8 +119,8 @@ impl<'c> Session<'c> {
                 Some(ClockKind::Step) => self.tick(ports, frame.tick, frame.time_ns)?,
                 Some(ClockKind::Stop) => return Ok(()),
                 Some(ClockKind::Start) | None => {
-                    return Err(SimError::Protocol {
-                        peer: "plant",
+                    return Err(RuntimeError::Protocol {
+                        peer: Role::Plant,
                         what: format!("clock frame of kind {} in lockstep", frame.kind),
                     });
                 }
@@ -110,28 +131,28 @@ impl<'c> Session<'c> {
     /// Runs on the machine's clock, half a period after the plant, until it says stop.
     ///
     /// # Errors
-    /// [`SimError`].
+    /// [`RuntimeError`].
     pub fn free_run<S: Service>(
         &mut self,
         ports: &mut ControllerPorts<S>,
         peer: &mut Peer,
         timeout: Duration,
-        loop_args: &LoopArgs,
-    ) -> Result<(), SimError> {
+        loop_settings: &LoopSettings,
+    ) -> Result<(), RuntimeError> {
         let mut patience = Patience::new(timeout);
         let start = loop {
             match ports.clock.oldest()? {
                 Some(frame) if frame.kind() == Some(ClockKind::Start) => break frame.time_ns,
                 Some(frame) => {
-                    return Err(SimError::Protocol {
-                        peer: "plant",
+                    return Err(RuntimeError::Protocol {
+                        peer: Role::Plant,
                         what: format!("clock frame of kind {} instead of a start", frame.kind),
                     });
                 }
                 None => patience.wait::<S>(peer)?,
             }
         };
-        let period_ns = loop_args.period_ns();
+        let period_ns = loop_settings.period_ns();
         let first_release_ns = start + period_ns / 2;
         let mut schedule = Schedule::new(first_release_ns, period_ns);
         let mut durations = LoopDurations::default();
@@ -140,7 +161,7 @@ impl<'c> Session<'c> {
         release_real_time();
         let due = (schedule.next_release_ns() - first_release_ns) / period_ns;
         self.scheduled = Some((due, schedule.skipped()));
-        self.timing = Some(durations.timing(loop_args.rate, &schedule, &scheduling));
+        self.timing = Some(durations.timing(loop_settings.rate, &schedule, &scheduling));
         outcome
     }
 
@@ -150,8 +171,8 @@ impl<'c> Session<'c> {
         peer: &mut Peer,
         schedule: &mut Schedule,
         durations: &mut LoopDurations,
-    ) -> Result<(), SimError> {
-        let mut orphaned: Option<(SimError, u64)> = None;
+    ) -> Result<(), RuntimeError> {
+        let mut orphaned: Option<(RuntimeError, u64)> = None;
         loop {
             sleep_until(schedule.next_release_ns());
             if let Some(frame) = ports.clock.oldest()?
@@ -171,8 +192,10 @@ impl<'c> Session<'c> {
                     // In RUN the samples are fresh: the plant lives.
                     if self.last.state != Mode::Run as u32 {
                         let alive = peer.check::<S>().and_then(|()| {
-                            let left =
-                                SimError::PeerDied { peer: "plant", how: "it has left without a word".to_owned() };
+                            let left = RuntimeError::PeerDied {
+                                peer: Role::Plant,
+                                how: "it has left without a word".to_owned(),
+                            };
                             if ports.has_peer() { Ok(()) } else { Err(left) }
                         });
                         orphaned = alive.err().map(|error| (error, release.tick));
@@ -191,7 +214,12 @@ impl<'c> Session<'c> {
         }
     }
 
-    fn tick<S: Service>(&mut self, ports: &mut ControllerPorts<S>, tick: u64, time_ns: u64) -> Result<(), SimError> {
+    fn tick<S: Service>(
+        &mut self,
+        ports: &mut ControllerPorts<S>,
+        tick: u64,
+        time_ns: u64,
+    ) -> Result<(), RuntimeError> {
         let stepped = if self.tripped {
             None
         } else {
@@ -200,7 +228,7 @@ impl<'c> Session<'c> {
                 assert!(self.panic_at.is_none_or(|at| tick < at), "panic on purpose in tick {tick}");
                 let inputs =
                     Inputs { tick, time_ns, needle: ports.needle(), target: ports.target(), paddle: ports.paddle() };
-                self.core.step(&inputs).map(|command| (inputs, command))
+                self.executor.step(&inputs).map(|command| (inputs, command))
             };
             catch_unwind(AssertUnwindSafe(step)).ok()
         };
@@ -227,17 +255,20 @@ impl<'c> Session<'c> {
             }
         }
         self.faults |= Faults::from_bits(command.faults);
-        let exchange = Exchange { inputs, command };
+        self.keep(&ControllerTick { inputs, command });
+        Ok(())
+    }
+
+    fn keep(&mut self, tick: &ControllerTick) {
         if let Some(recorder) = &mut self.recorder {
-            recorder.record(&exchange);
+            recorder.record(tick);
         }
         // Growing would allocate in the loop.
-        if self.exchanges.len() < self.exchanges.capacity() {
-            self.exchanges.push(exchange);
+        if self.kept.len() < self.kept.capacity() {
+            self.kept.push(*tick);
         } else {
-            self.exchanges_lost += 1;
+            self.not_kept += 1;
         }
-        Ok(())
     }
 
     /// The watchdog's command: SAFE, where the paddle was told to be last. Samples are not read any more.
@@ -263,9 +294,12 @@ impl<'c> Session<'c> {
     /// Closes the accounts, with what still waits in the buffers.
     ///
     /// # Errors
-    /// [`SimError::Board`] if a board does not tell its own.
-    pub fn end<S: Service>(mut self, ports: &mut ControllerPorts<S>) -> Result<(Handover, Vec<Exchange>), SimError> {
-        let ledger = self.core.ledger()?;
+    /// [`RuntimeError::Board`] if a board does not tell its own.
+    pub fn end<S: Service>(
+        mut self,
+        ports: &mut ControllerPorts<S>,
+    ) -> Result<(ControllerAccounts, Vec<ControllerTick>), RuntimeError> {
+        let ledger = self.executor.ledger()?;
         let [needle, target, paddle] = self.spans;
         let waiting = (ports.needle(), ports.target(), ports.paddle());
         let ticks = &ledger.ticks;
@@ -278,19 +312,19 @@ impl<'c> Session<'c> {
         } else {
             ticks.unaccounted() + ticks.run.abs_diff(run) + ticks.hold.abs_diff(hold) + ticks.safe.abs_diff(safe)
         };
-        let handover = Handover {
+        let accounts = ControllerAccounts {
             needle: needle.account(&ledger.needle, waiting.0.map(|sample| sample.sequence)),
             target: target.account(&ledger.target, waiting.1.map(|sample| sample.sequence)),
             paddle: paddle.account(&ledger.paddle, waiting.2.map(|sample| sample.sequence)),
             ticks: TickResult { due, run, hold, safe, skipped, unaccounted: due.abs_diff(entries) + own },
             commands: ports.command.published(),
-            final_state: Mode::from_wire(self.last.state).map_or("HOLD", mode_name).to_owned(),
-            faults: self.faults.to_string(),
+            final_state: Some(Mode::from_wire(self.last.state).unwrap_or_default()),
+            faults: self.faults,
             timing: self.timing,
-            exchanges: self.exchanges.len() as u64,
-            exchanges_lost: self.exchanges_lost,
-            record: self.recorder.map(StreamRecorder::finish),
+            kept: self.kept.len() as u64,
+            not_kept: self.not_kept,
+            record: self.recorder.map(TickRecorder::finish),
         };
-        Ok((handover, self.exchanges))
+        Ok((accounts, self.kept))
     }
 }

@@ -1,4 +1,135 @@
-//! The plant's side of the loop.
+//! The plant's side of the loop: publishes what the world's sensors see, and passes commands on to it.
 
 pub mod free_run;
 pub mod lockstep;
+pub mod observer;
+pub mod process;
+
+use std::time::{Duration, Instant};
+
+use firmware::Faults;
+use firmware::contract::PaddleCommand;
+use iceoryx2::service::Service;
+
+use self::observer::{Moment, Observer};
+use super::clock::now_ns;
+use super::error::RuntimeError;
+use crate::exchange::{LinkError, PlantPorts};
+use crate::world::World;
+use crate::world::error::WorldError;
+use crate::world::simulation::{LONGEST_WAIT_FOR_RUN_NS, Simulation};
+use crate::world::truth::Truth;
+
+/// A world in a loop, with everything that is kept of it.
+#[derive(Debug)]
+pub struct PlantLoop<'m> {
+    world: World<'m>,
+    truths: Vec<Truth>,
+    first_ns: Option<u64>,
+    solving: Duration,
+    observer: Option<Box<dyn Observer>>,
+}
+
+impl<'m> PlantLoop<'m> {
+    /// A world before its first tick.
+    pub fn new(world: World<'m>, simulation: &Simulation) -> Self {
+        let truths = Vec::with_capacity(simulation.ticks() as usize);
+        Self { world, truths, first_ns: None, solving: Duration::ZERO, observer: None }
+    }
+
+    /// Somebody looks on from now.
+    pub fn observed_by(&mut self, observer: Box<dyn Observer>) {
+        self.observer = Some(observer);
+    }
+
+    /// The world.
+    pub fn world(&mut self) -> &mut World<'m> {
+        &mut self.world
+    }
+
+    /// Solves for this moment and notes what really happened.
+    ///
+    /// # Errors
+    /// [`WorldError::Tissue`].
+    pub fn solve(&mut self, tick: u64, time_ns: u64) -> Result<Truth, WorldError> {
+        self.first_ns.get_or_insert(time_ns);
+        let before = Instant::now();
+        let began_ns = if self.observer.is_some() { now_ns() } else { 0 };
+        let truth = self.world.advance(tick, time_ns)?;
+        self.solving += before.elapsed();
+        if let Some(observer) = &mut self.observer {
+            let moment = Moment { truth, time_s: self.world.since_start_s(time_ns), began_ns };
+            observer.offer(self.world.tissue(), &moment);
+        }
+        self.truths.push(truth);
+        Ok(truth)
+    }
+
+    /// Solves for this moment, measures, and publishes what arrives.
+    ///
+    /// # Errors
+    /// [`RuntimeError::World`], [`RuntimeError::Link`].
+    fn publish<S: Service>(&mut self, tick: u64, time_ns: u64, ports: &mut PlantPorts<S>) -> Result<(), RuntimeError> {
+        let truth = self.solve(tick, time_ns)?;
+        let (needle, paddle) = self.world.encoders(time_ns);
+        ports.needle.send(needle)?;
+        ports.paddle.send(paddle)?;
+        for sample in self.world.target_samples(&truth) {
+            ports.target.send(sample)?;
+        }
+        Ok(())
+    }
+
+    /// Time goes on under `command`, if there is one.
+    ///
+    /// # Errors
+    /// [`RuntimeError::NeverArmed`] when RUN does not come.
+    fn act(&mut self, command: Option<&PaddleCommand>, time_ns: u64, elapsed_ns: u64) -> Result<(), RuntimeError> {
+        self.world.act(command, time_ns, elapsed_ns);
+        let waited_ns = time_ns - self.first_ns.unwrap_or(time_ns);
+        match command {
+            Some(command) if self.world.needle_started_ns().is_none() && waited_ns > LONGEST_WAIT_FOR_RUN_NS => {
+                Err(RuntimeError::NeverArmed {
+                    waited_s: waited_ns as f64 * 1e-9,
+                    faults: Faults::from_bits(command.faults),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether everything has been simulated, or whoever looks on has seen enough.
+    pub fn is_over(&self, time_ns: u64) -> bool {
+        self.world.is_over(time_ns) || self.observer.as_ref().is_some_and(|observer| observer.ends_early())
+    }
+
+    /// Between two ticks of lockstep: whoever looks on may hold time.
+    fn between_ticks(&mut self) {
+        if let Some(observer) = &mut self.observer {
+            observer.hold();
+        }
+    }
+
+    /// What really happened.
+    pub fn truths(&self) -> &[Truth] {
+        &self.truths
+    }
+
+    /// Mean duration of a solve, µs.
+    pub fn mean_step_us(&self) -> f64 {
+        self.solving.as_secs_f64() * 1e6 / self.truths.len().max(1) as f64
+    }
+}
+
+/// Samples that the plant has published: needle, target, paddle.
+pub fn published<S: Service>(ports: &PlantPorts<S>) -> [u64; 3] {
+    [ports.needle.published(), ports.target.published(), ports.paddle.published()]
+}
+
+/// The newest command that waits, for closing the accounts.
+///
+/// # Errors
+/// [`LinkError::Receive`].
+pub fn waiting_command<S: Service>(ports: &mut PlantPorts<S>) -> Result<Option<u32>, LinkError> {
+    Ok(ports.command.newest()?.map(|command| command.sequence))
+}

@@ -4,18 +4,17 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use firmware::Mode;
+use firmware::{Faults, Mode};
 use rand_pcg::Pcg64;
 
 use super::stage::{Process, Stage, children, descriptors, left_behind, ms, read_json, unaccounted, wait_until};
+use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
 use crate::bench::faults::fault::below;
-use crate::bench::faults::rows::Outcome;
-use crate::commands::controller::ControllerResult;
-use crate::commands::plant::PlantResult;
-use crate::error::SimError;
 use crate::record::recording::{Record, Recording};
 use crate::record::replay::replay;
+use crate::runtime::controller::process::ControllerResult;
+use crate::runtime::plant::process::PlantResult;
 
 /// Pairs of processes at work at once.
 const WORKERS: u64 = 4;
@@ -32,14 +31,14 @@ fn whole_and_replayed(path: &Path, finished: bool) -> Result<Vec<Record>, String
 }
 
 /// Row 33: the simulator is killed at 200 seeded phases, from its first millisecond on.
-pub(crate) fn plant_killed(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn plant_killed(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let repetitions = stage.repetitions(200);
     let shared = Mutex::new(evidence);
     let next = AtomicU64::new(0);
     std::thread::scope(|scope| {
         let workers: Vec<_> = (0..WORKERS)
             .map(|_| {
-                scope.spawn(|| -> Outcome {
+                scope.spawn(|| -> Result<(), SimError> {
                     loop {
                         let trial = next.fetch_add(1, Ordering::Relaxed);
                         if trial >= repetitions {
@@ -63,7 +62,7 @@ pub(crate) fn plant_killed(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcom
     })
 }
 
-fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Outcome {
+fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Result<(), SimError> {
     let what = || format!("killed after {phase} ms");
     let link = stage.link();
     let (mut controller, record, json) = stage.controller(&link, &[])?;
@@ -78,16 +77,16 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Outcome
         let unaccounted = unaccounted(&result, None);
         evidence.unaccounted += unaccounted;
         evidence.require(unaccounted == 0, || format!("{}: {unaccounted} unaccounted", what()));
-        let was_run = result.handover.ticks.run > 0;
-        let expected = if was_run { "SAFE" } else { "HOLD" };
-        let state = &result.handover.final_state;
-        evidence.require(state == expected, || format!("{}: ended in {state} instead of {expected}", what()));
+        let was_run = result.accounts.ticks.run > 0;
+        let expected = if was_run { Mode::Safe } else { Mode::Hold };
+        let state = result.accounts.final_state;
+        evidence.require(state == Some(expected), || format!("{}: ended in {state:?} instead of {expected:?}", what()));
         match whole_and_replayed(&record, true) {
             Ok(records) => {
-                let fresh = records.iter().rposition(|record| record.exchange.inputs.needle.is_some());
-                let safe = records.iter().position(|record| record.exchange.command.state == Mode::Safe as u32);
+                let fresh = records.iter().rposition(|record| record.tick.inputs.needle.is_some());
+                let safe = records.iter().position(|record| record.tick.command.state == Mode::Safe as u32);
                 if let (true, Some(fresh), Some(safe)) = (was_run, fresh, safe) {
-                    let ticks = records[safe].exchange.inputs.tick.saturating_sub(records[fresh].exchange.inputs.tick);
+                    let ticks = records[safe].tick.inputs.tick.saturating_sub(records[fresh].tick.inputs.tick);
                     evidence.ticks_to_detect = evidence.ticks_to_detect.max(Some(ticks));
                     evidence.final_state = Some(Mode::Safe);
                 }
@@ -108,7 +107,7 @@ pub(super) fn reaches(record: &Path, mode: Mode, process: &mut Process) -> bool 
     wait_until(ms(5000), || {
         let bytes = std::fs::read(record).unwrap_or_default();
         let found = Recording::whole_records(&bytes)
-            .is_ok_and(|(recording, _)| recording.records.iter().any(|r| r.exchange.command.state == mode as u32));
+            .is_ok_and(|(recording, _)| recording.records.iter().any(|r| r.tick.command.state == mode as u32));
         found || process.wait(ms(0)).is_some()
     })
 }
@@ -119,21 +118,20 @@ fn takes_over_gently(records: &[Record], evidence: &mut Evidence, what: &dyn Fn(
         evidence.require(false, || format!("{}: no record", what()));
         return;
     };
-    evidence
-        .require(first.exchange.command.state == Mode::Hold as u32, || format!("{}: does not start in HOLD", what()));
-    let adopted = records.iter().find(|record| record.exchange.command.is_valid());
-    let Some(Record { exchange, .. }) = adopted else {
+    evidence.require(first.tick.command.state == Mode::Hold as u32, || format!("{}: does not start in HOLD", what()));
+    let adopted = records.iter().find(|record| record.tick.command.is_valid());
+    let Some(Record { tick, .. }) = adopted else {
         evidence.require(false, || format!("{}: never heard where the paddle is", what()));
         return;
     };
-    let measured = exchange.inputs.paddle.map(|sample| sample.displacement.map(f64::to_bits));
-    let commanded = Some(exchange.command.displacement.map(f64::to_bits));
+    let measured = tick.inputs.paddle.map(|sample| sample.displacement.map(f64::to_bits));
+    let commanded = Some(tick.command.displacement.map(f64::to_bits));
     evidence.require(measured == commanded, || format!("{}: its first command is a motion", what()));
     evidence.detected += u64::from(measured == commanded);
 }
 
 /// Row 34: the controller is killed and restarted while the plant goes on.
-pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = Pcg64::new(u128::from(stage.seed), 34);
     let link = stage.link();
     let (mut plant, json) = stage.plant(&link, &["--keep", "--insertion-time", "6", "--duration", "16"])?;
@@ -173,11 +171,11 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
     evidence.injected += 1;
     if let Some(result) = read_json::<ControllerResult>(&accounts) {
         evidence.unaccounted += unaccounted(&result, None);
-        evidence.final_state = (result.handover.final_state == "RUN").then_some(Mode::Run);
+        evidence.final_state = (result.accounts.final_state == Some(Mode::Run)).then_some(Mode::Run);
         // Without a real-time policy a busy machine may have overrun it.
-        let (state, faults) = (&result.handover.final_state, &result.handover.faults);
-        let explained = state != "SAFE" || faults.contains("OVERRUN");
-        evidence.require(explained, || format!("ended in {state}: {faults}"));
+        let (state, faults) = (result.accounts.final_state, result.accounts.faults);
+        let explained = state != Some(Mode::Safe) || faults.contains(Faults::OVERRUN);
+        evidence.require(explained, || format!("ended in {state:?}: {faults}"));
     }
     let limit = stage.table.paddle.max_rate * 1e-3 * (1.0 + 1e-6);
     match read_json::<PlantResult>(&json) {
@@ -198,7 +196,7 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
 }
 
 /// Row 35: killed in the middle of creating services; the next ones get through in bounded time.
-pub(crate) fn killed_at_start(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn killed_at_start(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = Pcg64::new(u128::from(stage.seed), 35);
     let link = stage.link();
     for trial in 0..stage.repetitions(100) {
@@ -231,13 +229,13 @@ fn pair_works(stage: &Stage<'_>, link: &str, evidence: &mut Evidence) -> Result<
     if let Some(result) = read_json::<ControllerResult>(&json) {
         let published = read_json::<PlantResult>(&plant_json).map(|plant| plant.published);
         evidence.unaccounted += unaccounted(&result, published);
-        evidence.final_state = (result.handover.final_state == "RUN").then_some(Mode::Run);
+        evidence.final_state = (result.accounts.final_state == Some(Mode::Run)).then_some(Mode::Run);
     }
     Ok(())
 }
 
 /// Row 36: 100 controllers come and are killed; nothing grows.
-pub(crate) fn cycles(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn cycles(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     /// Cycles after which everything has been used once.
     const SETTLED: u64 = 5;
     let repetitions = stage.repetitions(100).max(SETTLED + 5);

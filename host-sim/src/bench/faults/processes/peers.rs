@@ -15,16 +15,16 @@ use rand_pcg::Pcg64;
 use rustix::process::Signal;
 
 use super::stage::{Stage, TIMEOUT, left_behind, ms, read_json, unaccounted, wait_until};
+use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
 use crate::bench::faults::fault::{below, between};
-use crate::bench::faults::rows::Outcome;
-use crate::commands::controller::ControllerResult;
-use crate::commands::plant::PlantResult;
-use crate::error::SimError;
 use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 use crate::record::recording::Recording;
+use crate::runtime::controller::process::ControllerResult;
+use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::plant::process::PlantResult;
 
-fn nothing_left(link: &str, evidence: &mut Evidence) -> Outcome {
+fn nothing_left(link: &str, evidence: &mut Evidence) -> Result<(), SimError> {
     let left = left_behind(link)?;
     evidence.require(left.is_empty(), || format!("left behind {left:?}"));
     Ok(())
@@ -40,14 +40,12 @@ fn close(evidence: &mut Evidence, controller: &std::path::Path, plant: &std::pat
     evidence.unaccounted += unaccounted;
     evidence.require(unaccounted == 0, || format!("{unaccounted} unaccounted"));
     evidence.max_error = Some(evidence.max_error.unwrap_or(0.0).max(plant.largest_error));
-    evidence.final_state = [Mode::Run, Mode::Hold, Mode::Safe]
-        .into_iter()
-        .find(|mode| crate::commands::controller::mode_name(*mode) == result.handover.final_state);
+    evidence.final_state = result.accounts.final_state;
     Some(result)
 }
 
 /// Row 37: a second controller on the same link is refused, and the first does not notice.
-pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let link = stage.link();
     let (mut first, _, json) = stage.controller(&link, &[])?;
     let (mut plant, plant_json) = stage.plant(&link, &["--insertion-time", "2", "--duration", "2.5"])?;
@@ -65,8 +63,8 @@ pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Out
     evidence.require(codes == [Some(0); 2], || format!("plant and first controller ended with {codes:?}"));
     if let Some(result) = close(evidence, &json, &plant_json) {
         // Without a real-time policy a busy machine may have overrun it, which is no effect of the second one.
-        let (state, faults) = (evidence.final_state, &result.handover.faults);
-        let explained = state != Some(Mode::Safe) || faults.contains("OVERRUN");
+        let (state, faults) = (evidence.final_state, result.accounts.faults);
+        let explained = state != Some(Mode::Safe) || faults.contains(Faults::OVERRUN);
         evidence.require(explained, || format!("the first ended in {state:?}: {faults}"));
         if state != Some(Mode::Run) {
             evidence.notes.push(format!("ended while it waited for samples, or too busy: {faults}"));
@@ -77,7 +75,7 @@ pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Out
 
 /// Row 38: a reader that is stopped: the plant's loop goes on, what is overwritten is counted, and the reader goes on
 /// with the newest sample.
-pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let link = stage.link();
     let (mut controller, _, json) = stage.controller(&link, &[])?;
     let (mut plant, plant_json) = stage.plant(&link, &["--insertion-time", "2.5", "--duration", "3"])?;
@@ -90,7 +88,7 @@ pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome
     evidence
         .require(codes == [Some(0); 2], || format!("plant and controller ended with {codes:?}: {}", plant.message()));
     if let Some(result) = close(evidence, &json, &plant_json) {
-        let overwritten = result.handover.needle.overwritten;
+        let overwritten = result.accounts.needle.overwritten;
         evidence.detected += u64::from(overwritten > 500);
         evidence.require(overwritten > 500, || format!("only {overwritten} of 1000 samples overwritten"));
         if let Some(plant) = read_json::<PlantResult>(&plant_json) {
@@ -103,7 +101,7 @@ pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome
 }
 
 /// Row 41: another user can neither read, nor join, nor prepare the place.
-pub(crate) fn other_user(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn other_user(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     const NOBODY: [&str; 3] = ["--reuid=65534", "--regid=65534", "--clear-groups"];
     let link = stage.link();
     let (mut controller, ..) = stage.controller(&link, &[])?;
@@ -174,7 +172,7 @@ fn any_u32(random: &mut Pcg64) -> u32 {
 }
 
 /// Row 42: a plant that writes garbage into shared memory: every command keeps the limits, nothing panics.
-pub(crate) fn garbage(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn garbage(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = Pcg64::new(u128::from(stage.seed), 42);
     for kind_at_end in [ClockKind::Stop as u32, 77] {
         let link = stage.link();
@@ -193,7 +191,7 @@ fn garbage_on(
     random: &mut Pcg64,
     kind_at_end: u32,
     evidence: &mut Evidence,
-) -> Outcome {
+) -> Result<(), SimError> {
     const TICKS: u64 = 5000;
     let mut ports = PlantPorts::<ipc::Service>::open(space)?;
     let (mut controller, _, json) = stage.controller(space.name(), &["--mode", "lockstep"])?;
@@ -252,10 +250,12 @@ fn garbage_on(
     if let Some(result) = read_json::<ControllerResult>(&json) {
         // Published cannot be known from sequence numbers that are garbage: the ledger must agree with itself.
         evidence.unaccounted += unaccounted(&result, None);
-        let refused = [&result.handover.needle, &result.handover.target, &result.handover.paddle];
+        let refused = [&result.accounts.needle, &result.accounts.target, &result.accounts.paddle];
         evidence.detected += refused.iter().map(|stream| stream.discarded.iter().sum::<u64>()).sum::<u64>();
         evidence.final_state = Some(Mode::Safe);
-        evidence.require(result.handover.final_state == "SAFE", || format!("ended in {}", result.handover.final_state));
+        evidence.require(result.accounts.final_state == Some(Mode::Safe), || {
+            format!("ended in {:?}", result.accounts.final_state)
+        });
     }
     evidence.notes = vec!["what is not refused is a sequence number of the past, or plausible by chance".to_owned()];
     Ok(())
@@ -269,10 +269,10 @@ fn wait_until_spinning(mut condition: impl FnMut() -> bool) {
 }
 
 /// Row 43: a service of the same name and size with another type is refused.
-pub(crate) fn other_layout(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn other_layout(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let link = stage.link();
     let space = Space::new(&link)?;
-    let setup = |what: String| SimError::Protocol { peer: "test", what };
+    let setup = |what: String| RuntimeError::Protocol { peer: Role::Controller, what };
     {
         let node = NodeBuilder::new()
             .config(space.config())
@@ -308,7 +308,7 @@ pub(crate) fn other_layout(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcom
 }
 
 /// Row 45: a panic in the step: from that tick on the watchdog answers SAFE where the paddle was.
-pub(crate) fn panic_in_step(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn panic_in_step(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     for tick in [0, 700u64] {
         let link = stage.link();
         let panic_at = tick.to_string();
@@ -325,11 +325,11 @@ pub(crate) fn panic_in_step(stage: &Stage<'_>, evidence: &mut Evidence) -> Outco
         }
         let bytes = std::fs::read(&record).unwrap_or_default();
         let records = Recording::whole_records(&bytes).map(|(recording, _)| recording.records).unwrap_or_default();
-        let place = records.iter().position(|record| record.exchange.inputs.tick >= tick);
+        let place = records.iter().position(|record| record.tick.inputs.tick >= tick);
         let after = place.map_or(&[] as &[_], |place| &records[place..]);
-        let before = place.and_then(|place| place.checked_sub(1)).map(|place| records[place].exchange.command);
+        let before = place.and_then(|place| place.checked_sub(1)).map(|place| records[place].tick.command);
         let watchdog = after.iter().all(|record| {
-            let command = &record.exchange.command;
+            let command = &record.tick.command;
             let kept = before.is_none_or(|before| before.displacement == command.displacement);
             command.state == Mode::Safe as u32 && Faults::from_bits(command.faults).contains(Faults::WATCHDOG) && kept
         });

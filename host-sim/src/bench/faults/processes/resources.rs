@@ -7,12 +7,12 @@ use rustix::process::Signal;
 
 use super::deaths::reaches;
 use super::stage::{Process, Stage, left_behind, ms, read_json, unaccounted};
+use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
-use crate::bench::faults::rows::Outcome;
-use crate::commands::controller::ControllerResult;
-use crate::commands::plant::PlantResult;
-use crate::error::SimError;
 use crate::exchange::Space;
+use crate::record::error::FileError;
+use crate::runtime::controller::process::ControllerResult;
+use crate::runtime::plant::process::PlantResult;
 
 /// Runs a script in a mount namespace of its own: as root, or where ordinary users may make one.
 fn in_own_namespace(stage: &Stage<'_>, script: &str) -> Result<Process, SimError> {
@@ -33,7 +33,7 @@ fn can_mount(stage: &Stage<'_>) -> Result<bool, SimError> {
 }
 
 /// Row 39: shared memory that is full is an error at the start; memory that fills up later does not reach the loop.
-pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     if !can_mount(stage)? {
         evidence.not_run = Some("needs root, or a user namespace, to mount a small tmpfs".to_owned());
         return Ok(());
@@ -72,7 +72,7 @@ pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome
 }
 
 /// Row 40: the files are deleted under it: the loop goes on, and without a plant it is SAFE.
-pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let link = stage.link();
     let (mut controller, record, json) = stage.controller(&link, &[])?;
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
@@ -92,7 +92,7 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcom
     let before = records().len();
     std::thread::sleep(ms(500));
     let now = records();
-    let running = now.last().is_some_and(|record| record.exchange.command.state == Mode::Run as u32);
+    let running = now.last().is_some_and(|record| record.tick.command.state == Mode::Run as u32);
     evidence.require(now.len() > before + 200 && running, || {
         format!("{} ticks in 500 ms after the deletion, in RUN: {running}", now.len() - before)
     });
@@ -105,8 +105,8 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcom
     let result = read_json::<ControllerResult>(&json);
     evidence.require(result.is_some(), || "no accounts were left".to_owned());
     if let Some(result) = result {
-        let safe = result.handover.final_state == "SAFE";
-        evidence.require(safe, || format!("ended in {}", result.handover.final_state));
+        let safe = result.accounts.final_state == Some(Mode::Safe);
+        evidence.require(safe, || format!("ended in {:?}", result.accounts.final_state));
         evidence.unaccounted += unaccounted(&result, None);
         evidence.final_state = safe.then_some(Mode::Safe);
         evidence.detected += evidence.injected;
@@ -117,9 +117,9 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcom
 }
 
 /// Row 44: the disk of the log is full: the loop does not notice, what is lost is counted.
-pub(crate) fn disk_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn disk_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let small = stage.path("small");
-    std::fs::create_dir(&small).map_err(|source| SimError::Write { path: small.clone(), source })?;
+    std::fs::create_dir(&small).map_err(FileError::write(&small))?;
     let mut places = vec![("/dev/full".to_owned(), String::new())];
     if can_mount(stage)? {
         let mount = format!("mount -t tmpfs -o size=128k tmpfs {} && exec", small.display());
@@ -153,13 +153,13 @@ pub(crate) fn disk_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Outcome {
         let (Some(result), Some(plant)) = (result, plant) else { continue };
         evidence.unaccounted += unaccounted(&result, Some(plant.published));
         evidence.max_error = Some(evidence.max_error.unwrap_or(0.0).max(plant.largest_error));
-        let record = result.handover.record.clone().unwrap_or_default();
+        let record = result.accounts.record.clone().unwrap_or_default();
         let lost = record.lost_in_ring + record.lost_on_disk;
         evidence.injected += record.offered;
         evidence.detected += lost + record.written;
         evidence.require(lost > 1000 && record.error.is_some(), || format!("{}: {record:?}", what()));
         // Where it ends depends on who stops first; nearly all of the time it must have been in RUN.
-        let ticks = result.handover.ticks;
+        let ticks = result.accounts.ticks;
         evidence.require(2 * ticks.run > ticks.due, || format!("{}: {ticks:?}", what()));
         evidence.final_state = Some(Mode::Run);
         evidence.notes.push(format!("{place}: {} of {} ticks written, {lost} lost", record.written, record.offered));

@@ -13,9 +13,11 @@ use model_offline::table::to_bytes;
 use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde::de::DeserializeOwned;
 
-use crate::commands::controller::ControllerResult;
-use crate::error::SimError;
+use crate::bench::error::SimError;
 use crate::exchange::{Departure, LinkError, Space};
+use crate::record::error::FileError;
+use crate::runtime::controller::process::ControllerResult;
+use crate::runtime::error::RuntimeError;
 
 /// How long any of them may take to end.
 pub(super) const TIMEOUT: Duration = Duration::from_secs(20);
@@ -41,14 +43,12 @@ pub(crate) struct Stage<'t> {
 impl<'t> Stage<'t> {
     /// A folder with a copy of this program and the table, for other users to read.
     pub(crate) fn new(table: &'t Table<f64, 2>, seed: u64, effort: f64) -> Result<Self, SimError> {
-        let folder = tempfile::Builder::new().prefix("stillpoint-faults-").tempdir().map_err(SimError::Spawn)?;
-        let write = |path: &Path, outcome: std::io::Result<()>| {
-            outcome.map_err(|source| SimError::Write { path: path.to_owned(), source })
-        };
+        let folder = tempfile::Builder::new().prefix("stillpoint-faults-").tempdir().map_err(RuntimeError::Spawn)?;
+        let write = |path: &Path, outcome: std::io::Result<()>| outcome.map_err(FileError::write(path));
         let readable = std::fs::Permissions::from_mode(0o755);
         write(folder.path(), std::fs::set_permissions(folder.path(), readable))?;
         let program = folder.path().join("host-sim");
-        let current = std::env::current_exe().map_err(SimError::Spawn)?;
+        let current = std::env::current_exe().map_err(RuntimeError::Spawn)?;
         write(&program, std::fs::copy(current, &program).map(drop))?;
         let table_file = folder.path().join("controller.table");
         write(&table_file, std::fs::write(&table_file, to_bytes(table)?))?;
@@ -81,9 +81,9 @@ impl<'t> Stage<'t> {
     /// Starts any program.
     pub(super) fn start_command(&self, mut command: Command) -> Result<Process, SimError> {
         let said = self.path("stderr");
-        let stderr = std::fs::File::create(&said).map_err(SimError::Spawn)?;
+        let stderr = std::fs::File::create(&said).map_err(RuntimeError::Spawn)?;
         let child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(stderr).process_group(0).spawn();
-        Ok(Process { child: child.map_err(SimError::Spawn)?, said })
+        Ok(Process { child: child.map_err(RuntimeError::Spawn)?, said })
     }
 
     /// Starts a controller in free-run; returns where it records and where its accounts will be.
@@ -207,7 +207,7 @@ pub(super) fn children() -> usize {
 
 /// Samples and ticks that a controller cannot account for, given what the plant says it published, if it lived to say.
 pub(super) fn unaccounted(result: &ControllerResult, published: Option<[u64; 3]>) -> u64 {
-    let handover = &result.handover;
+    let handover = &result.accounts;
     let streams = [&handover.needle, &handover.target, &handover.paddle];
     let own: u64 = streams.iter().map(|stream| stream.unaccounted).sum();
     let lost: u64 = published.map_or(0, |published| {

@@ -5,8 +5,9 @@ use firmware::detection::{FOLLOWING_FRACTION, FOLLOWING_SAMPLES, FROZEN_TRAVEL};
 use firmware::{Faults, Mode, Settings, stability};
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
-use super::{FOR_EVER, Outcome, Trial, comes_back, stays_safe_until_rearmed};
-use crate::bench::faults::bench::{Bench, Setup};
+use super::{FOR_EVER, Trial, comes_back, stays_safe_until_rearmed};
+use crate::bench::error::SimError;
+use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
 use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::Fault;
 
@@ -22,11 +23,11 @@ fn reach(table: &Table<f64, 2>) -> f64 {
 }
 
 /// Row 19: the paddle at the end of its range: clamped, no windup, back without overshoot.
-pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let reach = reach(trial.table);
     for sign in [1.0, -1.0] {
         let what = || format!("push of {sign} × 1.5 reach");
-        let mut bench = Bench::new(trial.table, Setup { noise: 0.0, speed: 0.0, ..trial.setup() })?;
+        let mut bench = ClosedLoop::new(trial.table, Setup { noise: 0.0, speed: 0.0, ..trial.setup() })?;
         bench.run(200);
         // Out in 15 s, 5 s there, and back.
         let rate = 0.1 * reach;
@@ -56,12 +57,12 @@ pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) ->
 }
 
 /// Row 20: a paddle that is too slow for its feed-forward: limited, no windup, there without overshoot.
-pub(crate) fn rate_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn rate_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut table = trial.table.clone();
     let setup = Setup { noise: 0.0, ..trial.setup() };
     let steepest = table.knots.iter().map(|knot| knot.paddle_path_slope.norm()).fold(0.0, f64::max);
     table.paddle.max_rate = 0.5 * steepest * setup.speed;
-    let mut bench = Bench::new(
+    let mut bench = ClosedLoop::new(
         &table,
         Setup {
             actuator: crate::world::actuator::ActuatorModel { max_rate: table.paddle.max_rate, ..setup.actuator },
@@ -87,7 +88,7 @@ pub(crate) fn rate_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Out
 }
 
 /// Row 21: an actuator that is stuck or reaches half of its commands trips the following error.
-pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(21);
     for fault in [Fault::Stuck, Fault::ActuatorGain(0.5)] {
         let what = || format!("{fault:?}");
@@ -129,11 +130,11 @@ pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Out
 
 /// Row 22: lag and delay of the actuator, 0 to 10 ticks: stable right up to the theoretical limit of the gain, and at
 /// the default gain always.
-pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut table = trial.table.clone();
     table.paddle.max_rate = 1e3;
     let start = 1e-5 * table.validity.depth_end;
-    let mut growth = |delay: u32, lag_s: f64, gain: Option<f64>| -> Result<f64, crate::error::SimError> {
+    let mut growth = |delay: u32, lag_s: f64, gain: Option<f64>| -> Result<f64, crate::bench::error::SimError> {
         let mut setup = Setup { noise: 0.0, speed: 0.0, ..trial.setup() };
         // A target sample on every tick, at once: a delay of k ticks is a delay of k samples.
         setup.settings = Settings {
@@ -144,7 +145,7 @@ pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Outco
         setup.actuator.delay_ticks = delay;
         setup.actuator.lag_s = lag_s;
         setup.actuator.max_rate = 1e3;
-        let mut bench = Bench::new(&table, setup)?;
+        let mut bench = ClosedLoop::new(&table, setup)?;
         bench.run(100);
         bench.tissue().push = start;
         bench.run(4000);
@@ -179,10 +180,10 @@ pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Outco
 
 /// Row 23: tissue that answers with the wrong sign leads to SAFE; with the right sign and up to half again as strong,
 /// or pushed with up to a third of what the paddle can follow, it never does.
-pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     for (gain, seed) in [(-1.0, 1), (-0.5, 2), (-1.5, 3), (-1.0, 4)] {
         let what = || format!("response × {gain}");
-        let mut bench = Bench::new(trial.table, Setup { seed: trial.seed + seed, ..trial.setup() })?;
+        let mut bench = ClosedLoop::new(trial.table, Setup { seed: trial.seed + seed, ..trial.setup() })?;
         bench.inject(Fault::TissueGain(gain), FOR_EVER);
         bench.run(500);
         evidence.detect(bench.until(6000, carries(Faults::DIVERGENCE)), 4000, what);
@@ -195,7 +196,7 @@ pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome 
         for push in [0.0, 0.1, -0.1, 0.33, -0.33] {
             let what = || format!("response × {gain}, push {push}");
             for speed in [0.0, trial.setup().speed] {
-                let mut bench = Bench::new(trial.table, Setup { speed, ..trial.setup() })?;
+                let mut bench = ClosedLoop::new(trial.table, Setup { speed, ..trial.setup() })?;
                 bench.inject(Fault::TissueGain(gain), FOR_EVER).run(500);
                 // To a tenth of the reach, at that rate.
                 let ticks =
@@ -213,7 +214,7 @@ pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome 
 
 /// Row 24: another paddle than the table's is known by its identity; one that lies about it, by the loop that it makes
 /// unstable. A wrong one with which the loop is stable is no danger.
-pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(24);
     for index in [0, trial.table.paddle.index + 1, u32::MAX] {
         let what = || format!("paddle {index}");
@@ -226,7 +227,7 @@ pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
     }
     for degrees in [0.0, 30.0, -45.0, 150.0, 180.0, -160.0f64] {
         let what = || format!("response turned by {degrees}°");
-        let mut bench = Bench::new(trial.table, trial.setup())?;
+        let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
         bench.tissue().turn = Rotation2::new(degrees.to_radians()).into_inner();
         if degrees.abs() > 90.0 {
             evidence.detect(bench.until(6000, carries(Faults::DIVERGENCE)), 4500, what);
@@ -246,7 +247,7 @@ pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
 }
 
 /// Row 25: Jacobians with σmin from 1e-1 to 1e-12: refused past the condition limit, harmless up to it.
-pub(crate) fn near_singular(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn near_singular(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     for exponent in 1..=12 {
         for angle in [0.3, 1.2, 2.5f64] {
             let what = || format!("σmin = 1e-{exponent}");
@@ -266,7 +267,7 @@ pub(crate) fn near_singular(trial: &Trial<'_>, evidence: &mut Evidence) -> Outco
             }
             evidence.require(exponent <= 3, || format!("{}: accepted past the condition limit", what()));
             let setup = Setup { speed: 0.0, ..trial.setup() };
-            let mut bench = Bench::new(&table, setup)?;
+            let mut bench = ClosedLoop::new(&table, setup)?;
             bench.inject(Fault::Push(1e-3 * table.validity.depth_end), 3000).run(6000);
             evidence.detected += u64::from(bench.invariants.count() == 0);
             comes_back(&mut bench, 1, evidence, what);

@@ -2,9 +2,9 @@
 
 use firmware::contract::{MAX_TABLE_BYTES, Table, TableError, decode, encode};
 
-use super::{Outcome, Trial};
+use super::Trial;
+use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
-use crate::error::SimError;
 
 /// Bytes before the payload, and of the checksum after it.
 const HEADER: usize = 52;
@@ -42,7 +42,7 @@ fn demand(evidence: &mut Evidence, refused: Option<TableError>, what: impl Fn() 
 }
 
 /// Row 26: every single-bit flip of a table is refused.
-pub(crate) fn bit_flips(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn bit_flips(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut bytes = encoded(trial.table)?;
     evidence.require(refusal(&bytes).is_none(), || "the table itself is refused".to_owned());
     for bit in 0..8 * bytes.len() {
@@ -54,7 +54,7 @@ pub(crate) fn bit_flips(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 27: every truncation and trailing bytes are refused.
-pub(crate) fn truncations(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn truncations(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let bytes = encoded(trial.table)?;
     for length in 0..bytes.len() {
         demand(evidence, refusal(&bytes[..length]), || format!("{length} bytes"));
@@ -73,7 +73,7 @@ pub(crate) fn truncations(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome
 }
 
 /// Row 28: another version, another schema, other units are refused, each for its own reason.
-pub(crate) fn mismatches(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn mismatches(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let bytes = encoded(trial.table)?;
     let with = |offset: usize, value: u8| {
         let mut changed = bytes.clone();
@@ -122,7 +122,7 @@ fn forged(trial: &Trial<'_>, change: impl FnOnce(&mut Table<f64, 2>)) -> Result<
 
 /// Row 29: a valid checksum over numbers that cannot be: NaN, unsorted, huge sizes, and every single-bit flip sealed
 /// again. What is accepted has all invariants.
-pub(crate) fn impossible(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn impossible(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     type Change = fn(&mut Table<f64, 2>);
     let cases: [(&str, Change); 10] = [
         ("NaN in a Jacobian", |table| table.knots[1].jacobian[(0, 1)] = f64::NAN),

@@ -11,10 +11,10 @@ use firmware::contract::Table;
 use firmware::{Mode, State};
 use rand_pcg::Pcg64;
 
-use super::bench::{Bench, Setup};
+use super::closed_loop::{ClosedLoop, Setup};
 use super::evidence::Evidence;
 use super::fault::{Fault, below};
-use crate::error::SimError;
+use crate::bench::error::SimError;
 
 /// What every row gets.
 #[derive(Clone, Copy, Debug)]
@@ -24,9 +24,6 @@ pub(crate) struct Trial<'t> {
     /// Seed of noise and phases.
     pub(crate) seed: u64,
 }
-
-/// What a row function returns: failures of the row are in its evidence, errors are failures of the set-up.
-pub(crate) type Outcome = Result<(), SimError>;
 
 impl<'t> Trial<'t> {
     /// Generator for the phases of a row.
@@ -39,21 +36,21 @@ impl<'t> Trial<'t> {
     }
 
     /// A bench in RUN, in the middle of an insertion, at a phase drawn from `random`.
-    fn running(&self, random: &mut Pcg64) -> Result<Bench<'t>, SimError> {
+    fn running(&self, random: &mut Pcg64) -> Result<ClosedLoop<'t>, SimError> {
         self.running_with(self.setup(), random)
     }
 
-    fn running_with(&self, setup: Setup, random: &mut Pcg64) -> Result<Bench<'t>, SimError> {
-        let mut bench = Bench::new(self.table, setup)?;
+    fn running_with(&self, setup: Setup, random: &mut Pcg64) -> Result<ClosedLoop<'t>, SimError> {
+        let mut bench = ClosedLoop::new(self.table, setup)?;
         bench.run(1000 + below(random, 500));
         Ok(bench)
     }
 
     /// Two benches in the same state.
-    fn twins(&self, random: &mut Pcg64) -> Result<[Bench<'t>; 2], SimError> {
+    fn twins(&self, random: &mut Pcg64) -> Result<[ClosedLoop<'t>; 2], SimError> {
         let ticks = 1000 + below(random, 500);
-        let one = || -> Result<Bench<'t>, SimError> {
-            let mut bench = Bench::new(self.table, self.setup())?;
+        let one = || -> Result<ClosedLoop<'t>, SimError> {
+            let mut bench = ClosedLoop::new(self.table, self.setup())?;
             bench.run(ticks);
             Ok(bench)
         };
@@ -62,7 +59,7 @@ impl<'t> Trial<'t> {
 }
 
 /// Lets both pass the same ticks; whether all displacements have the same bits.
-fn same_motion(twins: &mut [Bench<'_>; 2], ticks: u64) -> bool {
+fn same_motion(twins: &mut [ClosedLoop<'_>; 2], ticks: u64) -> bool {
     (0..ticks).all(|_| {
         let [a, b] = twins.each_mut().map(|bench| bench.step().map(|e| e.command.displacement.map(f64::to_bits)));
         a == b
@@ -74,13 +71,13 @@ fn integral_bits(state: &State<f64>) -> Option<[u64; 2]> {
 }
 
 /// Everything is over: within `limit` ticks the loop is in RUN again by itself.
-fn comes_back(bench: &mut Bench<'_>, limit: u64, evidence: &mut Evidence, what: impl Fn() -> String) {
+fn comes_back(bench: &mut ClosedLoop<'_>, limit: u64, evidence: &mut Evidence, what: impl Fn() -> String) {
     let back = bench.mode() == Mode::Run || bench.until(limit, super::evidence::is_in(Mode::Run)).is_some();
     evidence.require(back, || format!("{}: no RUN within {limit} ticks: {}", what(), bench.state.faults()));
 }
 
 /// In SAFE, and there it stays until somebody re-arms; then RUN follows.
-fn stays_safe_until_rearmed(bench: &mut Bench<'_>, evidence: &mut Evidence, what: impl Fn() -> String) {
+fn stays_safe_until_rearmed(bench: &mut ClosedLoop<'_>, evidence: &mut Evidence, what: impl Fn() -> String) {
     bench.run(50);
     evidence.expect_mode(bench, Mode::Safe, &what);
     bench.rearm();
@@ -91,6 +88,6 @@ fn stays_safe_until_rearmed(bench: &mut Bench<'_>, evidence: &mut Evidence, what
 const FOR_EVER: u64 = u64::MAX / 2;
 
 /// Injects `fault` for `ticks` and lets them pass.
-fn during(bench: &mut Bench<'_>, fault: Fault, ticks: u64) {
+fn during(bench: &mut ClosedLoop<'_>, fault: Fault, ticks: u64) {
     bench.inject(fault, ticks).run(ticks);
 }

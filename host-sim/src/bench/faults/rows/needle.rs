@@ -3,20 +3,21 @@
 use firmware::{Faults, Mode};
 use nalgebra::Vector2;
 
-use super::{Outcome, Trial, comes_back};
-use crate::bench::faults::bench::{Bench, Setup};
+use super::{Trial, comes_back};
+use crate::bench::error::SimError;
+use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
 use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::Fault;
 use crate::bench::faults::tissue::LinearTissue;
 
 /// Row 30: past the last knot the feed-forward stays at its last value, and says so.
-pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut short = trial.table.clone();
     let kept = 2 * short.knots.len() / 3;
     short.knots.truncate(kept);
     let Some(last) = short.knots.last().cloned() else { return Ok(()) };
     short.validity.depth_end = last.depth;
-    let mut bench = Bench::new(&short, Setup { depth_end: trial.table.validity.depth_end, ..trial.setup() })?;
+    let mut bench = ClosedLoop::new(&short, Setup { depth_end: trial.table.validity.depth_end, ..trial.setup() })?;
     *bench.tissue() = LinearTissue::new(trial.table);
     let mut outside_since = None;
     for _ in 0..9000 {
@@ -49,7 +50,7 @@ pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Ou
 }
 
 /// Row 31: the needle turns back in the middle: the command goes on without a step.
-pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(31);
     for factor in [-1.0, -3.0] {
         let what = || format!("speed × {factor}");
@@ -81,7 +82,7 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 32: a needle faster than the table holds for: HOLD on that very tick, RUN when it is slower again.
-pub(crate) fn too_fast(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn too_fast(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(32);
     let limit = trial.table.validity.needle_speed;
     for excess in [1.2, 2.0] {

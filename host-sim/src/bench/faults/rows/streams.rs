@@ -6,8 +6,9 @@ use firmware::detection::{
 use firmware::inputs::{Discard, StreamLedger};
 use firmware::{Faults, Mode, Settings};
 
-use super::{FOR_EVER, Outcome, Trial, comes_back, during, same_motion, stays_safe_until_rearmed};
-use crate::bench::faults::bench::{Bench, Setup};
+use super::{FOR_EVER, Trial, comes_back, during, same_motion, stays_safe_until_rearmed};
+use crate::bench::error::SimError;
+use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
 use crate::bench::faults::evidence::{Evidence, carries, is_in};
 use crate::bench::faults::fault::{Fault, Stream};
 
@@ -22,7 +23,7 @@ fn age_limits(stream: Stream, settings: &Settings) -> [u64; 2] {
     }
 }
 
-fn ledger<'b>(bench: &'b Bench<'_>, stream: Stream) -> &'b StreamLedger {
+fn ledger<'b>(bench: &'b ClosedLoop<'_>, stream: Stream) -> &'b StreamLedger {
     let ledger = bench.state.ledger();
     match stream {
         Stream::Needle => &ledger.needle,
@@ -32,7 +33,7 @@ fn ledger<'b>(bench: &'b Bench<'_>, stream: Stream) -> &'b StreamLedger {
 }
 
 /// Goes on until a target sample has just arrived; its age then, ticks.
-fn after_a_target_sample(bench: &mut Bench<'_>) -> u64 {
+fn after_a_target_sample(bench: &mut ClosedLoop<'_>) -> u64 {
     let period = bench.setup().settings.loop_period_ns;
     loop {
         if let Some(exchange) = bench.step()
@@ -44,7 +45,7 @@ fn after_a_target_sample(bench: &mut Bench<'_>) -> u64 {
 }
 
 /// Row 7: a stream that stops leads to HOLD on the first tick past its first limit and to SAFE past its second.
-pub(crate) fn stale(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn stale(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(7);
     for stream in Stream::ALL {
         let mut bench = trial.running(&mut random)?;
@@ -74,7 +75,7 @@ pub(crate) fn stale(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 8: gaps in the sequence are counted exactly.
-pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(8);
     for stream in Stream::ALL {
         for gap in [1, 10, 1000] {
@@ -101,7 +102,7 @@ pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 9: a sample that arrives twice is used once.
-pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(9);
     let mut twins = trial.twins(&mut random)?;
     twins[1].inject(Fault::Duplicated(Stream::Target), 1000);
@@ -134,7 +135,7 @@ pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome 
 }
 
 /// Row 10: a sample that arrives after a newer one is discarded and counted.
-pub(crate) fn reordered(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn reordered(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(10);
     for (stream, late, spacing) in [(Stream::Needle, 2, 5), (Stream::Paddle, 2, 5), (Stream::Target, 30, 80)] {
         let mut bench = trial.running(&mut random)?;
@@ -158,7 +159,7 @@ pub(crate) fn reordered(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 11: a value that stays while the sequence advances and the needle moves is detected.
-pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(11);
     let setup = trial.setup();
     let period_s = setup.settings.loop_period_ns as f64 * 1e-9;
@@ -184,12 +185,12 @@ pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 12: a target sensor of 30 Hz in a loop of 1 kHz makes no oscillation.
-pub(crate) fn slow_sensor(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn slow_sensor(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     const MS: u64 = 1_000_000;
     let setup = Setup { settings: Settings::new(MS, 33_333_333, 20 * MS), noise: 0.0, speed: 0.0, ..trial.setup() };
     let offset = 0.01 * trial.table.validity.depth_end;
     for sign in [1.0, -1.0] {
-        let mut bench = Bench::new(trial.table, setup)?;
+        let mut bench = ClosedLoop::new(trial.table, setup)?;
         bench.tissue().push = sign * offset;
         evidence.injected += 1;
         // The paddle needs longer than a sample for the first correction, which costs a little overshoot.
@@ -209,7 +210,7 @@ pub(crate) fn slow_sensor(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome
 }
 
 /// Row 16: the target is lost for 1 to 500 ticks: HOLD, then SAFE; the return keeps the limits.
-pub(crate) fn target_lost(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn target_lost(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(16);
     let settings = trial.setup().settings;
     let [hold, safe] = age_limits(Stream::Target, &settings);

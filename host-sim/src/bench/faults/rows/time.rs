@@ -3,14 +3,17 @@
 use firmware::detection::{MAX_SUCCESSIVE_OVERRUNS, TICKS_TO_HOLD};
 use firmware::{Faults, Mode};
 
-use super::{Outcome, Trial, comes_back, integral_bits, stays_safe_until_rearmed};
-use crate::bench::faults::bench::Bench;
+use super::{Trial, comes_back, integral_bits, stays_safe_until_rearmed};
+use crate::bench::error::SimError;
+use crate::bench::faults::closed_loop::ClosedLoop;
 use crate::bench::faults::evidence::{Evidence, carries, is_in};
 use crate::bench::faults::fault::{Event, Fault, Stream, below};
-use crate::record::recording::{Exchange, Header, Record, Recording, RunMode};
+use crate::record::recording::{Header, Record, Recording};
+use crate::runtime::mode::RunMode;
+use crate::runtime::tick::ControllerTick;
 
 /// Row 1: a step over its budget is counted, whole periods are skipped, the phase stays, nothing runs twice.
-pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(1);
     for (periods, skipped) in [(0.5, 0), (1.0, 0), (3.5, 3)] {
         let mut bench = trial.running(&mut random)?;
@@ -33,7 +36,7 @@ pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 }
 
 /// Row 2: an overrun on every tick leads to SAFE.
-pub(crate) fn overrun_on_every_tick(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn overrun_on_every_tick(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(2);
     for (periods, spacing) in [(1.5, 2), (3.5, 4)] {
         let mut bench = trial.running(&mut random)?;
@@ -51,7 +54,7 @@ pub(crate) fn overrun_on_every_tick(trial: &Trial<'_>, evidence: &mut Evidence) 
 }
 
 /// Row 3: the peer stops for 100 ms: one gap, HOLD, and RUN on fresh data.
-pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(3);
     for lost in [false, true] {
         let what = || if lost { "samples lost" } else { "sequences stand still" }.to_owned();
@@ -82,18 +85,18 @@ pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
 }
 
 /// Row 4: jumps of the wall clock by an hour leave no trace in the record: the same bytes.
-pub(crate) fn wall_clock(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn wall_clock(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     const HOUR_NS: i64 = 3_600_000_000_000;
     let mut random = trial.random(4);
     let mut recordings = Vec::new();
     for jumps in [&[] as &[i64], &[HOUR_NS], &[-HOUR_NS], &[HOUR_NS, -HOUR_NS]] {
-        let mut bench = Bench::new(trial.table, trial.setup())?;
+        let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
         for by_ns in jumps {
             let from = below(&mut random, 2000);
             bench.inject_at(Event { fault: Fault::WallClock(*by_ns), from, until: from + 1 });
             evidence.injected += 1;
         }
-        let exchanges: Vec<Exchange> = (0..2000).filter_map(|_| bench.step()).collect();
+        let exchanges: Vec<ControllerTick> = (0..2000).filter_map(|_| bench.step()).collect();
         evidence.expect_mode(&bench, Mode::Run, || "wall clock".to_owned());
         evidence.close(&bench, || "wall clock".to_owned());
         recordings.push(recording(trial, &bench, &exchanges));
@@ -104,7 +107,7 @@ pub(crate) fn wall_clock(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome 
     Ok(())
 }
 
-fn recording(trial: &Trial<'_>, bench: &Bench<'_>, exchanges: &[Exchange]) -> Vec<u8> {
+fn recording(trial: &Trial<'_>, bench: &ClosedLoop<'_>, exchanges: &[ControllerTick]) -> Vec<u8> {
     let header = Header {
         mode: RunMode::Lockstep,
         seed: trial.seed,
@@ -112,12 +115,12 @@ fn recording(trial: &Trial<'_>, bench: &Bench<'_>, exchanges: &[Exchange]) -> Ve
         settings: bench.setup().settings,
         table: Vec::new(),
     };
-    let records = exchanges.iter().map(|exchange| Record { exchange: *exchange, truth: None }).collect();
+    let records = exchanges.iter().map(|exchange| Record { tick: *exchange, truth: None }).collect();
     Recording { header, records }.encode()
 }
 
 /// Row 5: a tick from the past is rejected: SAFE at once, nothing of it is used.
-pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     const MS: u64 = 1_000_000;
     let mut random = trial.random(5);
     for back_ns in [MS + 1, 5 * MS, 3_600_000 * MS] {
@@ -137,11 +140,11 @@ pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome 
 }
 
 /// Row 6: counters that wrap are no event: same motion, same accounts, gaps counted across the wrap.
-pub(crate) fn counter_wrap(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
-    let bench = |sequence| -> Result<Bench<'_>, crate::error::SimError> {
+pub(crate) fn counter_wrap(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+    let bench = |sequence| -> Result<ClosedLoop<'_>, crate::bench::error::SimError> {
         let mut setup = trial.setup();
         setup.sequence = sequence;
-        Ok(Bench::new(trial.table, setup)?)
+        Ok(ClosedLoop::new(trial.table, setup)?)
     };
     // The wrap between two samples, and in the middle of ten lost ones.
     for start in [u32::MAX - 5, u32::MAX - 505] {

@@ -3,12 +3,13 @@
 use firmware::inputs::Discard;
 use firmware::{Faults, Mode};
 
-use super::{Outcome, Trial, integral_bits, same_motion};
-use crate::bench::faults::bench::Bench;
+use super::{Trial, integral_bits, same_motion};
+use crate::bench::error::SimError;
+use crate::bench::faults::closed_loop::ClosedLoop;
 use crate::bench::faults::evidence::Evidence;
 use crate::bench::faults::fault::{Fault, Stream, below, between};
 
-fn refusals(bench: &Bench<'_>, stream: Stream, reason: Discard) -> u64 {
+fn refusals(bench: &ClosedLoop<'_>, stream: Stream, reason: Discard) -> u64 {
     let ledger = bench.state.ledger();
     match stream {
         Stream::Needle => &ledger.needle,
@@ -27,7 +28,7 @@ fn refused(
     stream: Stream,
     fault: Fault,
     reasons: &[Discard],
-) -> Outcome {
+) -> Result<(), SimError> {
     let what = || format!("{fault:?}");
     let [mut lost, mut hit] = trial.twins(random)?;
     // Until the next sample of the target is due, so that each kind of sample is hit once.
@@ -61,7 +62,7 @@ fn refused(
 }
 
 /// Row 13: NaN, ±Inf, a subnormal in each number, and absurd times, are refused.
-pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(13);
     for stream in Stream::ALL {
         for field in 0..2 {
@@ -80,7 +81,7 @@ pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome
 }
 
 /// Row 14: finite numbers that cannot be are refused.
-pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(14);
     let reasons = [Discard::OutOfRange, Discard::Innovation];
     for value in [1e3, -1e3, f64::MAX, f64::MIN, 1.0, -1.0] {
@@ -103,7 +104,7 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcom
 }
 
 /// Row 15: units that are off by 1000 are refused for as long as they last, and move nothing.
-pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(15);
     let reasons = [Discard::OutOfRange, Discard::Innovation];
     // A target or a paddle that is a thousand times too near its rest position is plausible by itself: what follows
@@ -134,7 +135,7 @@ pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome
 
 /// Row 17: single samples of something else. 5σ is noise and taken. 50σ is refused unless the motion of the needle
 /// explains as much: then it may be taken, and moves the target by no more than the gain's part of it.
-pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     for (name, sigmas, moving) in
         [("default σ, needle at rest", 1.0, false), ("10 × σ", 10.0, true), ("default σ", 1.0, true)]
     {
@@ -163,14 +164,14 @@ pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
 /// 400 jumps, 5σ and 50σ in turns; how many were accepted and refused wrongly.
 fn jump_trial(
     trial: &Trial<'_>,
-    setup: crate::bench::faults::bench::Setup,
+    setup: crate::bench::faults::closed_loop::Setup,
     evidence: &mut Evidence,
     name: &str,
-) -> Result<[u64; 2], crate::error::SimError> {
+) -> Result<[u64; 2], crate::bench::error::SimError> {
     const PER_TARGET: u64 = 20;
     let mut random = trial.random(17);
     let mut bench = trial.running_with(setup, &mut random)?;
-    let refusals = |bench: &Bench<'_>| refusals(bench, Stream::Target, Discard::Innovation);
+    let refusals = |bench: &ClosedLoop<'_>| refusals(bench, Stream::Target, Discard::Innovation);
     let (mut accepted, mut detected) = (0, 0);
     bench.max_error = 0.0;
     let start = refusals(&bench);
@@ -199,7 +200,7 @@ fn jump_trial(
 }
 
 /// Row 18: stated noise over five decades: the error stays in proportion, the state does not chatter.
-pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
+pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     /// The loop averages: at g·λ = 0.2 its error has 0.35 of the noise's deviation. This is 11 of those.
     const MOST_SIGMAS: f64 = 4.0;
     let depth = trial.table.validity.depth_end;
@@ -209,7 +210,7 @@ pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
         let mut setup = trial.setup();
         setup.noise = sigma;
         setup.settings.target_noise = sigma;
-        let mut bench = Bench::new(trial.table, setup)?;
+        let mut bench = ClosedLoop::new(trial.table, setup)?;
         bench.run(500);
         let (hold, injected) = (bench.audit.modes[0], bench.state.ledger().target.consumed);
         bench.max_error = 0.0;
@@ -224,7 +225,7 @@ pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Outcome {
     }
     // Noise that nobody has stated: refused sample by sample, or kept in proportion; the state may only get worse by
     // age, so that it cannot change more often than samples arrive.
-    let mut bench = Bench::new(trial.table, trial.setup())?;
+    let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
     bench.inject(Fault::Noise(0.1 * depth), 4000);
     let mut changes = 0u64;
     let mut last = Mode::Hold;

@@ -1,7 +1,7 @@
 //! The closed loop in one thread and virtual time: plant, sensors, seam, controller, actuator; nothing waits.
 //!
 //! The plant ticks every period. The controller follows its own [`Schedule`] in the same virtual time, so that a slow
-//! step makes it skip periods while the plant goes on. Its record is the one of [`crate::record::recording`].
+//! step makes it skip periods while the plant goes on.
 
 use std::collections::VecDeque;
 
@@ -17,8 +17,10 @@ use super::fault::{Event, Fault, Stream};
 use super::invariants::Invariants;
 use super::seam::{Channel, see};
 use super::tissue::LinearTissue;
-use crate::record::recording::Exchange;
-use crate::world::actuator::{ActuatorModel, Paddle};
+use crate::runtime::tick::ControllerTick;
+use crate::world::actuator::{ActuatorModel, PaddleActuator};
+use crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH;
+use crate::world::needle::NeedleMotion;
 use crate::world::sensors::{Encoders, TargetSensor};
 
 /// Part of a period that a healthy step takes.
@@ -56,7 +58,7 @@ impl Setup {
     pub fn new(table: &Table<f64, 2>, seed: u64) -> Self {
         const MS: u64 = 1_000_000;
         let depth = table.validity.depth_end;
-        let noise = crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH * depth;
+        let noise = DEFAULT_NOISE_PER_DEPTH * depth;
         Self {
             settings: Settings { target_noise: noise, ..Settings::new(MS, 20 * MS, 20 * MS) },
             noise,
@@ -102,7 +104,7 @@ impl CommandSink for Link {
 
 /// The closed loop.
 #[derive(Debug)]
-pub struct Bench<'t> {
+pub struct ClosedLoop<'t> {
     setup: Setup,
     table: &'t Table<f64, 2>,
     controller: Controller<'t, f64>,
@@ -116,7 +118,7 @@ pub struct Bench<'t> {
     depth: f64,
     velocity: f64,
     direction: f64,
-    paddle: Paddle,
+    paddle: PaddleActuator,
     encoders: Encoders,
     target_sensor: TargetSensor,
     random: Pcg64,
@@ -131,7 +133,7 @@ pub struct Bench<'t> {
     /// What must hold on every tick.
     pub invariants: Invariants,
     /// Last exchange of the controller.
-    pub last: Option<Exchange>,
+    pub last: Option<ControllerTick>,
     /// Orthogonal error now, length.
     pub error: f64,
     /// Largest orthogonal error so far, length.
@@ -142,7 +144,7 @@ pub struct Bench<'t> {
     pub flagged: u64,
 }
 
-impl<'t> Bench<'t> {
+impl<'t> ClosedLoop<'t> {
     /// Everything at rest at time 0.
     ///
     /// # Errors
@@ -162,7 +164,7 @@ impl<'t> Bench<'t> {
             depth: table.validity.depth_start,
             velocity: 0.0,
             direction: 1.0,
-            paddle: Paddle::at(setup.actuator, Vector2::from(setup.paddle)),
+            paddle: PaddleActuator::at(setup.actuator, Vector2::from(setup.paddle)),
             encoders: Encoders::starting_at(setup.sequence),
             target_sensor: TargetSensor::new(
                 settings.target_period_ns,
@@ -258,7 +260,7 @@ impl<'t> Bench<'t> {
     }
 
     /// One tick of the plant, and of the controller if it is due.
-    pub fn step(&mut self) -> Option<Exchange> {
+    pub fn step(&mut self) -> Option<ControllerTick> {
         let time_ns = self.tick * self.setup.settings.loop_period_ns;
         self.active.clear();
         let tick = self.tick;
@@ -307,18 +309,18 @@ impl<'t> Bench<'t> {
     fn drive_needle(&mut self, factor: f64, period_s: f64) {
         let (start, end) = (self.table.validity.depth_start, self.setup.depth_end);
         let started = self.audit.modes[Mode::Run as usize - 1] > 0;
-        let mut wish = if started { self.setup.speed * factor * self.direction } else { 0.0 };
+        let mut setpoint = if started { self.setup.speed * factor * self.direction } else { 0.0 };
         let slowing = self.table.validity.needle_speed / NEEDLE_RAMP_S;
         // The drive knows where it ends, and is at rest there.
-        let left = if wish > 0.0 { end - self.depth } else { self.depth - start }.max(0.0);
-        if left < 1e-3 * (end - start) && self.setup.shuttles && wish * self.direction > 0.0 {
+        let left = if setpoint > 0.0 { end - self.depth } else { self.depth - start }.max(0.0);
+        if left < 1e-3 * (end - start) && self.setup.shuttles && setpoint * self.direction > 0.0 {
             self.direction = -self.direction;
         }
         let stoppable = (1.8 * slowing * left).sqrt();
-        wish = wish.clamp(-stoppable, stoppable);
+        setpoint = setpoint.clamp(-stoppable, stoppable);
         let change = slowing * period_s;
         let before = self.velocity;
-        self.velocity += (wish - before).clamp(-change, change);
+        self.velocity += (setpoint - before).clamp(-change, change);
         self.depth = (self.depth + 0.5 * (before + self.velocity) * period_s).clamp(start, end);
     }
 
@@ -339,7 +341,12 @@ impl<'t> Bench<'t> {
             });
             self.injected += u64::from(identity.is_some());
             let index = identity.unwrap_or(self.table.paddle.index);
-            let samples = self.encoders.sample(time_ns, (self.depth, self.velocity), index, &position);
+            let samples = self.encoders.sample(
+                time_ns,
+                NeedleMotion { depth: self.depth, velocity: self.velocity },
+                index,
+                &position,
+            );
             (needle, paddle) = (Some(samples.0), Some(samples.1));
             self.target_sensor.measure(time_ns, &target);
             seen = self.target_sensor.arrived(time_ns);
@@ -354,7 +361,7 @@ impl<'t> Bench<'t> {
     }
 
     /// One tick of the controller.
-    fn control(&mut self, time_ns: u64) -> Exchange {
+    fn control(&mut self, time_ns: u64) -> ControllerTick {
         let period_ns = self.setup.settings.loop_period_ns;
         let (mut back_ns, mut periods) = (0, HEALTHY_STEP);
         for fault in &self.active {
@@ -395,7 +402,7 @@ impl<'t> Bench<'t> {
         self.invariants.check_release(self.schedule.next_release_ns(), next_ns);
         self.next_release_ns = next_ns;
         self.on_their_way.push_back((end_ns, command));
-        let exchange = Exchange { inputs, command };
+        let exchange = ControllerTick { inputs, command };
         self.last = Some(exchange);
         exchange
     }

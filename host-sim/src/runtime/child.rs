@@ -7,16 +7,16 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use crate::error::SimError;
+use super::accounts::ControllerAccounts;
+use super::error::{Role, RuntimeError};
+use super::executor::Hardware;
+use super::mode::RunMode;
+use super::tick::ControllerTick;
 use crate::exchange::Space;
-use crate::record::recording::{Exchange, RunMode};
-use crate::runtime::accounts::Handover;
-use crate::runtime::executor::Hardware;
-use crate::runtime::peer::describe;
-use crate::world::loop_settings::LoopArgs;
+use crate::world::loop_settings::LoopSettings;
 
-/// How long a controller may take to hand over its accounts after the stop.
-const HANDOVER_TIMEOUT: Duration = Duration::from_secs(20);
+/// How long a controller may take to hand in its accounts after the stop.
+const ACCOUNTS_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// A running controller; ended and reaped when dropped.
 #[derive(Debug)]
@@ -40,7 +40,7 @@ pub struct ControllerCall<'a> {
     /// What computes the steps.
     pub hardware: Hardware,
     /// Rates, latency, noise.
-    pub loop_args: LoopArgs,
+    pub loop_settings: LoopSettings,
     /// Insertion depth, for the default of the noise.
     pub depth: f64,
     /// Ticks to keep room for.
@@ -53,8 +53,8 @@ impl ControllerProcess {
     /// Starts `host-sim controller`.
     ///
     /// # Errors
-    /// [`SimError::Spawn`].
-    pub fn start(call: &ControllerCall<'_>) -> Result<Self, SimError> {
+    /// [`RuntimeError::Spawn`].
+    pub fn start(call: &ControllerCall<'_>) -> Result<Self, RuntimeError> {
         let mut child = Command::new(call.program)
             .arg("controller")
             .arg("--table")
@@ -62,7 +62,7 @@ impl ControllerProcess {
             .args(["--link", call.space.name()])
             .args(["--mode", &call.mode.to_string()])
             .args(["--controller", call.hardware.name()])
-            .args(call.loop_args.to_arguments(call.depth))
+            .args(call.loop_settings.to_arguments(call.depth))
             .args(["--capacity", &call.capacity.to_string()])
             .args(["--patience", &call.patience_s.to_string()])
             .args(["--parent", &std::process::id().to_string()])
@@ -71,7 +71,7 @@ impl ControllerProcess {
             // Ctrl-C in the terminal is for the plant, which ends its controller itself.
             .process_group(0)
             .spawn()
-            .map_err(SimError::Spawn)?;
+            .map_err(RuntimeError::Spawn)?;
         let (sender, said) = channel();
         if let Some(mut stdout) = child.stdout.take() {
             std::thread::spawn(move || {
@@ -96,19 +96,21 @@ impl ControllerProcess {
     /// After the stop: its accounts and everything that it saw.
     ///
     /// # Errors
-    /// [`SimError::PeerDied`], [`SimError::PeerSilent`], [`SimError::Protocol`].
-    pub fn finish(mut self) -> Result<(Handover, Vec<Exchange>), SimError> {
-        let said = self
-            .said
-            .recv_timeout(HANDOVER_TIMEOUT)
-            .map_err(|_| SimError::PeerSilent { peer: "controller", silent_s: HANDOVER_TIMEOUT.as_secs_f64() })?;
-        let status = self.child.wait().map_err(SimError::Spawn)?;
+    /// [`RuntimeError::PeerDied`], [`RuntimeError::PeerSilent`], [`RuntimeError::Protocol`].
+    pub fn finish(mut self) -> Result<(ControllerAccounts, Vec<ControllerTick>), RuntimeError> {
+        let said = self.said.recv_timeout(ACCOUNTS_TIMEOUT).map_err(|_| RuntimeError::PeerSilent {
+            peer: Role::Controller,
+            silent_s: ACCOUNTS_TIMEOUT.as_secs_f64(),
+        })?;
+        let status = self.child.wait().map_err(RuntimeError::Spawn)?;
         if !status.success() {
-            return Err(SimError::PeerDied { peer: "controller", how: describe(&status) });
+            return Err(RuntimeError::PeerDied { peer: Role::Controller, how: describe_exit(&status) });
         }
-        let bytes = said.map_err(SimError::Spawn)?;
-        Handover::decode(&bytes)
-            .ok_or_else(|| SimError::Protocol { peer: "controller", what: "its accounts cannot be read".to_owned() })
+        let bytes = said.map_err(RuntimeError::Spawn)?;
+        ControllerAccounts::decode(&bytes).ok_or_else(|| RuntimeError::Protocol {
+            peer: Role::Controller,
+            what: "its accounts cannot be read".to_owned(),
+        })
     }
 }
 
@@ -117,5 +119,17 @@ impl Drop for ControllerProcess {
         // Both fail harmlessly if it has been waited for; an unreaped child would count as alive in shared memory.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// How a process ended, in words.
+pub fn describe_exit(status: &ExitStatus) -> String {
+    use std::os::unix::process::ExitStatusExt;
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("exit code {code}"),
+        (_, Some(9)) => "killed by SIGKILL".to_owned(),
+        (_, Some(15)) => "killed by SIGTERM".to_owned(),
+        (_, Some(signal)) => format!("killed by signal {signal}"),
+        _ => status.to_string(),
     }
 }

@@ -9,13 +9,14 @@ use std::time::{Duration, Instant};
 use firmware::contract::{PaddleCommand, Table};
 use iceoryx2::service::ipc;
 
-use super::peer::{Bare, DATAGRAM, Exchange};
-use super::stimulus::Stimulus;
-use crate::error::SimError;
+use super::peer::{Bare, DATAGRAM, Transport};
+use super::stimulus::{Samples, Stimulus};
 use crate::exchange::{Departure, PlantPorts, Space};
+use crate::runtime::child::describe_exit;
 use crate::runtime::clock::now_ns;
+use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::signals;
-use crate::world::loop_settings::LoopArgs;
+use crate::world::loop_settings::LoopSettings;
 
 /// How long the other process may take to be there, and to answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
@@ -26,7 +27,7 @@ pub(super) struct Partner<'t> {
     pub(super) program: PathBuf,
     pub(super) table: &'t Table<f64, 2>,
     pub(super) table_file: PathBuf,
-    pub(super) loop_args: LoopArgs,
+    pub(super) loop_settings: LoopSettings,
     pub(super) cpu: Option<usize>,
     pub(super) priority: u8,
 }
@@ -47,26 +48,26 @@ enum Ends {
     Closed,
 }
 
-fn child(partner: &Partner<'_>, exchange: &str, space: &Space, stdin: Stdio) -> Result<Child, SimError> {
+fn child(partner: &Partner<'_>, exchange: &str, space: &Space, stdin: Stdio) -> Result<Child, RuntimeError> {
     let mut command = Command::new(&partner.program);
     command.args(["timing-peer", "--exchange", exchange, "--link", space.name()]);
     command.arg("--table").arg::<&Path>(&partner.table_file);
-    command.args(["--rate", &partner.loop_args.rate.to_string(), "--priority", &partner.priority.to_string()]);
+    command.args(["--rate", &partner.loop_settings.rate.to_string(), "--priority", &partner.priority.to_string()]);
     if let Some(cpu) = partner.cpu {
         command.args(["--cpu", &cpu.to_string()]);
     }
-    command.stdin(stdin).stdout(Stdio::null()).spawn().map_err(SimError::Spawn)
+    command.stdin(stdin).stdout(Stdio::null()).spawn().map_err(RuntimeError::Spawn)
 }
 
-fn wait(child: &mut Child, ready: impl Fn() -> bool) -> Result<(), SimError> {
+fn wait(child: &mut Child, ready: impl Fn() -> bool) -> Result<(), RuntimeError> {
     let until = Instant::now() + TIMEOUT;
     while !ready() {
         signals::check()?;
         if let Ok(Some(status)) = child.try_wait() {
-            return Err(SimError::PeerDied { peer: "timing", how: crate::runtime::peer::describe(&status) });
+            return Err(RuntimeError::PeerDied { peer: Role::TimingPeer, how: describe_exit(&status) });
         }
         if Instant::now() > until {
-            return Err(SimError::PeerSilent { peer: "timing", silent_s: TIMEOUT.as_secs_f64() });
+            return Err(RuntimeError::PeerSilent { peer: Role::TimingPeer, silent_s: TIMEOUT.as_secs_f64() });
         }
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -75,21 +76,21 @@ fn wait(child: &mut Child, ready: impl Fn() -> bool) -> Result<(), SimError> {
 
 impl Running {
     /// Starts the other process and waits until it polls.
-    pub(super) fn start(partner: &Partner<'_>, exchange: Exchange) -> Result<Self, SimError> {
+    pub(super) fn start(partner: &Partner<'_>, transport: Transport) -> Result<Self, RuntimeError> {
         let space = Space::unique()?;
-        let stimulus = Stimulus::new(partner.table, &partner.loop_args);
-        let (ends, mut child) = match exchange {
-            Exchange::Link => {
+        let stimulus = Stimulus::new(partner.table, &partner.loop_settings);
+        let (ends, mut child) = match transport {
+            Transport::Link => {
                 let ports = PlantPorts::open(&space)?;
                 (Ends::Link(Box::new(ports)), child(partner, "link", &space, Stdio::null())?)
             }
-            Exchange::Bare => {
+            Transport::Bare => {
                 let bare = Bare::open(&space, "ping", "pong")?;
                 (Ends::Bare(bare), child(partner, "bare", &space, Stdio::null())?)
             }
-            Exchange::Socket => {
-                let (ours, theirs) = UnixDatagram::pair().map_err(SimError::Spawn)?;
-                ours.set_nonblocking(true).map_err(SimError::Spawn)?;
+            Transport::Socket => {
+                let (ours, theirs) = UnixDatagram::pair().map_err(RuntimeError::Spawn)?;
+                ours.set_nonblocking(true).map_err(RuntimeError::Spawn)?;
                 (Ends::Socket(ours), child(partner, "socket", &space, OwnedFd::from(theirs).into())?)
             }
         };
@@ -107,60 +108,73 @@ impl Running {
     }
 
     /// One exchange; returns when the sample was published and when the command was received, ns.
-    pub(super) fn once(&mut self) -> Result<(u64, u64), SimError> {
+    pub(super) fn once(&mut self) -> Result<(u64, u64), RuntimeError> {
         let measured_ns = now_ns();
         let samples = self.stimulus.samples(measured_ns, self.last);
-        let silent = || SimError::PeerSilent { peer: "timing", silent_s: TIMEOUT.as_secs_f64() };
         match &mut self.ends {
-            Ends::Link(ports) => {
-                // The needle is what the other side polls: it comes last, when all is there.
-                ports.paddle.send(samples.paddle)?;
-                if let Some(target) = samples.target {
-                    ports.target.send(target)?;
-                }
-                let start_ns = now_ns();
-                ports.needle.send(samples.needle)?;
-                let mut outcome = Ok(None);
-                spin(|| {
-                    outcome = ports.command.oldest();
-                    !matches!(outcome, Ok(None))
-                });
-                let end_ns = now_ns();
-                self.last = outcome?.ok_or_else(silent)?.displacement;
-                Ok((start_ns, end_ns))
-            }
-            Ends::Bare(bare) => {
-                let start_ns = now_ns();
-                bare.send([measured_ns; 8])?;
-                let mut outcome = Ok(None);
-                spin(|| {
-                    outcome = bare.receive();
-                    !matches!(outcome, Ok(None))
-                });
-                let end_ns = now_ns();
-                outcome?.ok_or_else(silent)?;
-                Ok((start_ns, end_ns))
-            }
-            Ends::Socket(socket) => {
-                let mut buffer = [0; DATAGRAM];
-                let start_ns = now_ns();
-                let datagram = (samples.needle, samples.target, samples.paddle);
-                let bytes = postcard::to_slice(&datagram, &mut buffer).map_err(|_| silent())?;
-                socket.send(bytes).map_err(SimError::Spawn)?;
-                let mut answer = [0; DATAGRAM];
-                let mut length = None;
-                spin(|| {
-                    length = socket.recv(&mut answer).ok();
-                    length.is_some()
-                });
-                let command = length.and_then(|length| postcard::from_bytes::<PaddleCommand>(&answer[..length]).ok());
-                let end_ns = now_ns();
-                self.last = command.ok_or_else(silent)?.displacement;
-                Ok((start_ns, end_ns))
-            }
+            Ends::Link(ports) => over_link(ports, &samples, &mut self.last),
+            Ends::Bare(bare) => over_bare(bare, measured_ns),
+            Ends::Socket(socket) => over_socket(socket, &samples, &mut self.last),
             Ends::Closed => Err(silent()),
         }
     }
+}
+
+fn silent() -> RuntimeError {
+    RuntimeError::PeerSilent { peer: Role::TimingPeer, silent_s: TIMEOUT.as_secs_f64() }
+}
+
+fn over_link(
+    ports: &mut PlantPorts<ipc::Service>,
+    samples: &Samples,
+    last: &mut [f64; 2],
+) -> Result<(u64, u64), RuntimeError> {
+    // The needle is what the other side polls: it comes last, when all is there.
+    ports.paddle.send(samples.paddle)?;
+    if let Some(target) = samples.target {
+        ports.target.send(target)?;
+    }
+    let start_ns = now_ns();
+    ports.needle.send(samples.needle)?;
+    let mut outcome = Ok(None);
+    spin(|| {
+        outcome = ports.command.oldest();
+        !matches!(outcome, Ok(None))
+    });
+    let end_ns = now_ns();
+    *last = outcome?.ok_or_else(silent)?.displacement;
+    Ok((start_ns, end_ns))
+}
+
+fn over_bare(bare: &Bare, measured_ns: u64) -> Result<(u64, u64), RuntimeError> {
+    let start_ns = now_ns();
+    bare.send([measured_ns; 8])?;
+    let mut outcome = Ok(None);
+    spin(|| {
+        outcome = bare.receive();
+        !matches!(outcome, Ok(None))
+    });
+    let end_ns = now_ns();
+    outcome?.ok_or_else(silent)?;
+    Ok((start_ns, end_ns))
+}
+
+fn over_socket(socket: &UnixDatagram, samples: &Samples, last: &mut [f64; 2]) -> Result<(u64, u64), RuntimeError> {
+    let mut buffer = [0; DATAGRAM];
+    let start_ns = now_ns();
+    let datagram = (samples.needle, samples.target, samples.paddle);
+    let bytes = postcard::to_slice(&datagram, &mut buffer).map_err(|_| silent())?;
+    socket.send(bytes).map_err(RuntimeError::Spawn)?;
+    let mut answer = [0; DATAGRAM];
+    let mut length = None;
+    spin(|| {
+        length = socket.recv(&mut answer).ok();
+        length.is_some()
+    });
+    let command = length.and_then(|length| postcard::from_bytes::<PaddleCommand>(&answer[..length]).ok());
+    let end_ns = now_ns();
+    *last = command.ok_or_else(silent)?.displacement;
+    Ok((start_ns, end_ns))
 }
 
 impl Drop for Running {

@@ -1,7 +1,9 @@
 //! What `timing` says on the terminal.
 
-use super::TimingResult;
-use crate::bench::result::{Distribution, LoopTiming};
+use std::fmt::Write as _;
+
+use crate::bench::timing::TimingResult;
+use crate::runtime::durations::{Distribution, LoopTiming};
 
 fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3
@@ -45,25 +47,35 @@ fn ratio(what: &str, ratios: &[f64]) -> String {
     }
 }
 
-/// Prints everything.
-pub(super) fn print(result: &TimingResult, priority: u8) {
-    println!(
+/// Everything, for the terminal; `priority` is what was asked for.
+pub fn timing_summary(result: &TimingResult, priority: u8) -> String {
+    let mut text = String::new();
+    // A string takes everything.
+    let _ = write_loops(&mut text, result, priority).and_then(|()| write_exchanges(&mut text, result));
+    text
+}
+
+/// The loops on the machine's clock.
+fn write_loops(text: &mut String, result: &TimingResult, priority: u8) -> std::fmt::Result {
+    writeln!(
+        text,
         "obtained: {}; memory locked: {}; processors: {}",
         result.controller.scheduling.policy,
         if result.controller.scheduling.memory_locked { "yes" } else { "no" },
         if result.pinned { "as asked for" } else { "left to the kernel" },
-    );
+    )?;
     let loops = [("empty loop", &result.empty), ("controller", &result.controller), ("exchange", &result.exchange)];
     for (number, ((name, timing), more)) in loops.into_iter().zip(&result.blocks).enumerate() {
-        println!("{}  {name}", cyclictest(number, priority, timing, more.last_lateness_ns));
-        println!("{}", percentiles("wake latency", &timing.release_lateness));
-        println!("{}", percentiles("execution", &timing.execution_time));
+        writeln!(text, "{}  {name}", cyclictest(number, priority, timing, more.last_lateness_ns))?;
+        writeln!(text, "{}", percentiles("wake latency", &timing.release_lateness))?;
+        writeln!(text, "{}", percentiles("execution", &timing.execution_time))?;
         if let Some(age) = &more.input_age {
-            println!("{}", percentiles("input age at actuation", age));
+            writeln!(text, "{}", percentiles("input age at actuation", age))?;
         }
-        println!("{}", percentiles("end to end", more.end_to_end.as_ref().unwrap_or(&timing.response_time)));
+        writeln!(text, "{}", percentiles("end to end", more.end_to_end.as_ref().unwrap_or(&timing.response_time)))?;
         let disturbance = &more.disturbance;
-        println!(
+        writeln!(
+            text,
             "  deadline misses {}, overruns {}, skipped {}; context switches {} voluntary, {} involuntary; steal {} ms; \
              void blocks {} of {}",
             timing.deadline_misses,
@@ -74,35 +86,40 @@ pub(super) fn print(result: &TimingResult, priority: u8) {
             disturbance.steal_ms.map_or_else(|| "?".to_owned(), |steal| steal.to_string()),
             more.voided_blocks,
             more.blocks,
-        );
+        )?;
     }
-    println!("{}", ratio("median wake latency, controller / empty loop", &result.lateness_ratios));
-    println!("{}", ratio("median wake latency, exchange / empty loop", &result.exchange_lateness_ratios));
+    writeln!(text, "{}", ratio("median wake latency, controller / empty loop", &result.lateness_ratios))?;
+    writeln!(text, "{}", ratio("median wake latency, exchange / empty loop", &result.exchange_lateness_ratios))?;
     let ticks = &result.ledger;
-    println!(
+    writeln!(
+        text,
         "ledger: {} due = {} RUN + {} HOLD + {} SAFE + {} skipped, unaccounted {}",
         ticks.due, ticks.run, ticks.hold, ticks.safe, ticks.skipped, ticks.unaccounted
-    );
-    println!("back to back:");
-    println!("{}", percentiles("clock read twice", &result.clock));
-    println!("{}", percentiles("step, with both clock readings", &result.step));
-    println!("sample published to command received, both sides polling:");
+    )
+}
+
+/// Steps and exchanges without a schedule, and the sweep.
+fn write_exchanges(text: &mut String, result: &TimingResult) -> std::fmt::Result {
+    writeln!(text, "back to back:")?;
+    writeln!(text, "{}", percentiles("clock read twice", &result.clock))?;
+    writeln!(text, "{}", percentiles("step, with both clock readings", &result.step))?;
+    writeln!(text, "sample published to command received, both sides polling:")?;
     let names = ["shared memory, controller's step", "bare iceoryx2, no step", "Unix socket, controller's step"];
     for (name, distribution) in names.into_iter().zip(&result.polled) {
-        println!("{}", percentiles(name, distribution));
+        writeln!(text, "{}", percentiles(name, distribution))?;
     }
-    println!("{}", ratio("medians, shared memory / bare iceoryx2", &result.link_over_bare));
-    println!("{}", ratio("medians, Unix socket / shared memory", &result.socket_over_link));
+    writeln!(text, "{}", ratio("medians, shared memory / bare iceoryx2", &result.link_over_bare))?;
+    writeln!(text, "{}", ratio("medians, Unix socket / shared memory", &result.socket_over_link))?;
     for (rate, ticks, misses, skipped) in &result.sweep {
-        println!("sweep: {rate:6.0} Hz, {ticks:6} ticks: {misses} deadline misses, {skipped} skipped");
+        writeln!(text, "sweep: {rate:6.0} Hz, {ticks:6} ticks: {misses} deadline misses, {skipped} skipped")?;
     }
     if !result.sweep.is_empty() {
         // The highest one below which none was missed either.
         let clean = result.sweep.iter().take_while(|(_, _, misses, skipped)| misses + skipped == 0).last();
         match clean {
-            Some((rate, ..)) => println!("highest rate without a missed deadline: {rate:.0} Hz"),
-            None => println!("no rate without a missed deadline"),
+            Some((rate, ..)) => writeln!(text, "highest rate without a missed deadline: {rate:.0} Hz")?,
+            None => writeln!(text, "no rate without a missed deadline")?,
         }
     }
-    println!("This describes this machine while it ran: no worst case, and nothing about hard real time.");
+    writeln!(text, "This describes this machine while it ran: no worst case, and nothing about hard real time.")
 }

@@ -3,15 +3,20 @@
 use std::path::Path;
 
 use firmware::contract::Table;
+use model_offline::placement::discretise;
 use model_offline::scene::Scene;
 
-use super::{Knobs, View};
+use super::server::View;
+use super::shared::Knobs;
+use crate::bench::error::SimError;
 use crate::bench::result::StrategyResult;
-use crate::bench::strategy::{Active, Extras, Label, active};
-use crate::error::SimError;
-use crate::record::recording::RunMode;
+use crate::bench::strategy::{ControllerSetup, Extras, Insertion, Label};
+use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
-use crate::world::Simulation;
+use crate::runtime::mode::RunMode;
+use crate::runtime::names;
+use crate::world::error::WorldError;
+use crate::world::simulation::Simulation;
 
 /// What the page's insertions start from.
 #[derive(Clone, Copy, Debug)]
@@ -43,22 +48,28 @@ pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<
         shared.started();
         let knobs = shared.knobs();
         let (scene, simulation) = under(&knobs, basis);
-        let (model, _) = model_offline::placement::discretise(&scene)?;
-        let controller = Active {
+        let (model, _) = discretise(&scene)?;
+        let controller = ControllerSetup {
             program: basis.program,
             table: basis.table,
             table_bytes: basis.table_bytes,
             mode: basis.mode,
             hardware: basis.hardware,
-            view: Some(shared),
-            extras: Extras::default(),
+            spectator: Some(view),
         };
         let label = Label { tissue: scene.tissue(), table_tissue: basis.table.tissue.as_str(), strategy: "live" };
-        match active(&model, &controller, &simulation, &label, &|| {}) {
-            Ok((result, _)) => say(&line(number, &knobs, &result)),
-            Err(SimError::Interrupted { .. }) => return Ok(()),
+        let insertion = Insertion {
+            model: &model,
+            simulation: &simulation,
+            label: &label,
+            extras: Extras::default(),
+            progress: &|| {},
+        };
+        match insertion.controlled(&controller) {
+            Ok(measured) => say(&line(number, &knobs, &measured.result)),
+            Err(SimError::Runtime(RuntimeError::Interrupted { .. })) => return Ok(()),
             // A tissue that has no equilibrium any more is something to see, not the end of the view.
-            Err(error @ SimError::Tissue { .. }) => {
+            Err(error @ SimError::Runtime(RuntimeError::World(WorldError::Tissue { .. }))) => {
                 say(&format!("insertion {number}: {error}"));
                 shared.set_paused(true);
             }
@@ -81,11 +92,11 @@ fn under(knobs: &Knobs, basis: &Basis<'_>) -> (Scene, Simulation) {
     let settle_s = simulation.duration_s - simulation.insertion_s;
     simulation.insertion_s /= knobs.needle_speed;
     simulation.duration_s = simulation.insertion_s + settle_s;
-    let loop_args = &mut simulation.loop_args;
-    loop_args.noise = Some(loop_args.noise_for(simulation.depth) * knobs.noise);
+    let loop_settings = &mut simulation.loop_settings;
+    loop_settings.noise = Some(loop_settings.noise_for(simulation.depth) * knobs.noise);
     // The target sensor is never faster than the loop.
-    loop_args.target_rate = knobs.target_rate.min(loop_args.rate);
-    loop_args.latency = knobs.latency;
+    loop_settings.target_rate = knobs.target_rate.min(loop_settings.rate);
+    loop_settings.latency = knobs.latency;
     (scene, simulation)
 }
 
@@ -94,7 +105,8 @@ fn line(number: u64, knobs: &Knobs, result: &StrategyResult) -> String {
     let mut text = format!(
         "insertion {number} (needle × {needle_speed}, sensor {target_rate} Hz, {latency} ms, noise × {noise}, \
          stiffness × {stiffness}): largest error {:.3e}, {}",
-        result.max_orthogonal_error, result.final_state
+        result.max_orthogonal_error,
+        names::mode::name(result.final_state)
     );
     if let Some(timing) = &result.plant_timing {
         text += &format!(

@@ -1,0 +1,159 @@
+//! Everything that ends a command early, with its exit code.
+
+use std::path::PathBuf;
+
+use firmware::SettingsError;
+use firmware::contract::TableError;
+use model_offline::model::ModelError;
+use model_offline::scene::SceneError;
+use model_offline::table::TableBuildError;
+
+use super::board::measure::MeasureError;
+use crate::exchange::LinkError;
+use crate::exchange::board::BoardError;
+use crate::record::error::{FileError, RecordError};
+use crate::runtime::error::RuntimeError;
+use crate::world::error::{OutOfRange, WorldError};
+
+/// Why a command ended early.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[non_exhaustive]
+pub enum SimError {
+    /// The scene is not valid.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Scene(Box<SceneError>),
+    /// A number that an option does not take.
+    #[error(transparent)]
+    OutOfRange(#[from] OutOfRange),
+    /// A combination of options that makes no sense.
+    #[error("{0}")]
+    Usage(String),
+    /// A tissue was asked for that the scene does not have.
+    #[error("the scene {scene} has no inclusion: leave --tissue and --table-tissue away")]
+    NoInclusion {
+        /// Name of the scene.
+        scene: String,
+    },
+    /// An emulated board's time is that of its instructions.
+    #[error("--controller qemu runs in lockstep: add --mode lockstep")]
+    QemuIsLockstepOnly,
+    /// A table cannot be used.
+    #[error("the table {} cannot be used", path.display())]
+    Table {
+        /// File, or what it was computed from.
+        path: PathBuf,
+        /// Why.
+        source: TableError,
+    },
+    /// A table was computed in other units than the scene's.
+    #[error(
+        "the table {} is in {}, the scene in {}: compute it from this scene", path.display(), found.join(" and "),
+        expected.join(" and ")
+    )]
+    TableUnits {
+        /// File.
+        path: PathBuf,
+        /// Units of length and stress in the table.
+        found: [String; 2],
+        /// Those of the scene.
+        expected: [String; 2],
+    },
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A recording cannot be used.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Record(#[from] RecordError),
+    /// The finished run in a directory cannot be understood.
+    #[error("{} does not hold a finished run: {reason}", path.display())]
+    NotARun {
+        /// File.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The tissue cannot be modelled.
+    #[error("the tissue cannot be modelled")]
+    Model(#[from] ModelError),
+    /// The table cannot be computed.
+    #[error("the controller table cannot be computed")]
+    TableBuild(#[from] TableBuildError),
+    /// A run ended early.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Runtime(#[from] RuntimeError),
+    /// The live view cannot be served.
+    #[error("no live view: {0}")]
+    #[diagnostic(help("choose another --view-port, or leave it away for any free one"))]
+    View(String),
+    /// The images on the board cannot be measured, or cost too much.
+    #[error(transparent)]
+    Measure(#[from] MeasureError),
+    /// Some rows of the catalogue of faults do not hold.
+    #[error("{failed} of {rows} rows of the catalogue and {schedules} random schedules failed; see above")]
+    Faults {
+        /// Rows that failed.
+        failed: usize,
+        /// Rows that were tried.
+        rows: usize,
+        /// Random schedules that failed.
+        schedules: usize,
+    },
+}
+
+// What happens inside a run, from wherever it comes, is one kind of error.
+macro_rules! in_a_run {
+    ($($error:ty),*) => {
+        $(impl From<$error> for SimError {
+            fn from(error: $error) -> Self {
+                Self::Runtime(error.into())
+            }
+        })*
+    };
+}
+
+in_a_run!(BoardError, LinkError, SettingsError, WorldError);
+
+impl From<SceneError> for SimError {
+    /// Boxed: errors travel through every result, and this one carries the scene's text.
+    fn from(error: SceneError) -> Self {
+        Self::Scene(error.into())
+    }
+}
+
+impl SimError {
+    /// Exit code of the process: 2 for bad input or usage, 1 for everything else.
+    pub fn exit_code(&self) -> u8 {
+        let is_input = match self {
+            Self::Scene(_)
+            | Self::OutOfRange(_)
+            | Self::Usage(_)
+            | Self::NoInclusion { .. }
+            | Self::QemuIsLockstepOnly
+            | Self::Table { .. }
+            | Self::TableUnits { .. }
+            | Self::NotARun { .. } => true,
+            Self::File(error) => is_unreadable(error),
+            Self::Record(RecordError::File(error)) => is_unreadable(error),
+            Self::Record(RecordError::Recording { .. } | RecordError::Table { .. }) => true,
+            Self::Record(RecordError::Runtime(error)) | Self::Runtime(error) => is_input_of_a_run(error),
+            _ => false,
+        };
+        if is_input { 2 } else { 1 }
+    }
+}
+
+fn is_unreadable(error: &FileError) -> bool {
+    matches!(error, FileError::Read { .. })
+}
+
+fn is_input_of_a_run(error: &RuntimeError) -> bool {
+    matches!(
+        error,
+        RuntimeError::Settings(_)
+            | RuntimeError::Link(LinkError::Name { .. })
+            | RuntimeError::World(WorldError::NoPaddle { .. })
+    )
+}

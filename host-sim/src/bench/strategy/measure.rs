@@ -1,0 +1,105 @@
+//! What an insertion amounts to.
+
+use firmware::Faults;
+use model_offline::model::TissueModel;
+use nalgebra::Vector2;
+
+use crate::bench::result::{Frame, SeriesPoint, StrategyResult};
+use crate::record::export;
+use crate::runtime::mode::RunMode;
+use crate::runtime::plant::PlantLoop;
+use crate::world::tissue::{PlantChoice, TissuePlant};
+use crate::world::truth::Truth;
+use model_offline::output::table_text::hex;
+
+/// Points of a time series in the result.
+const SERIES_POINTS: usize = 500;
+
+/// Pictures of the body along an insertion, and how many node positions all of them may have together.
+const FRAMES: usize = 10;
+const FRAME_NUMBERS: usize = 20_000;
+
+/// What the true motion of the target amounts to.
+pub(super) fn measure(
+    model: &TissueModel,
+    plant: &mut PlantLoop<'_>,
+    mode: RunMode,
+    paddle: Option<u32>,
+    seed: u64,
+) -> StrategyResult {
+    let plant_account = plant.world().plant_account();
+    let deformed_nodes = plant.world().tissue().deformed_nodes();
+    let started_ns = plant.world().needle_started_ns().unwrap_or(0);
+    let needle = &model.scene().needle;
+    let (normal, axis) = (needle.orthogonal(), needle.axis);
+    let truths = plant.truths();
+    let error = |truth: &Truth| Vector2::from(truth.target).dot(&normal);
+    let worst = truths.iter().max_by(|a, b| error(a).abs().total_cmp(&error(b).abs()));
+    let squares: f64 = truths.iter().map(|truth| error(truth).powi(2)).sum();
+    let travel =
+        truths.windows(2).map(|pair| (Vector2::from(pair[1].paddle) - Vector2::from(pair[0].paddle)).norm()).sum();
+    let stride = truths.len().div_ceil(SERIES_POINTS - 1).max(1);
+    let last = truths.len().saturating_sub(1);
+    let series = truths
+        .iter()
+        .enumerate()
+        .filter(|(i, _)| i % stride == 0 || *i == last)
+        .map(|(_, truth)| SeriesPoint {
+            time_s: export::csv::seconds_since(truth.time_ns, started_ns),
+            depth: truth.depth,
+            orthogonal_error: error(truth),
+            axial: Vector2::from(truth.target).dot(&axis),
+            paddle: truth.paddle,
+        })
+        .collect();
+    StrategyResult {
+        mode,
+        paddle,
+        max_orthogonal_error: worst.map_or(0.0, |truth| error(truth).abs()),
+        max_error_depth: worst.map_or(0.0, |truth| truth.depth),
+        rms_orthogonal_error: (squares / truths.len().max(1) as f64).sqrt(),
+        paddle_travel: travel,
+        final_state: None,
+        faults: Faults::NONE,
+        ledger: None,
+        timing: None,
+        plant_timing: None,
+        seed,
+        table_hash: None,
+        scene_hash: hex(&model.scene().hash()),
+        recording: None,
+        csv: None,
+        series,
+        deformed_nodes,
+        frames: frames(model, paddle, truths),
+        plant_step_us: plant.mean_step_us(),
+        plant: plant_account,
+    }
+}
+
+/// The body along the insertion, solved once more after the run at some of its ticks: nothing is added to a loop on
+/// the machine's clock. Ends early where the tissue has no equilibrium with such large steps.
+fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Frame> {
+    let position = paddle.and_then(|index| model.paddle_position(index));
+    let (Ok(mut tissue), Some(last)) = (TissuePlant::new(model, position, PlantChoice::Full), truths.last()) else {
+        return Vec::new();
+    };
+    let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
+    // A millionth of the depth is beyond any drawing.
+    let places = 10f64.powi(6 - last.depth.abs().max(1e-9).log10().floor() as i32);
+    let rounded = |coordinate: f64| (coordinate * places).round() / places;
+    let mut frames = Vec::new();
+    for i in 0..=count {
+        let depth = last.depth * i as f64 / count as f64;
+        // The last one is the end, with what the controller removed after the needle had arrived.
+        let truth = if i == count { last } else { &truths[truths.partition_point(|truth| truth.depth < depth)] };
+        if tissue.step(truth.depth, Vector2::from(truth.paddle)).is_err() {
+            break;
+        }
+        frames.push(Frame {
+            depth: truth.depth,
+            nodes: tissue.deformed_nodes().into_iter().map(|node| node.map(rounded)).collect(),
+        });
+    }
+    frames
+}

@@ -1,0 +1,326 @@
+//! One strategy on one tissue: simulated, measured, recorded.
+
+mod measure;
+
+use std::path::Path;
+use std::time::Duration;
+
+use firmware::contract::Table;
+use iceoryx2::service::ipc;
+use model_offline::model::TissueModel;
+use sha2::{Digest, Sha256};
+
+use self::measure::measure;
+use super::result::{RecordingResult, StrategyResult};
+use crate::bench::error::SimError;
+use crate::exchange::{Departure, PlantPorts, Space};
+use crate::record::error::FileError;
+use crate::record::export::{csv, mcap, paraview};
+use crate::record::files::Artifact;
+use crate::record::recording::{Header, Record, Recording};
+use crate::runtime::accounts::{CommandAccount, ControllerAccounts};
+use crate::runtime::child::{ControllerCall, ControllerProcess};
+use crate::runtime::durations::LoopTiming;
+use crate::runtime::error::RuntimeError;
+use crate::runtime::executor::Hardware;
+use crate::runtime::ledger::LedgerResult;
+use crate::runtime::mode::RunMode;
+use crate::runtime::peer::{Patience, Peer};
+use crate::runtime::plant::free_run::FreeRun;
+use crate::runtime::plant::lockstep::{self, Pace};
+use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
+use crate::runtime::plant::{PlantLoop, published, waiting_command};
+use crate::runtime::signals;
+use crate::runtime::tick::ControllerTick;
+use crate::world::World;
+use crate::world::simulation::Simulation;
+use crate::world::truth::Truth;
+use model_offline::output::table_text::hex;
+
+/// How long the other process may be silent before a run is given up.
+const PEER_TIMEOUT: Duration = Duration::from_secs(30);
+
+/// The same for a controller whose plant a spectator may pause.
+const WATCHED_PATIENCE_S: f64 = 24.0 * 3600.0;
+
+/// A result and the files that belong to it.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// The result.
+    pub result: StrategyResult,
+    /// Its files.
+    pub artifacts: Vec<Artifact>,
+}
+
+/// Name of files of a strategy, unique in a run.
+#[derive(Clone, Debug)]
+pub struct Label<'a> {
+    /// Tissue of the simulation.
+    pub tissue: &'a str,
+    /// Tissue of the table.
+    pub table_tissue: &'a str,
+    /// Strategy.
+    pub strategy: &'a str,
+}
+
+impl Label<'_> {
+    fn file(&self, extension: &str) -> String {
+        format!("{}.{extension}", self.stem())
+    }
+
+    fn stem(&self) -> String {
+        let Self { tissue, table_tissue, strategy } = self;
+        if tissue == table_tissue {
+            format!("{tissue}-{strategy}")
+        } else {
+            format!("{tissue}-with-{table_tissue}-table-{strategy}")
+        }
+    }
+
+    fn title(&self) -> String {
+        format!("{}, table of {}: {}", self.tissue, self.table_tissue, self.strategy)
+    }
+}
+
+/// Files for other tools that are not always written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Extras {
+    /// Controlled insertions as MCAP.
+    pub mcap: bool,
+    /// The body along insertions as VTU series.
+    pub vtu: bool,
+}
+
+/// The controller of a dynamic strategy.
+#[derive(Clone, Copy, Debug)]
+pub struct ControllerSetup<'a> {
+    /// This program, which is also the controller.
+    pub program: &'a Path,
+    /// Its table.
+    pub table: &'a Table<f64, 2>,
+    /// The table as encoded.
+    pub table_bytes: &'a [u8],
+    /// What drives time.
+    pub mode: RunMode,
+    /// What computes the controller's steps.
+    pub hardware: Hardware,
+    /// Somebody who looks on.
+    pub spectator: Option<&'a dyn Spectator>,
+}
+
+/// One insertion that is to be simulated.
+#[derive(Clone, Copy)]
+pub struct Insertion<'a> {
+    /// The tissue.
+    pub model: &'a TissueModel,
+    /// Its numbers.
+    pub simulation: &'a Simulation,
+    /// Names of its files.
+    pub label: &'a Label<'a>,
+    /// Files besides recording and time series.
+    pub extras: Extras,
+    /// Called at every tick.
+    pub progress: &'a dyn Fn(),
+}
+
+impl std::fmt::Debug for Insertion<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Insertion").field("label", &self.label).finish_non_exhaustive()
+    }
+}
+
+/// A controlled insertion that is over.
+struct Finished<'m> {
+    plant: PlantLoop<'m>,
+    accounts: ControllerAccounts,
+    ticks: Vec<ControllerTick>,
+    ledger: LedgerResult,
+    plant_timing: Option<LoopTiming>,
+}
+
+impl<'a> Insertion<'a> {
+    /// Without a paddle, or with one that does not move: nothing to control, time in ticks all the same.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn uncontrolled(&self, paddle: Option<u32>) -> Result<Measured, SimError> {
+        let Self { model, simulation, label, extras, progress } = *self;
+        let mut plant = PlantLoop::new(World::new(model, paddle, simulation)?, simulation);
+        plant.world().start_needle(0);
+        let period_ns = simulation.loop_settings.period_ns();
+        for tick in 0.. {
+            let time_ns = tick * period_ns;
+            if plant.is_over(time_ns) {
+                break;
+            }
+            signals::check()?;
+            plant.solve(tick, time_ns)?;
+            progress();
+        }
+        let mut result = measure(model, &mut plant, RunMode::Lockstep, paddle, simulation.seed);
+        let normal = model.scene().needle.orthogonal();
+        let series = csv::insertion(plant.truths(), &[], &normal, 0);
+        let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
+        result.csv = Some(artifacts[0].name.clone());
+        if extras.vtu {
+            artifacts.extend(paraview::series(model, paddle, plant.truths(), 0, &label.stem()));
+        }
+        Ok(Measured { result, artifacts })
+    }
+
+    /// With the controller as a process of its own.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn controlled(&self, controller: &ControllerSetup<'_>) -> Result<Measured, SimError> {
+        let Self { model, simulation, label, .. } = *self;
+        let space = Space::unique()?;
+        let outcome = self.in_space(controller, &space);
+        space.leave::<ipc::Service>(Departure::Last);
+        let mut run = outcome?;
+
+        let paddle = controller.table.paddle.index;
+        let mut result = measure(model, &mut run.plant, controller.mode, Some(paddle), simulation.seed);
+        let recording = self.recording(controller, &run);
+        let bytes = recording.encode();
+        result.recording = Some(RecordingResult {
+            file: label.file("rec"),
+            sha256: hex(&Sha256::digest(&bytes)),
+            ticks: recording.records.len() as u64,
+        });
+        result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
+        let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);
+        let mut artifacts = self.files(controller, &recording, run.plant.truths(), started_ns)?;
+        artifacts.insert(1, Artifact { name: label.file("rec"), bytes });
+        result.csv = Some(artifacts[0].name.clone());
+        result.final_state = run.accounts.final_state;
+        result.faults = run.accounts.faults;
+        result.ledger = Some(run.ledger);
+        result.timing = run.accounts.timing;
+        result.plant_timing = run.plant_timing;
+        Ok(Measured { result, artifacts })
+    }
+
+    fn recording(&self, controller: &ControllerSetup<'_>, run: &Finished<'_>) -> Recording {
+        let settings = self.simulation.loop_settings.settings(controller.table.validity.depth_end);
+        let header = Header {
+            mode: controller.mode,
+            seed: self.simulation.seed,
+            scene_hash: self.model.scene().hash(),
+            settings,
+            table: controller.table_bytes.to_vec(),
+        };
+        Recording { header, records: merge(&run.ticks, run.plant.truths()) }
+    }
+
+    /// The time series, and what else was asked for.
+    fn files(
+        &self,
+        controller: &ControllerSetup<'_>,
+        recording: &Recording,
+        truths: &[Truth],
+        started_ns: u64,
+    ) -> Result<Vec<Artifact>, SimError> {
+        let Self { model, label, extras, .. } = *self;
+        let normal = model.scene().needle.orthogonal();
+        let series = csv::insertion(truths, &recording.records, &normal, started_ns);
+        let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
+        if extras.mcap {
+            let name = label.file("mcap");
+            let bytes = mcap::encode(recording, controller.table.orthogonal.into()).map_err(|error| {
+                FileError::Write { path: name.clone().into(), source: std::io::Error::other(error) }
+            })?;
+            artifacts.push(Artifact { name, bytes });
+        }
+        if extras.vtu {
+            let paddle = controller.table.paddle.index;
+            artifacts.extend(paraview::series(model, Some(paddle), truths, started_ns, &label.stem()));
+        }
+        Ok(artifacts)
+    }
+
+    /// Starts the controller, runs the insertion, and closes the accounts.
+    fn in_space(&self, controller: &ControllerSetup<'_>, space: &Space) -> Result<Finished<'a>, SimError> {
+        let Self { model, simulation, .. } = *self;
+        let table = space.root().join("controller.table");
+        std::fs::write(&table, controller.table_bytes).map_err(FileError::write(&table))?;
+        let paddle = controller.table.paddle.index;
+        let mut plant = PlantLoop::new(World::new(model, Some(paddle), simulation)?, simulation);
+        let mut ports = PlantPorts::<ipc::Service>::open(space)?;
+        let mut peer = Peer::Child(self.start(controller, space, &table)?);
+        let mut patience = Patience::new(PEER_TIMEOUT);
+        while !ports.has_peer() {
+            patience.wait::<ipc::Service>(&mut peer)?;
+        }
+        ports.connect()?;
+        if let Some(spectator) = controller.spectator {
+            let period_ns = simulation.loop_settings.period_ns();
+            let (mode, title) = (controller.mode, self.label.title());
+            plant.observed_by(spectator.observe(ObservedInsertion { model, paddle, mode, period_ns, title }));
+        }
+        let (mut commands, plant_timing) = self.drive(&mut plant, &mut ports, &mut peer, controller.mode)?;
+        let Peer::Child(child) = peer else {
+            unreachable!("the peer of a run is its child");
+        };
+        let (accounts, ticks) = child.finish()?;
+        commands.end(waiting_command(&mut ports)?);
+        let ledger = accounts.ledger(published(&ports), &commands);
+        Ok(Finished { plant, accounts, ticks, ledger, plant_timing })
+    }
+
+    fn start(
+        &self,
+        controller: &ControllerSetup<'_>,
+        space: &Space,
+        table: &Path,
+    ) -> Result<ControllerProcess, RuntimeError> {
+        let patience_s = match controller.spectator {
+            Some(_) => WATCHED_PATIENCE_S,
+            None => PEER_TIMEOUT.as_secs_f64(),
+        };
+        ControllerProcess::start(&ControllerCall {
+            program: controller.program,
+            table,
+            space,
+            mode: controller.mode,
+            hardware: controller.hardware,
+            loop_settings: self.simulation.loop_settings,
+            depth: self.simulation.depth,
+            capacity: self.simulation.ticks(),
+            patience_s,
+        })
+    }
+
+    fn drive(
+        &self,
+        plant: &mut PlantLoop<'_>,
+        ports: &mut PlantPorts<ipc::Service>,
+        peer: &mut Peer,
+        mode: RunMode,
+    ) -> Result<(CommandAccount, Option<LoopTiming>), RuntimeError> {
+        let settings = &self.simulation.loop_settings;
+        let (rate_hz, period_ns) = (settings.rate, settings.period_ns());
+        match mode {
+            RunMode::Lockstep => {
+                let pace = Pace { period_ns, timeout: PEER_TIMEOUT };
+                Ok((lockstep::run(plant, ports, peer, &pace, self.progress)?, None))
+            }
+            RunMode::FreeRun => {
+                let free_run = FreeRun { ports, peer, rate_hz, period_ns, succession: None };
+                let (account, timing) = free_run.run(plant, self.progress)?;
+                Ok((account, Some(timing)))
+            }
+        }
+    }
+}
+
+/// Both sides of every tick; the truth is that of the plant's tick of the same number.
+fn merge(ticks: &[ControllerTick], truths: &[Truth]) -> Vec<Record> {
+    ticks
+        .iter()
+        .map(|tick| Record {
+            tick: *tick,
+            truth: truths.binary_search_by_key(&tick.inputs.tick, |truth| truth.tick).ok().map(|found| truths[found]),
+        })
+        .collect()
+}

@@ -1,0 +1,144 @@
+//! `host-sim run`: the main job.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::SimError;
+use host_sim::bench::comparison::{Comparison, ComparisonOptions, EncodedTable};
+use host_sim::bench::strategy::Extras;
+use host_sim::bench::tissue::Tissue;
+use host_sim::record::files::write_json;
+use host_sim::report::directory::{check_directory, write_run};
+use host_sim::report::summary::summary;
+use host_sim::runtime::error::RuntimeError;
+use host_sim::runtime::executor::{Hardware, ScalarChoice};
+use host_sim::runtime::mode::RunMode;
+use host_sim::runtime::plant::observer::Spectator;
+use host_sim::runtime::signals;
+use host_sim::view::{self, Basis, Knobs, View};
+use host_sim::world::loop_settings::LoopSettings;
+
+use super::progress::Bar;
+use super::world_args::WorldArgs;
+
+/// Options of `run`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct RunArgs {
+    /// The simulated world.
+    #[command(flatten)]
+    pub(crate) world: WorldArgs,
+    /// Tissue of the simulation [default: both, and the inclusion with a table that does not know it]
+    #[arg(long, value_enum)]
+    pub(crate) tissue: Option<Tissue>,
+    /// Tissue that the planner and the table believe in [default: the simulation's]
+    #[arg(long, value_enum)]
+    pub(crate) table_tissue: Option<Tissue>,
+    /// Controller table to use instead of computing one
+    #[arg(long, value_name = "FILE", conflicts_with = "table_tissue")]
+    pub(crate) table: Option<PathBuf>,
+    /// What drives time [default: lockstep, then the dynamic strategy once more in free-run]
+    #[arg(long, value_enum)]
+    pub(crate) mode: Option<RunMode>,
+    /// What computes the controller's steps: this machine, or the bare-metal image on a Cortex-M7 in QEMU (in lockstep)
+    #[arg(long = "controller", value_enum, default_value_t)]
+    pub(crate) hardware: Hardware,
+    /// Number type that the controller computes in
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) scalar: ScalarChoice,
+    /// Directory for the report, created whole
+    #[arg(long, default_value = "stillpoint-report", value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Serve a page on this machine's loopback that shows the runs with a controller; afterwards go on inserting under
+    /// the page's knobs until it says finish, or Ctrl-C
+    #[arg(long)]
+    pub(crate) view: bool,
+    /// Port of the page [default: any free one]
+    #[arg(long, value_name = "PORT", requires = "view", default_value_t = 0, hide_default_value = true)]
+    pub(crate) view_port: u16,
+    /// Also write every controlled insertion as MCAP, for Foxglove and Lichtblick
+    #[arg(long)]
+    pub(crate) mcap: bool,
+    /// Also write the body along every insertion as a VTU series with a .pvd, for ParaView
+    #[arg(long)]
+    pub(crate) vtu: bool,
+    /// Also write the result here, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Neither progress nor summary
+    #[arg(long)]
+    pub(crate) quiet: bool,
+    /// Threads for placement and for strategies without a controller [default: all processors]
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+}
+
+impl RunArgs {
+    fn options(&self) -> Result<ComparisonOptions, SimError> {
+        let mut options = ComparisonOptions::new(std::env::current_exe().map_err(RuntimeError::Spawn)?);
+        options.tissue = self.tissue;
+        options.table_tissue = self.table_tissue;
+        options.table.clone_from(&self.table);
+        options.mode = self.mode;
+        options.hardware = self.hardware;
+        options.scalar = self.scalar;
+        options.extras = Extras { mcap: self.mcap, vtu: self.vtu };
+        options.threads = self.threads.unwrap_or(options.threads).max(1);
+        Ok(options)
+    }
+}
+
+/// Runs everything that was asked for and writes the report.
+///
+/// # Errors
+/// [`SimError`]; nothing is written then.
+pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
+    signals::install();
+    let scene = args.world.scene()?;
+    let simulation = args.world.simulation(&scene)?;
+    check_directory(&args.out)?;
+    let bar = Bar::new(args.quiet);
+    let comparison = Comparison::prepare(scene, simulation, args.options()?, &bar)?;
+    let view = args.view.then(|| live_view(args, &simulation.loop_settings)).transpose()?;
+    let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
+    bar.finish();
+    write_run(&args.out, &compared.result, compared.artifacts)?;
+    if let Some(path) = &args.json {
+        write_json(path, &compared.result)?;
+    }
+    if !args.quiet {
+        print!("{}", summary(&compared.result, &args.out));
+    }
+    view.map_or(Ok(()), |view| go_on(args, &view, &comparison))
+}
+
+/// Starts the page and says where it is.
+fn live_view(args: &RunArgs, loop_settings: &LoopSettings) -> Result<View, SimError> {
+    let LoopSettings { target_rate, latency, .. } = *loop_settings;
+    let knobs = Knobs { needle_speed: 1.0, target_rate, latency, noise: 1.0, stiffness: 1.0 };
+    let view = View::start(args.view_port, knobs)?;
+    // The one line that even a quiet run must say: without it nobody gets in.
+    println!("Live view: {}", view.address());
+    Ok(view)
+}
+
+/// Goes on inserting under the page's knobs.
+fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(), SimError> {
+    let Some((scene, EncodedTable { table, bytes })) = comparison.last_case() else { return Ok(()) };
+    let options = comparison.options();
+    let basis = Basis {
+        program: &options.program,
+        scene,
+        table,
+        table_bytes: bytes,
+        simulation: *comparison.simulation(),
+        mode: args.mode.unwrap_or(RunMode::Lockstep),
+        hardware: args.hardware,
+    };
+    let say = |line: &str| {
+        if !args.quiet {
+            println!("{line}");
+        }
+    };
+    say(&format!("\nGoing on under the knobs of {} (its Finish, or Ctrl-C, ends it)", view.address()));
+    view::insertions(view, &basis, &say)
+}

@@ -1,0 +1,77 @@
+//! `host-sim timing`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use host_sim::SimError;
+use host_sim::bench::timing::{TimingOptions, TimingResult, timing as measure};
+use host_sim::record::error::FileError;
+use host_sim::record::files::{write_bytes, write_json};
+use host_sim::report::timing_histograms;
+use host_sim::report::timing_summary::timing_summary;
+use host_sim::runtime::clock::FIFO_PRIORITY;
+use host_sim::runtime::error::RuntimeError;
+use host_sim::runtime::signals;
+use host_sim::world::error::positive;
+
+/// Options of `timing`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TimingArgs {
+    /// Rate of the loop, Hz
+    #[arg(long, default_value_t = 1000.0, value_name = "HZ")]
+    pub(crate) rate: f64,
+    /// Duration of the periodic measurement, s
+    #[arg(long, default_value_t = 10.0, value_name = "S")]
+    pub(crate) seconds: f64,
+    /// Processor of the loop; the controller process stays on the next one [default: left to the kernel]
+    #[arg(long, value_name = "N")]
+    pub(crate) cpu: Option<usize>,
+    /// Real-time priority to ask for, 1 to 99; 0: the ordinary policy
+    #[arg(long, default_value_t = FIFO_PRIORITY, value_name = "P", value_parser = clap::value_parser!(u8).range(0..=99))]
+    pub(crate) priority: u8,
+    /// Also find the highest rate at which no deadline is missed
+    #[arg(long)]
+    pub(crate) sweep: bool,
+    /// Also write the result here, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub(crate) json: Option<PathBuf>,
+    /// Write timing.json and histograms into this directory
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Measures and prints.
+///
+/// # Errors
+/// [`SimError`].
+pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
+    signals::install();
+    positive("--rate", args.rate)?;
+    positive("--seconds", args.seconds)?;
+    if let Some(directory) = &args.out {
+        std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
+    }
+    let result = measure(&TimingOptions {
+        rate: args.rate,
+        seconds: args.seconds,
+        cpu: args.cpu,
+        priority: args.priority,
+        sweep: args.sweep,
+        program: std::env::current_exe().map_err(RuntimeError::Spawn)?,
+    })?;
+    print!("{}", timing_summary(&result, args.priority));
+    write(args, &result)
+}
+
+fn write(args: &TimingArgs, result: &TimingResult) -> Result<(), SimError> {
+    if let Some(directory) = &args.out {
+        write_json(&directory.join("timing.json"), result)?;
+        let loops =
+            [("empty loop", &result.empty), ("controller's loop", &result.controller), ("exchange", &result.exchange)];
+        write_bytes(&directory.join("timing.svg"), timing_histograms(&loops).as_bytes())?;
+    }
+    if let Some(path) = &args.json {
+        write_json(path, result)?;
+    }
+    Ok(())
+}

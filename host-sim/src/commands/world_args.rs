@@ -1,0 +1,85 @@
+//! Options of the simulated world, the same for `run` and `plant`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::SimError;
+use host_sim::world::actuator::ActuatorModel;
+use host_sim::world::error::{not_negative, positive};
+use host_sim::world::loop_settings::LoopSettings;
+use host_sim::world::simulation::Simulation;
+use host_sim::world::tissue::PlantChoice;
+use model_offline::scene::Scene;
+
+/// Time simulated after the needle has arrived, s: long enough for the feedback to remove what is left.
+const SETTLE_S: f64 = 0.5;
+
+/// Options of the simulated world.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct WorldArgs {
+    /// Scene file, or the name of a bundled scene [default: paper]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Rates, latency, noise.
+    #[command(flatten)]
+    pub(crate) loop_settings: LoopSettings,
+    /// Duration of the insertion, s
+    #[arg(long, default_value_t = 5.0, value_name = "S")]
+    pub(crate) insertion_time: f64,
+    /// Time simulated from the start of the needle, s [default: the insertion and half a second]
+    #[arg(long, value_name = "S")]
+    pub(crate) duration: Option<f64>,
+    /// Seed of the sensors' noise
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Time constant of the paddle's lag, ms
+    #[arg(long, default_value_t = 0.0, value_name = "MS")]
+    pub(crate) paddle_lag: f64,
+    /// Ticks that a command waits before the paddle acts
+    #[arg(long, default_value_t = 0, value_name = "TICKS")]
+    pub(crate) paddle_delay: u32,
+    /// What answers for the tissue at every tick
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) plant: PlantChoice,
+    /// Part of its command that the paddle reaches
+    #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
+    pub(crate) paddle_gain: f64,
+}
+
+impl WorldArgs {
+    /// Reads the scene.
+    ///
+    /// # Errors
+    /// [`SimError::Scene`].
+    pub(crate) fn scene(&self) -> Result<Scene, SimError> {
+        let path = self.scene.as_deref().unwrap_or(Path::new("paper"));
+        Ok(Scene::read(path)?)
+    }
+
+    /// Checks the numbers and combines them with the scene's.
+    ///
+    /// # Errors
+    /// [`SimError::Usage`] names the option.
+    pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
+        self.loop_settings.check()?;
+        positive("--insertion-time", self.insertion_time)?;
+        let duration_s = self.duration.unwrap_or(self.insertion_time + SETTLE_S);
+        positive("--duration", duration_s)?;
+        not_negative("--paddle-lag", self.paddle_lag)?;
+        not_negative("--paddle-gain", self.paddle_gain)?;
+        Ok(Simulation {
+            loop_settings: self.loop_settings,
+            insertion_s: self.insertion_time,
+            duration_s,
+            depth: scene.needle.depth,
+            actuator: ActuatorModel {
+                max_rate: scene.actuator.max_rate,
+                lag_s: self.paddle_lag * 1e-3,
+                delay_ticks: self.paddle_delay,
+                gain: self.paddle_gain,
+            },
+            seed: self.seed,
+            plant: self.plant,
+        })
+    }
+}

@@ -1,0 +1,51 @@
+//! Somebody who looks on while a plant runs: the loop tells, and never waits for an answer.
+
+use model_offline::model::TissueModel;
+
+use crate::runtime::mode::RunMode;
+use crate::world::tissue::TissuePlant;
+use crate::world::truth::Truth;
+
+/// A moment of the simulation, as the loop knows it.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// What is true.
+    pub truth: Truth,
+    /// Time since the start of the needle, s.
+    pub time_s: f64,
+    /// When the tick began to be solved, ns of the steady clock.
+    pub began_ns: u64,
+}
+
+/// Looks on.
+pub trait Observer: std::fmt::Debug {
+    /// A moment that may be looked at; must not wait.
+    fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment);
+
+    /// Whether the insertion is to end now.
+    fn ends_early(&self) -> bool;
+
+    /// Called between two ticks of lockstep, where time may be held: no clock is in the record.
+    fn hold(&mut self);
+}
+
+/// An insertion that is about to begin.
+#[derive(Clone, Debug)]
+pub struct ObservedInsertion<'m> {
+    /// Its tissue.
+    pub model: &'m TissueModel,
+    /// Index of the attached paddle.
+    pub paddle: u32,
+    /// What drives time.
+    pub mode: RunMode,
+    /// Period of the loop, ns.
+    pub period_ns: u64,
+    /// What it is about, in a line.
+    pub title: String,
+}
+
+/// Looks on at one insertion after another.
+pub trait Spectator: std::fmt::Debug {
+    /// Begins to look on.
+    fn observe(&self, insertion: ObservedInsertion<'_>) -> Box<dyn Observer>;
+}

@@ -1,0 +1,146 @@
+//! The plant in a process of its own, with a controller that somebody else starts.
+
+use std::time::Duration;
+
+use iceoryx2::service::ipc;
+use nalgebra::Vector2;
+use serde::{Deserialize, Serialize};
+
+use super::free_run::{FreeRun, Succession};
+use super::lockstep::Pace;
+use super::{PlantLoop, lockstep, published};
+use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
+use crate::runtime::accounts::CommandAccount;
+use crate::runtime::durations::LoopTiming;
+use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::mode::RunMode;
+use crate::runtime::peer::{Patience, Peer};
+use crate::world::loop_settings::LoopSettings;
+
+/// What `plant --json` writes.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PlantResult {
+    /// Ticks simulated.
+    pub ticks: u64,
+    /// Controllers that have come.
+    pub controllers: u64,
+    /// Needle, target and paddle samples published.
+    pub published: [u64; 3],
+    /// Commands executed.
+    pub commands: u64,
+    /// Commands replaced by newer ones before the plant looked.
+    pub overwritten: u64,
+    /// Largest orthogonal target displacement, length.
+    pub largest_error: f64,
+    /// Largest motion of the paddle per tick, length.
+    pub largest_step: f64,
+    /// Timing of the loop; free-run only.
+    pub timing: Option<LoopTiming>,
+}
+
+/// How a plant is served by whatever controller comes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visit {
+    /// What drives time.
+    pub mode: RunMode,
+    /// Rates, latency, noise.
+    pub loop_settings: LoopSettings,
+    /// Silence after which the controller is given up.
+    pub timeout: Duration,
+    /// What the death of a controller means; free-run only.
+    pub on_death: OnDeath,
+}
+
+/// What the death of a controller means to the plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OnDeath {
+    /// The end of the run.
+    Stop,
+    /// The paddle stays where it is until the next controller comes.
+    AwaitNext,
+}
+
+/// Commands, controllers, timing, samples published.
+type Inserted = (CommandAccount, u64, Option<LoopTiming>, [u64; 3]);
+
+/// Runs one insertion. Leaves nothing behind in shared memory, however it ends. `orthogonal` is n.
+///
+/// # Errors
+/// [`RuntimeError`].
+pub fn serve(
+    plant: &mut PlantLoop<'_>,
+    space: &Space,
+    visit: &Visit,
+    orthogonal: &Vector2<f64>,
+) -> Result<PlantResult, RuntimeError> {
+    let outcome = insertion(plant, space, visit);
+    space.leave::<ipc::Service>(Departure::Last);
+    let (account, controllers, timing, published) = outcome?;
+    let truths = plant.truths();
+    let error = |target: [f64; 2]| Vector2::from(target).dot(orthogonal).abs();
+    let [commands, overwritten] = account.counts();
+    Ok(PlantResult {
+        ticks: truths.len() as u64,
+        controllers,
+        published,
+        commands,
+        overwritten,
+        largest_error: truths.iter().map(|truth| error(truth.target)).fold(0.0, f64::max),
+        largest_step: truths
+            .windows(2)
+            .map(|pair| {
+                let step = (Vector2::from(pair[1].paddle) - Vector2::from(pair[0].paddle)).norm();
+                step / (pair[1].tick - pair[0].tick) as f64
+            })
+            .fold(0.0, f64::max),
+        timing,
+    })
+}
+
+fn insertion(plant: &mut PlantLoop<'_>, space: &Space, visit: &Visit) -> Result<Inserted, RuntimeError> {
+    let mut ports = PlantPorts::<ipc::Service>::open(space)?;
+    let mut peer = Peer::Elsewhere(Box::new(space.clone()), Role::Controller);
+    let mut patience = Patience::new(visit.timeout);
+    while !ports.has_peer() {
+        patience.wait::<ipc::Service>(&mut peer)?;
+    }
+    ports.connect()?;
+    let outcome = drive(plant, space, visit, &mut ports, &mut peer);
+    if outcome.is_err() {
+        // Whatever has happened, the controller need not wait for its end.
+        let _ = ports.clock.send(ClockFrame::new(ClockKind::Stop, 0, 0));
+    }
+    let (account, controllers, timing) = outcome?;
+    // The controller closes its accounts with what still waits: it leaves first.
+    let mut patience = Patience::new(visit.timeout);
+    while ports.command.has_writer() {
+        if patience.wait::<ipc::Service>(&mut peer).is_err() {
+            break;
+        }
+    }
+    Ok((account, controllers, timing, published(&ports)))
+}
+
+fn drive(
+    plant: &mut PlantLoop<'_>,
+    space: &Space,
+    visit: &Visit,
+    ports: &mut PlantPorts<ipc::Service>,
+    peer: &mut Peer,
+) -> Result<(CommandAccount, u64, Option<LoopTiming>), RuntimeError> {
+    let period_ns = visit.loop_settings.period_ns();
+    match visit.mode {
+        RunMode::Lockstep => {
+            let pace = Pace { period_ns, timeout: visit.timeout };
+            Ok((lockstep::run(plant, ports, peer, &pace, &|| {})?, 1, None))
+        }
+        RunMode::FreeRun => {
+            let rate_hz = visit.loop_settings.rate;
+            let mut succession = Succession::new(space);
+            let kept = (visit.on_death == OnDeath::AwaitNext).then_some(&mut succession);
+            let free_run = FreeRun { ports, peer, rate_hz, period_ns, succession: kept };
+            let (account, timing) = free_run.run(plant, &|| {})?;
+            Ok((account, succession.controllers, Some(timing)))
+        }
+    }
+}

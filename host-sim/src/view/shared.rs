@@ -1,0 +1,241 @@
+//! What the loop and the view share.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use model_offline::model::TissueModel;
+use serde::{Deserialize, Serialize};
+
+use crate::runtime::mode::RunMode;
+
+/// Time between two pictures: 30 a second.
+pub(super) const FRAME_NS: u64 = 33_333_333;
+
+/// What the page lets its reader turn. Takes effect with the next insertion.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Knobs {
+    /// Speed of the needle, times that of the command line.
+    pub needle_speed: f64,
+    /// Rate of the target sensor, Hz.
+    pub target_rate: f64,
+    /// Latency of the target sensor, ms.
+    pub latency: f64,
+    /// Noise of the target sensor, times that of the command line.
+    pub noise: f64,
+    /// Stiffness of the inclusions, times that of the scene; the controller's table does not know of it.
+    pub stiffness: f64,
+}
+
+impl Knobs {
+    /// Checks the numbers.
+    ///
+    /// # Errors
+    /// [`KnobOutOfRange`] names the knob.
+    pub fn check(&self) -> Result<(), KnobOutOfRange> {
+        let ranges = [
+            ("needle_speed", self.needle_speed, 0.1, 10.0),
+            ("target_rate", self.target_rate, 1.0, 1000.0),
+            ("latency", self.latency, 0.0, 500.0),
+            ("noise", self.noise, 0.0, 1000.0),
+            ("stiffness", self.stiffness, 1e-3, 1e3),
+        ];
+        match ranges.iter().find(|(_, value, low, high)| !(*low..=*high).contains(value)) {
+            Some(&(knob, value, low, high)) => Err(KnobOutOfRange { knob, value, low, high }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A knob cannot be turned that far.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{knob} is {value}; it must be from {low} to {high}")]
+pub struct KnobOutOfRange {
+    /// Its name.
+    pub knob: &'static str,
+    /// What was asked for.
+    pub value: f64,
+    /// Least value.
+    pub low: f64,
+    /// Largest value.
+    pub high: f64,
+}
+
+/// The newest state that the loop has left.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ViewState {
+    /// Counts states; 0: none yet.
+    pub(super) number: u64,
+    /// Counts insertions: a new one has new geometry.
+    pub(super) insertion: u64,
+    pub(super) title: String,
+    pub(super) mode: Option<RunMode>,
+    pub(super) model: Option<Arc<TissueModel>>,
+    pub(super) paddle_index: u32,
+    pub(super) coefficients: Vec<f64>,
+    pub(super) time_s: f64,
+    pub(super) tick: u64,
+    pub(super) depth: f64,
+    pub(super) target: [f64; 2],
+    pub(super) paddle: [f64; 2],
+    /// Longest solve since the state before, ns.
+    pub(super) solve_ns: u64,
+    /// Latest start of a tick after its release since the state before, ns; free-run only.
+    pub(super) late_ns: u64,
+}
+
+/// Everything that the loop and the view's threads share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    state: Mutex<ViewState>,
+    knobs: Mutex<Knobs>,
+    paused: AtomicBool,
+    steps: AtomicU64,
+    /// Simulated per real time, in thousandths; 0: as fast as it goes.
+    pace: AtomicU64,
+    restart: AtomicBool,
+    finish: AtomicBool,
+    /// Restarts are for the view's own insertions, not for the comparison of strategies.
+    may_restart: AtomicBool,
+    /// States that were dropped because a view thread held the last one.
+    dropped: AtomicU64,
+}
+
+/// A poisoned lock holds data that is still whole: every write to it is a plain copy.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Shared {
+    pub(super) fn new(knobs: Knobs) -> Self {
+        Self {
+            state: Mutex::default(),
+            knobs: Mutex::new(knobs),
+            paused: AtomicBool::new(false),
+            steps: AtomicU64::new(0),
+            pace: AtomicU64::new(1000),
+            restart: AtomicBool::new(false),
+            finish: AtomicBool::new(false),
+            may_restart: AtomicBool::new(false),
+            dropped: AtomicU64::new(0),
+        }
+    }
+
+    /// The knobs as they are now.
+    pub(super) fn knobs(&self) -> Knobs {
+        *lock(&self.knobs)
+    }
+
+    pub(super) fn turn(&self, knobs: Knobs) {
+        *lock(&self.knobs) = knobs;
+        self.restart.store(true, Ordering::Release);
+    }
+
+    pub(super) fn set_paused(&self, paused: bool) {
+        self.paused.store(paused, Ordering::Release);
+    }
+
+    pub(super) fn is_paused(&self) -> bool {
+        self.paused.load(Ordering::Acquire)
+    }
+
+    pub(super) fn step(&self, ticks: u64) {
+        self.set_paused(true);
+        self.steps.fetch_add(ticks, Ordering::AcqRel);
+    }
+
+    pub(super) fn set_pace(&self, thousandths: u64) {
+        self.pace.store(thousandths, Ordering::Release);
+    }
+
+    pub(super) fn pace(&self) -> u64 {
+        self.pace.load(Ordering::Acquire)
+    }
+
+    pub(super) fn finish(&self) {
+        self.finish.store(true, Ordering::Release);
+        self.set_paused(false);
+    }
+
+    pub(super) fn restart(&self) {
+        self.restart.store(true, Ordering::Release);
+        self.set_paused(false);
+    }
+
+    /// Whether the page has asked for the end of the view.
+    pub(super) fn is_finished(&self) -> bool {
+        self.finish.load(Ordering::Acquire)
+    }
+
+    /// From here on the page may end insertions early.
+    pub(super) fn allow_restarts(&self) {
+        self.may_restart.store(true, Ordering::Release);
+    }
+
+    /// Knobs only take effect at the start of an insertion: what they asked for is being done.
+    pub(super) fn started(&self) {
+        self.restart.store(false, Ordering::Release);
+    }
+
+    /// Whether the present insertion is to end early.
+    pub(super) fn ends_early(&self) -> bool {
+        self.may_restart.load(Ordering::Acquire)
+            && (self.restart.load(Ordering::Acquire) || self.finish.load(Ordering::Acquire))
+    }
+
+    /// States that were dropped because somebody was reading.
+    pub(super) fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// The newest state, if there is one after `number` or of another insertion.
+    pub(super) fn newer(&self, insertion: u64, number: u64) -> Option<ViewState> {
+        let state = lock(&self.state);
+        let is_new = state.number > number || state.insertion != insertion;
+        (state.number > 0 && is_new).then(|| state.clone())
+    }
+
+    /// Takes one of the single steps that were asked for; whether there was one.
+    pub(super) fn take_step(&self) -> bool {
+        self.steps.fetch_update(Ordering::AcqRel, Ordering::Acquire, |left| left.checked_sub(1)).is_ok()
+    }
+
+    /// The state, to be replaced at the start of an insertion; waits for a reader.
+    pub(super) fn state(&self) -> MutexGuard<'_, ViewState> {
+        lock(&self.state)
+    }
+
+    /// The state, to be renewed; none, and counted, while somebody reads it.
+    pub(super) fn try_state(&self) -> Option<MutexGuard<'_, ViewState>> {
+        let state = self.state.try_lock().ok();
+        if state.is_none() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        state
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KNOBS: Knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
+
+    #[test]
+    fn knobs_out_of_range_are_refused_by_name() {
+        assert!(KNOBS.check().is_ok());
+        assert!(Knobs { latency: -1.0, ..KNOBS }.check().unwrap_err().to_string().starts_with("latency"));
+        assert!(Knobs { noise: f64::NAN, ..KNOBS }.check().is_err());
+    }
+
+    #[test]
+    fn restarts_wait_until_they_are_allowed() {
+        let shared = Shared::new(KNOBS);
+        shared.turn(Knobs { noise: 2.0, ..KNOBS });
+        assert!(!shared.ends_early());
+        shared.allow_restarts();
+        assert!(shared.ends_early());
+        shared.started();
+        assert!(!shared.ends_early() && shared.knobs().noise == 2.0);
+    }
+}

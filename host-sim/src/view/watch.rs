@@ -1,0 +1,162 @@
+//! The loop's end: leaves a state for the page now and then, and holds time where the page wants it held.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use super::shared::{FRAME_NS, Shared, ViewState};
+use crate::runtime::clock::{now_ns, sleep_until};
+use crate::runtime::mode::RunMode;
+use crate::runtime::plant::observer::{Moment, ObservedInsertion, Observer};
+use crate::runtime::signals;
+use crate::world::tissue::TissuePlant;
+
+/// How long a paused loop sleeps between two looks.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// Lockstep that falls behind the clock on the wall by more than this does not catch up, ns.
+const CATCH_UP_NS: u64 = 200_000_000;
+
+/// Keeps lockstep from running ahead of the clock on the wall.
+#[derive(Debug)]
+struct Pacing {
+    period_ns: u64,
+    next_ns: u64,
+}
+
+impl Pacing {
+    /// For ticks of this period, ns.
+    fn new(period_ns: u64) -> Self {
+        Self { period_ns, next_ns: now_ns() }
+    }
+
+    fn restart(&mut self) {
+        self.next_ns = now_ns();
+    }
+
+    fn keep(&mut self, thousandths: u64) {
+        if thousandths == 0 {
+            return;
+        }
+        self.next_ns += self.period_ns * 1000 / thousandths;
+        let now = now_ns();
+        if self.next_ns > now {
+            sleep_until(self.next_ns);
+        } else if now - self.next_ns > CATCH_UP_NS {
+            // Too slow for this pace: what is lost stays lost.
+            self.next_ns = now;
+        }
+    }
+}
+
+/// Looks on at one insertion.
+#[derive(Debug)]
+pub(super) struct Watch {
+    shared: Arc<Shared>,
+    mode: RunMode,
+    pacing: Pacing,
+    due_ns: u64,
+    solve_ns: u64,
+    late_ns: u64,
+}
+
+impl Watch {
+    /// Begins an insertion.
+    pub(super) fn new(shared: &Arc<Shared>, insertion: ObservedInsertion<'_>) -> Self {
+        let ObservedInsertion { model, paddle, mode, period_ns, title } = insertion;
+        {
+            let mut state = shared.state();
+            *state = ViewState {
+                insertion: state.insertion + 1,
+                number: state.number,
+                title,
+                mode: Some(mode),
+                model: Some(Arc::new(model.clone())),
+                paddle_index: paddle,
+                coefficients: vec![0.0; model.dofs()],
+                ..ViewState::default()
+            };
+        }
+        let pacing = Pacing::new(period_ns);
+        Self { shared: Arc::clone(shared), mode, pacing, due_ns: 0, solve_ns: 0, late_ns: 0 }
+    }
+}
+
+impl Observer for Watch {
+    /// Leaves a state if one is due and nobody reads the last one. Never waits.
+    fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment) {
+        let now = now_ns();
+        self.solve_ns = self.solve_ns.max(now.saturating_sub(moment.began_ns));
+        if self.mode == RunMode::FreeRun {
+            self.late_ns = self.late_ns.max(moment.began_ns.saturating_sub(moment.truth.time_ns));
+        }
+        // A paused simulation shows every single step.
+        if now < self.due_ns && !self.shared.is_paused() {
+            return;
+        }
+        let Some(mut state) = self.shared.try_state() else { return };
+        self.due_ns = now + FRAME_NS;
+        tissue.copy_coefficients(&mut state.coefficients);
+        state.number += 1;
+        state.time_s = moment.time_s;
+        state.tick = moment.truth.tick;
+        state.depth = moment.truth.depth;
+        state.target = moment.truth.target;
+        state.paddle = moment.truth.paddle;
+        state.solve_ns = std::mem::take(&mut self.solve_ns);
+        state.late_ns = std::mem::take(&mut self.late_ns);
+    }
+
+    /// Whether the page wants the insertion to end now.
+    fn ends_early(&self) -> bool {
+        self.shared.ends_early()
+    }
+
+    /// Holds time while paused, and to keep pace with the clock on the wall.
+    fn hold(&mut self) {
+        while self.shared.is_paused() && !self.shared.ends_early() && signals::check().is_ok() {
+            let step = self.shared.take_step();
+            self.pacing.restart();
+            if step {
+                return;
+            }
+            std::thread::sleep(PAUSE);
+        }
+        self.pacing.keep(self.shared.pace());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::view::Knobs;
+    use crate::world::tissue::PlantChoice;
+    use crate::world::truth::Truth;
+    use model_offline::model::TissueModel;
+    use model_offline::scene::Scene;
+
+    #[test]
+    fn the_loop_never_waits_for_a_reader() {
+        let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+        let tissue = TissuePlant::new(&model, None, PlantChoice::Full).unwrap();
+        let knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
+        let shared = Arc::new(Shared::new(knobs));
+        let insertion = ObservedInsertion {
+            model: &model,
+            paddle: 0,
+            mode: RunMode::Lockstep,
+            period_ns: 1_000_000,
+            title: String::new(),
+        };
+        let mut watch = Watch::new(&shared, insertion);
+        let truth = Truth { tick: 1, time_ns: 0, depth: 0.0, target: [0.0; 2], paddle: [0.0; 2] };
+        let moment = Moment { truth, time_s: 0.0, began_ns: 0 };
+        let reader = shared.state();
+        watch.offer(&tissue, &moment);
+        assert_eq!((reader.number, shared.dropped()), (0, 1));
+        drop(reader);
+        watch.offer(&tissue, &moment);
+        let state = shared.newer(0, 0).unwrap();
+        assert_eq!((state.number, state.tick, state.coefficients.len()), (1, 1, model.dofs()));
+        assert!(shared.newer(state.insertion, state.number).is_none());
+    }
+}
