@@ -1,4 +1,6 @@
-//! What the verification suites share: reproducible scatter, and bodies to test on.
+//! What the verification suites share: reproducible scatter, bodies to test on, and golden data.
+
+pub mod continuum;
 
 use model_offline::geometry::{Point, Point2, Polygon};
 

@@ -18,12 +18,14 @@ fn newton_converges_quadratically() {
     let model = model(Integration::Scni);
     let mut body = model.body(Some(2), NewtonSettings { residual_tolerance: 1e-13, ..Default::default() }).unwrap();
     body.drive(0.02, Vector2::zeros()).unwrap();
-    let history: Vec<f64> =
-        body.equilibrium().residual_history().iter().copied().filter(|r| *r < 0.1 && *r > 1e-12).collect();
-    assert!(history.len() >= 2, "{history:?}");
-    for pair in history.windows(2) {
-        // log r grows by about two per iteration; rounding ends it.
-        assert!(pair[1] < 10.0 * pair[0].powf(1.7) || pair[1] < 1e-11, "{history:?}");
+    let history = body.equilibrium().residual_history();
+    // From where the residual, over the reaction, is small to where rounding ends it.
+    let tail: Vec<&[f64]> = history.windows(2).filter(|pair| pair[0] < 0.1 && pair[0] > 1e-6).collect();
+    println!("{history:?}");
+    assert!(tail.len() >= 2, "{history:?}");
+    for pair in tail {
+        // A tangent that is wrong by a per cent leaves a per cent of the residual: far more than its square.
+        assert!(pair[1] <= pair[0] * pair[0], "{} after {}: {history:?}", pair[1], pair[0]);
     }
 }
 
@@ -150,14 +152,15 @@ fn too_deep_is_a_typed_failure_with_the_last_converged_state() {
 fn a_paddle_that_failed_never_ranks_above_one_that_reached_the_depth() {
     let mut scene = Scene::bundled("paper").unwrap().without_inclusions();
     scene.discretization.resolution = Resolution::Spacing(0.1);
-    scene.needle.depth = 0.13;
-    scene.needle.increments = 13;
+    scene.needle.depth = 0.14;
+    scene.needle.increments = 14;
     let model = TissueModel::new(&scene).unwrap();
     let placement = place(&model, &PlacementOptions { threads: 2, ..Default::default() }).unwrap();
+    let failed: Vec<bool> = placement.paddles.iter().map(|p| p.fixture.failure.is_some()).collect();
+    println!("{failed:?}");
+    assert!(failed.contains(&true) && failed.contains(&false), "the depth does not tell the paddles apart: {failed:?}");
     let best = placement.paddles.iter().find(|p| p.index == placement.optimum.fixture).unwrap();
-    if placement.paddles.iter().any(|p| p.fixture.failure.is_none()) {
-        assert!(best.fixture.failure.is_none());
-    }
+    assert_eq!(best.fixture.failure, None);
 }
 
 #[test]

@@ -453,7 +453,7 @@ mod tests {
             let paddle = model.paddle_position(3);
             let (reduced, report) = train(&model, paddle, &TrainingOptions::default()).unwrap();
             println!("{report:?}");
-            assert!(report.worst_error < 0.005 && report.worst_estimate >= report.worst_error);
+            assert!(report.worst_error < 0.005);
             assert!(report.points < report.full_points);
             // An insertion with a moving paddle that is in no snapshot.
             let mut full = model.body(paddle, NewtonSettings::default()).unwrap();
@@ -469,7 +469,9 @@ mod tests {
                 let error = (full.target_displacement() - body.target_displacement()).norm();
                 largest = largest.max(full.target_displacement().norm());
                 worst = worst.max(error);
-                assert!(body.error_estimate() <= reduced.tolerance());
+                // These states had no part in what the estimate was fitted to.
+                println!("{k}: error {error:.2e}, estimate {:.2e}", body.error_estimate());
+                assert!(error <= body.error_estimate() && body.error_estimate() <= reduced.tolerance());
             }
             assert!(worst < 0.005 * largest, "{worst} of {largest}");
             // Outside it says so and stays where it was.
