@@ -248,10 +248,10 @@ fn manufactured_solution_quadratic_basis() {
 fn spectrum(integration: Integration) -> Vec<f64> {
     use model_offline::mechanics::assembly::displacement_gradient;
     let nodes = jittered_rectangle(1.0, 1.0, 6, 6, 0.0, 1);
-    let n = 2 * nodes.len();
     let planar =
         Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(1.0 / 6.0), method(integration, Basis::Linear, 2.0, true))
             .unwrap();
+    let n = 2 * planar.positions().len();
     let law = Law::saint_venant_kirchhoff(383.0, 318.5).unwrap();
     let a = law.tangent(&nalgebra::Matrix2::zeros());
     let rule = planar.rule();
@@ -288,13 +288,21 @@ fn spectrum(integration: Integration) -> Vec<f64> {
     values.iter().map(|v| v / largest).collect()
 }
 
+/// Counting does not see everything: nodal integration without stabilisation passes too, because boundary cells hold the modes
+/// that the inner ones let go.
 #[test]
-fn zero_energy_modes_of_scni_are_the_three_rigid_ones() {
-    for integration in [Integration::Scni, Integration::Nsni, Integration::Gauss] {
+fn a_free_body_moves_without_energy_in_the_three_rigid_ways_only() {
+    for integration in [
+        Integration::Dni,
+        Integration::Scni,
+        Integration::Nsni,
+        Integration::Gauss,
+        Integration::FemT3,
+        Integration::FemT6,
+    ] {
         let spectrum = spectrum(integration);
-        assert!(spectrum[..3].iter().all(|v| v.abs() < 1e-12), "{integration:?}");
+        println!("{integration:?}: fourth eigenvalue {:.1e}", spectrum[3]);
+        assert!(spectrum[..3].iter().all(|v| v.abs() < 1e-12), "{integration:?}: {:?}", &spectrum[..4]);
         assert!(spectrum[3] > 1e-6, "{integration:?}: fourth eigenvalue {:.1e}", spectrum[3]);
     }
-    let direct = spectrum(Integration::Dni);
-    println!("fourth eigenvalue, direct nodal integration: {:.1e}", direct[3]);
 }
