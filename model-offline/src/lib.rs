@@ -13,7 +13,7 @@
 //!    there is one assembly for all.
 //! 4. [`mechanics`]: internal force `f_I = Σ_q w_q P g_I`, tangent stiffness `K_IJ = Σ_q w_q g_I · A · g_J`, essential
 //!    boundary conditions.
-//! 5. [`solver`]: minimise the energy over the coefficients d subject to held nodal values `Λ d = g`, by Newton's method
+//! 5. [`solver`]: minimise the energy over the coefficients d subject to prescribed nodal values `Λ d = g`, by Newton's method
 //!    with line search and cutback; every way to fail is typed and keeps the last converged state.
 //! 6. [`scene`]: the scene file, validated, with errors that point at line and column. [`model`]: a scene turned into a
 //!    discrete body.

@@ -4,8 +4,8 @@ use model_offline::discretization::{Basis, Integration, Method, Planar};
 use model_offline::geometry::{Point2, Polygon};
 use model_offline::material::{Law, Material as _};
 use model_offline::mechanics::nitsche::Nitsche;
-use model_offline::mechanics::{HeldRows, Tissue, WeaklyHeld};
-use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
+use model_offline::mechanics::{ConstrainedRows, Tissue, WeaklyImposed};
+use model_offline::solver::equilibrium::{DiscreteBody, Equilibrium, NewtonSettings};
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};
 
@@ -33,11 +33,13 @@ fn hold(
         }
     }
     let body = Equilibrium::at_rest(
-        Arc::clone(planar.rule()),
-        Tissue::uniform(material.clone(), planar.cells().len()),
-        HeldRows::new(stencils.iter()),
-        planar.positions(),
-        spacing,
+        DiscreteBody {
+            rule: Arc::clone(planar.rule()),
+            tissue: Tissue::uniform(material.clone(), planar.cells().len()),
+            positions: planar.positions(),
+            spacing,
+        },
+        ConstrainedRows::new(stencils.iter()),
         NewtonSettings::default(),
     )
     .unwrap();
@@ -165,15 +167,11 @@ fn manufactured(integration: Integration, basis: Basis, support: f64, n: usize) 
     // Weakly, so that the boundary does not limit the order.
     let points = planar.boundary_points().unwrap();
     let prescribed: Vec<f64> = points.iter().flat_map(|p| <[f64; 2]>::from(exact(p.position))).collect();
-    let weak: Arc<dyn WeaklyHeld> = Arc::new(Nitsche::new(&planar, &tissue, points));
+    let weak: Arc<dyn WeaklyImposed> = Arc::new(Nitsche::new(&planar, &tissue, points));
     let load = planar.body_force(density).unwrap();
-    let mut body = Equilibrium::at_rest_with(
-        Arc::clone(planar.rule()),
-        tissue,
-        HeldRows::default(),
-        Some(weak),
-        planar.positions(),
-        h,
+    let mut body = Equilibrium::at_rest(
+        DiscreteBody { rule: Arc::clone(planar.rule()), tissue, positions: planar.positions(), spacing: h },
+        weak,
         NewtonSettings::default(),
     )
     .unwrap();

@@ -4,8 +4,8 @@ use model_offline::discretization::{Integration, Method, Planar};
 use model_offline::geometry::Point2;
 use model_offline::material::{Law, Material as _};
 use model_offline::mechanics::nitsche::Nitsche;
-use model_offline::mechanics::{HeldRows, Tissue, WeaklyHeld};
-use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
+use model_offline::mechanics::{Constraints, ConstrainedRows, Tissue, WeaklyImposed};
+use model_offline::solver::equilibrium::{DiscreteBody, Equilibrium, NewtonSettings};
 use nalgebra::Matrix2;
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};
@@ -59,12 +59,13 @@ fn patch_error(boundary: Boundary, integration: Integration, consistent: bool, j
     let prescribed_at = held.iter().copied().chain(weakly.iter().map(|p| p.position));
     let prescribed: Vec<f64> = prescribed_at.flat_map(|x| <[f64; 2]>::from(gradient() * x)).collect();
     let stencils: Vec<_> = held.iter().map(|x| planar.value_stencil(x).unwrap()).collect();
-    let weak = (!weakly.is_empty()).then(|| Arc::new(Nitsche::new(&planar, &tissue, weakly)) as Arc<dyn WeaklyHeld>);
+    let weak = (!weakly.is_empty()).then(|| Arc::new(Nitsche::new(&planar, &tissue, weakly)) as Arc<dyn WeaklyImposed>);
 
     let settings = NewtonSettings { residual_tolerance: 1e-12, ..Default::default() };
-    let rows = HeldRows::new(stencils.iter());
+    let rows = ConstrainedRows::new(stencils.iter());
     let rule = Arc::clone(planar.rule());
-    let mut body = Equilibrium::at_rest_with(rule, tissue, rows, weak, planar.positions(), SPACING, settings).unwrap();
+    let body = DiscreteBody { rule, tissue, positions: planar.positions(), spacing: SPACING };
+    let mut body = Equilibrium::at_rest(body, Constraints { rows, weak }, settings).unwrap();
     body.drive_loaded(&prescribed, &load).unwrap();
     let error =
         |x: &Point2| (planar.value_stencil(x).unwrap().interpolate(body.coefficients()) - gradient() * x).amax();

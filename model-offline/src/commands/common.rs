@@ -7,7 +7,7 @@ use model_offline::discretization::{Basis, Essential, Integration, Resolution};
 use model_offline::output::terminal;
 use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A scene file, with or without its inclusions.
 #[derive(Debug, Args)]
@@ -90,17 +90,4 @@ pub(super) fn threads_or_all(threads: Option<usize>) -> usize {
 pub(super) fn no_such_paddle(scene: &Scene, index: u32) -> CliError {
     let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
     CliError::usage(format!("the scene has no paddle {index}"), format!("choose one of {}", known.join(", ")))
-}
-
-pub(super) fn pretty(value: &impl serde::Serialize) -> String {
-    // Values made of numbers, strings and lists always serialise.
-    serde_json::to_string_pretty(value).unwrap_or_default() + "\n"
-}
-
-/// Writes JSON where it is asked for.
-pub(super) fn write_json(path: Option<&Path>, value: &impl serde::Serialize) -> Result<(), CliError> {
-    match path {
-        Some(path) => Ok(model_offline::output::write_whole(path, pretty(value).as_bytes())?),
-        None => Ok(()),
-    }
 }

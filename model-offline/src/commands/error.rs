@@ -1,8 +1,9 @@
 //! Why a command failed, and what scripts are told.
 
+use super::json;
 use model_offline::discretization::DiscretizationError;
 use model_offline::model::ModelError;
-use model_offline::output::{self, OutputError};
+use model_offline::output::OutputError;
 use model_offline::scene::{LimitError, Scene, SceneError};
 use model_offline::solver::equilibrium::Failure;
 use model_offline::table::TableBuildError;
@@ -87,15 +88,13 @@ impl CliError {
     }
 
     /// The error, told in the JSON too when a computation failed, so that a script sees the reason.
-    pub(super) fn reported(self, json: Option<&Path>, scene: &Scene) -> Self {
-        if self.exit_code() == 1
-            && let Some(path) = json
-        {
+    pub(super) fn reported(self, file: Option<&Path>, scene: &Scene) -> Self {
+        if self.exit_code() == 1 && file.is_some() {
             let document = serde_json::json!({
                 "scene": scene.name, "tissue": scene.tissue(),
                 "failure": {"reason": self.reason(), "detail": self.to_string()},
             });
-            if let Err(output) = output::write_whole(path, super::common::pretty(&document).as_bytes()) {
+            if let Err(output) = json::write_json(file, &document) {
                 return output.into();
             }
         }

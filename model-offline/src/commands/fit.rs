@@ -1,7 +1,8 @@
 //! `model-offline fit`: the smallest model that keeps a tolerance.
 
-use super::common::{SceneArgs, threads_or_all, write_json};
+use super::common::{SceneArgs, threads_or_all};
 use super::error::CliError;
+use super::json::write_json;
 use model_offline::discretization::Resolution;
 use model_offline::output;
 use model_offline::scene::{Scene, limits};

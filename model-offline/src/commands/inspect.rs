@@ -1,7 +1,7 @@
 //! `model-offline inspect`: what a table holds.
 
-use super::common::write_json;
 use super::error::CliError;
+use super::json::write_json;
 use model_offline::output::table_text;
 use std::path::PathBuf;
 

@@ -5,6 +5,7 @@ mod completions;
 mod error;
 mod fit;
 mod inspect;
+mod json;
 mod man;
 mod new;
 mod pareto;

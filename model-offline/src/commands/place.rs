@@ -1,7 +1,8 @@
 //! `model-offline place`: the whole placement study.
 
-use super::common::{Common, SceneArgs, write_json};
+use super::common::{Common, SceneArgs};
 use super::error::CliError;
+use super::json::write_json;
 use model_offline::output;
 use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;

@@ -1,7 +1,8 @@
 //! `model-offline solve`: one equilibrium.
 
-use super::common::{Common, SceneArgs, no_such_paddle, write_json};
+use super::common::{Common, SceneArgs, no_such_paddle};
 use super::error::CliError;
+use super::json::write_json;
 use model_offline::model::{Body, ModelError, TissueModel};
 use model_offline::output;
 use model_offline::placement::{controllability, discretise};

@@ -1,7 +1,6 @@
 //! What the catalogue of laws knows about each besides its response.
 
 use super::error::MaterialError;
-use super::linear::Linear;
 use super::section::MaterialSection;
 
 /// A law that scene files can name.
@@ -25,8 +24,8 @@ pub(super) trait Catalogued: Sized {
         false
     }
 
-    /// Linear elasticity with the same tangent at rest; none where that is not isotropic.
-    fn linearised(&self) -> Option<Linear>;
+    /// Moduli of linear elasticity with the same tangent at rest; none where that is not isotropic.
+    fn linearised(&self) -> Option<LameParameters>;
 
     /// The law with another factor on its exponential term; none where it has no such term.
     fn with_exponential_factor(&self, _: f64) -> Option<Result<Self, MaterialError>> {
@@ -37,6 +36,13 @@ pub(super) trait Catalogued: Sized {
     fn with_poisson_ratio(&self, _: f64) -> Option<Result<Self, MaterialError>> {
         None
     }
+}
+
+/// λ and μ of an isotropic law at small strain, stress units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LameParameters {
+    pub(super) lambda: f64,
+    pub(super) mu: f64,
 }
 
 /// λ = 2μν/(1 − 2ν).

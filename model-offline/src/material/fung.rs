@@ -1,9 +1,8 @@
 //! Fung's exponential law in isotropic form.
 
-use super::catalogue::{Catalogued, lambda};
+use super::catalogue::{Catalogued, LameParameters, lambda};
 use super::error::{MaterialError, finite, not_negative};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, zero4};
-use super::linear::Linear;
 use super::material::{Material, Response};
 use super::section::{MaterialSection, required, unused};
 use serde::Serialize;
@@ -85,8 +84,8 @@ impl Catalogued for Fung {
         Self::new(required(section.lambda, "lambda")?, required(section.mu, "mu")?, c, lambda_c, mu_c)
     }
 
-    fn linearised(&self) -> Option<Linear> {
-        Some(Linear { lambda: self.lambda + self.c * self.lambda_c, mu: self.mu + self.c * self.mu_c })
+    fn linearised(&self) -> Option<LameParameters> {
+        Some(LameParameters { lambda: self.lambda + self.c * self.lambda_c, mu: self.mu + self.c * self.mu_c })
     }
 
     fn with_exponential_factor(&self, c: f64) -> Option<Result<Self, MaterialError>> {

@@ -1,9 +1,8 @@
 //! Fung's exponential law with general tensors, in the plane.
 
-use super::catalogue::Catalogued;
+use super::catalogue::{Catalogued, LameParameters};
 use super::error::{MaterialError, not_negative};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, push_forward, zero4};
-use super::linear::Linear;
 use super::material::{Material, Response};
 use super::section::{MaterialSection, TensorEntry, unused};
 use serde::Serialize;
@@ -113,7 +112,7 @@ impl Catalogued for FungTensors {
     }
 
     /// Anisotropic in general: none.
-    fn linearised(&self) -> Option<Linear> {
+    fn linearised(&self) -> Option<LameParameters> {
         None
     }
 

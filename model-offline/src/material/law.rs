@@ -1,7 +1,7 @@
 //! The catalogue of laws, and a law of it with an optional volumetric barrier.
 
 use super::barrier::Barrier;
-use super::catalogue::Catalogued as _;
+use super::catalogue::{Catalogued as _, LameParameters};
 use super::error::MaterialError;
 use super::fung::Fung;
 use super::fung_general::FungTensors;
@@ -57,7 +57,7 @@ macro_rules! registry {
                 match self { $($(Self::$law(law) => law.has_mesh_limit(),)+)+ }
             }
 
-            fn linearised(&self) -> Option<Linear> {
+            fn linearised(&self) -> Option<LameParameters> {
                 match self { $($(Self::$law(law) => law.linearised(),)+)+ }
             }
 
@@ -202,7 +202,7 @@ impl Law {
     /// tangent at rest is not isotropic stays as it is, for small strains.
     #[must_use]
     pub fn linearised(&self) -> Self {
-        self.form.linearised().map_or_else(|| self.clone(), |linear| Self::plain(Form::Linear(linear)))
+        self.form.linearised().map_or_else(|| self.clone(), |moduli| Self::plain(Form::Linear(moduli.into())))
     }
 
     /// The law with another factor c of Fung's exponential term; none where the law has no such term.

@@ -1,6 +1,6 @@
 //! Linear elasticity.
 
-use super::catalogue::{Catalogued, lambda};
+use super::catalogue::{Catalogued, LameParameters, lambda};
 use super::error::{MaterialError, finite};
 use super::kinematics::{Matrix, Tensor4, indices, zero4};
 use super::material::{Material, Response};
@@ -10,8 +10,8 @@ use serde::Serialize;
 /// `W = ½ λ (tr ε)² + μ ε:ε`, ε = ½ (H + Hᵀ).
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Linear {
-    pub(super) lambda: f64,
-    pub(super) mu: f64,
+    lambda: f64,
+    mu: f64,
 }
 
 impl Linear {
@@ -19,6 +19,13 @@ impl Linear {
         let law = Self { lambda: finite(lambda, "lambda")?, mu: finite(mu, "mu")? };
         Material::<3>::check_stable_at_rest(&law)?;
         Ok(law)
+    }
+}
+
+/// The moduli of a law that is stable at rest make a linear one that is.
+impl From<LameParameters> for Linear {
+    fn from(LameParameters { lambda, mu }: LameParameters) -> Self {
+        Self { lambda, mu }
     }
 }
 
@@ -55,8 +62,8 @@ impl Catalogued for Linear {
         true
     }
 
-    fn linearised(&self) -> Option<Linear> {
-        Some(self.clone())
+    fn linearised(&self) -> Option<LameParameters> {
+        Some(LameParameters { lambda: self.lambda, mu: self.mu })
     }
 
     fn with_poisson_ratio(&self, poisson: f64) -> Option<Result<Self, MaterialError>> {

@@ -1,9 +1,8 @@
 //! Compressible neo-Hookean law with an isochoric-volumetric split.
 
-use super::catalogue::{Catalogued, lambda};
+use super::catalogue::{Catalogued, LameParameters, lambda};
 use super::error::{MaterialError, finite};
 use super::kinematics::{Matrix, Tensor4, determinant, dilation, indices, inverse_transpose, zero4};
-use super::linear::Linear;
 use super::material::{Material, Response};
 use super::section::MaterialSection;
 use serde::Serialize;
@@ -76,8 +75,8 @@ impl Catalogued for NeoHookean {
         true
     }
 
-    fn linearised(&self) -> Option<Linear> {
-        Some(Linear { lambda: self.kappa - 2.0 * self.mu / 3.0, mu: self.mu })
+    fn linearised(&self) -> Option<LameParameters> {
+        Some(LameParameters { lambda: self.kappa - 2.0 * self.mu / 3.0, mu: self.mu })
     }
 
     fn with_poisson_ratio(&self, poisson: f64) -> Option<Result<Self, MaterialError>> {

@@ -1,9 +1,8 @@
 //! St. Venant–Kirchhoff: linear in the Green–Lagrange strain.
 
-use super::catalogue::{Catalogued, lambda};
+use super::catalogue::{Catalogued, LameParameters, lambda};
 use super::error::{MaterialError, finite};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, zero4};
-use super::linear::Linear;
 use super::material::{Material, Response};
 use super::section::MaterialSection;
 use serde::Serialize;
@@ -53,8 +52,8 @@ impl Catalogued for SaintVenantKirchhoff {
         Self::new(lambda, mu)
     }
 
-    fn linearised(&self) -> Option<Linear> {
-        Some(Linear { lambda: self.lambda, mu: self.mu })
+    fn linearised(&self) -> Option<LameParameters> {
+        Some(LameParameters { lambda: self.lambda, mu: self.mu })
     }
 
     fn with_poisson_ratio(&self, poisson: f64) -> Option<Result<Self, MaterialError>> {

@@ -136,12 +136,12 @@ pub fn internal_force<const D: usize>(
 /// Where every (point, node, node) block of the tangent goes: computed once per pattern, so that assembly is a plain
 /// loop without searches.
 #[derive(Debug, Clone)]
-pub struct Scatter {
+pub struct BlockPositions {
     /// For every point and every ordered pair (row ≥ column) of its nodes: first entry of the block's first column.
     positions: Vec<u32>,
 }
 
-impl Scatter {
+impl BlockPositions {
     /// Finds the place of every block of `rule` in `pattern`.
     ///
     /// # Panics
@@ -166,7 +166,7 @@ pub fn tangent<const D: usize>(
     tissue: &Tissue,
     state: &State<D>,
     pattern: &Pattern,
-    scatter: &Scatter,
+    blocks: &BlockPositions,
     values: &mut [f64],
 ) {
     let mut next = 0;
@@ -187,7 +187,7 @@ pub fn tangent<const D: usize>(
             });
             let stride = pattern.column_length(j);
             let rows = &point.gradients[column..];
-            for (gi, &at) in rows.iter().zip(&scatter.positions[next..next + rows.len()]) {
+            for (gi, &at) in rows.iter().zip(&blocks.positions[next..next + rows.len()]) {
                 for (k, t) in t.iter().enumerate() {
                     let start = at as usize + k * stride;
                     for (entry, t) in values[start..start + D].iter_mut().zip(t) {

@@ -3,16 +3,17 @@
 use super::assembly::Tissue;
 use crate::discretization::Stencil;
 use crate::linalg::Pattern;
+use std::sync::Arc;
 
-/// Rows Λ_b of the held nodes: `u(X_b) = Σ_I Ψ_I(X_b) d_I`.
+/// Rows Λ_b of the constrained nodes: `u(X_b) = Σ_I Ψ_I(X_b) d_I`.
 #[derive(Debug, Clone, Default)]
-pub struct HeldRows {
+pub struct ConstrainedRows {
     offsets: Vec<u32>,
     nodes: Vec<u32>,
     values: Vec<f64>,
 }
 
-impl HeldRows {
+impl ConstrainedRows {
     /// One row per stencil.
     pub fn new<'a, const D: usize>(stencils: impl Iterator<Item = &'a Stencil<D>>) -> Self {
         let mut rows = Self { offsets: vec![0], ..Self::default() };
@@ -24,12 +25,12 @@ impl HeldRows {
         rows
     }
 
-    /// Number of held nodes.
+    /// Number of constrained nodes.
     pub fn len(&self) -> usize {
         self.offsets.len().saturating_sub(1)
     }
 
-    /// Whether nothing is held.
+    /// Whether nothing is constrained.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -70,8 +71,8 @@ impl HeldRows {
     }
 }
 
-/// Displacements that are held weakly, by terms of the energy instead of constraints (Nitsche's method).
-pub trait WeaklyHeld: std::fmt::Debug + Send + Sync {
+/// Displacements that are imposed weakly, by terms of the energy instead of constraints (Nitsche's method).
+pub trait WeaklyImposed: std::fmt::Debug + Send + Sync {
     /// How many numbers are prescribed.
     fn prescribed(&self) -> usize;
     /// Nodes that interact, list by list, each ascending.
@@ -82,4 +83,25 @@ pub trait WeaklyHeld: std::fmt::Debug + Send + Sync {
     fn add_tangent(&self, tissue: &Tissue, d: &[f64], pattern: &Pattern, values: &mut [f64]);
     /// Adds the force that unit rates of the prescribed numbers cause: −∂(force)/∂(prescribed) · rates.
     fn add_response(&self, tissue: &Tissue, d: &[f64], rates: &[f64], out: &mut [f64]);
+}
+
+/// Everything that is prescribed on a body: nodal values, boundary values imposed weakly, or both.
+#[derive(Debug, Clone, Default)]
+pub struct Constraints {
+    /// Rows of the constrained nodes.
+    pub rows: ConstrainedRows,
+    /// Values that terms of the energy impose.
+    pub weak: Option<Arc<dyn WeaklyImposed>>,
+}
+
+impl From<ConstrainedRows> for Constraints {
+    fn from(rows: ConstrainedRows) -> Self {
+        Self { rows, weak: None }
+    }
+}
+
+impl From<Arc<dyn WeaklyImposed>> for Constraints {
+    fn from(weak: Arc<dyn WeaklyImposed>) -> Self {
+        Self { rows: ConstrainedRows::default(), weak: Some(weak) }
+    }
 }

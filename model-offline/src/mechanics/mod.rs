@@ -5,4 +5,4 @@ pub mod constraints;
 pub mod nitsche;
 
 pub use assembly::Tissue;
-pub use constraints::{HeldRows, WeaklyHeld};
+pub use constraints::{ConstrainedRows, Constraints, WeaklyImposed};

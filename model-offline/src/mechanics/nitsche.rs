@@ -1,4 +1,4 @@
-//! Nitsche's method: displacements held weakly on the boundary, with consistent terms (Nitsche 1971; for meshfree
+//! Nitsche's method: displacements imposed weakly on the boundary, with consistent terms (Nitsche 1971; for meshfree
 //! methods Fernández-Méndez & Huerta 2004).
 //!
 //! Adds to the energy `∮ [ −(P N)·(u − g) + β/2 |u − g|² ] dΓ`, with P from the gradient of the adjoining cell, so that for
@@ -6,7 +6,7 @@
 //! to rounding. The term of the tangent with ∂²P/∂F² (u − g) is left out: it vanishes with the gap.
 
 use super::assembly::Tissue;
-use super::constraints::WeaklyHeld;
+use super::constraints::WeaklyImposed;
 use crate::discretization::Planar;
 use crate::discretization::boundary::BoundaryPoint;
 use crate::geometry::Point;
@@ -16,14 +16,14 @@ use crate::material::{Material, Matrix, Tensor4};
 /// Penalty β over (stiffness / cell size).
 const PENALTY: f64 = 40.0;
 
-/// Boundary points whose displacement is held weakly.
+/// Boundary points whose displacement is imposed weakly.
 #[derive(Debug, Clone, Default)]
 pub struct Nitsche {
-    points: Vec<HeldPoint>,
+    points: Vec<WeakPoint>,
 }
 
 #[derive(Debug, Clone)]
-struct HeldPoint {
+struct WeakPoint {
     weight: f64,
     normal: Point<2>,
     cell: u32,
@@ -52,7 +52,7 @@ impl Nitsche {
                 let stiffness: f64 =
                     tissue.parts(p.cell).map(|(m, factor)| Material::<2>::rest_stiffness(m) * factor).sum();
                 let size = planar.cells()[p.cell as usize].area.sqrt();
-                HeldPoint {
+                WeakPoint {
                     weight: p.weight,
                     normal: p.normal,
                     cell: p.cell,
@@ -67,7 +67,7 @@ impl Nitsche {
     }
 }
 
-impl WeaklyHeld for Nitsche {
+impl WeaklyImposed for Nitsche {
     fn prescribed(&self) -> usize {
         2 * self.points.len()
     }
@@ -131,7 +131,7 @@ impl WeaklyHeld for Nitsche {
                         - coupling[column] * p.values[row]
                         - coupling[row].transpose() * p.values[column])
                         * p.weight;
-                    let at = pattern.block_position(i, j).expect("the pattern covers the held points");
+                    let at = pattern.block_position(i, j).expect("the pattern covers the imposed points");
                     for k in 0..2 {
                         for r in 0..2 {
                             values[at + k * stride + r] += block[(r, k)];
@@ -143,7 +143,7 @@ impl WeaklyHeld for Nitsche {
     }
 }
 
-impl HeldPoint {
+impl WeakPoint {
     /// Displacement gradient of the cell, and u − g.
     fn kinematics(&self, d: &[f64], g: &[f64]) -> (Matrix<2>, Point<2>) {
         let mut h = Matrix::zeros();

@@ -12,9 +12,9 @@ use crate::discretization::{
 use crate::geometry::{Point2, Polygon, distance_to_polyline, overlap_area};
 use crate::material::Law;
 use crate::mechanics::nitsche::Nitsche;
-use crate::mechanics::{HeldRows, Tissue, WeaklyHeld};
+use crate::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
 use crate::scene::Scene;
-use crate::solver::equilibrium::{Equilibrium, Failure, NewtonSettings};
+use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use std::sync::Arc;
 
@@ -30,9 +30,9 @@ pub enum ModelError {
     /// The tangent at rest cannot be solved with, or a Jacobian cannot be computed.
     #[error("{0}")]
     Solve(#[from] Failure),
-    /// A held feature has no node on it.
+    /// A constrained feature has no node on it.
     #[error("no node lies on the {0}; refine the discretization")]
-    NothingHeld(String),
+    NothingConstrained(String),
     /// The paddle cannot move the target orthogonally to the needle.
     #[error(
         "paddle {paddle}: the actuation Jacobian is singular (condition {condition:.1e}): this paddle cannot control the target"
@@ -73,15 +73,15 @@ pub struct TissueModel {
     planar: Planar,
     tissue: Tissue,
     spacing: f64,
-    held: Held,
+    essential: EssentialBoundary,
     target: Stencil<2>,
 }
 
-/// What holds the body: nodes whose values are prescribed, or boundary points that Nitsche's method holds.
+/// Where essential boundary conditions are imposed: on nodes, or at boundary points by Nitsche's method.
 #[derive(Debug, Clone)]
-enum Held {
+enum EssentialBoundary {
     Nodes(Groups<Stencil<2>>),
-    Boundary(Groups<BoundaryPoint>),
+    Points(Groups<BoundaryPoint>),
 }
 
 /// The same kind of thing for the immobile part, the needle contact and every paddle.
@@ -96,8 +96,8 @@ impl<T> Groups<T> {
     /// Collects each group by the polylines it lies on.
     fn collect(scene: &Scene, on: impl Fn(&[&[Point2]]) -> Result<Vec<T>, ShapeError>) -> Result<Self, ModelError> {
         let some = |paths: &[&[Point2]], name: &str| -> Result<Vec<T>, ModelError> {
-            let held = on(paths)?;
-            if held.is_empty() { Err(ModelError::NothingHeld(name.to_owned())) } else { Ok(held) }
+            let found = on(paths)?;
+            if found.is_empty() { Err(ModelError::NothingConstrained(name.to_owned())) } else { Ok(found) }
         };
         let immobile: Vec<&[Point2]> = scene.immobile.iter().map(Vec::as_slice).collect();
         Ok(Self {
@@ -152,11 +152,11 @@ impl TissueModel {
     /// The model of a scene on a body discretised already, whose nodes are `spacing` apart.
     ///
     /// # Errors
-    /// [`ModelError::NothingHeld`] when no node lies on a feature.
+    /// [`ModelError::NothingConstrained`] when no node lies on a feature.
     pub fn on(scene: &Scene, planar: Planar, spacing: f64) -> Result<Self, ModelError> {
         let tolerance = 1e-9 * scene.outline.size();
-        let held = match scene.discretization.essential {
-            Essential::Transformation => Held::Nodes(Groups::collect(scene, |paths| {
+        let essential = match scene.discretization.essential {
+            Essential::Transformation => EssentialBoundary::Nodes(Groups::collect(scene, |paths| {
                 let near = |x: &&Point2| paths.iter().any(|path| distance_to_polyline(**x, path) <= tolerance);
                 planar.positions().iter().filter(near).map(|x| planar.value_stencil(x)).collect()
             })?),
@@ -167,7 +167,7 @@ impl TissueModel {
                         "Nitsche's method holds boundary, and this needle contact is inside the body: use essential = \"transformation\"".into(),
                     ));
                 }
-                Held::Boundary(Groups::collect(scene, |paths| {
+                EssentialBoundary::Points(Groups::collect(scene, |paths| {
                     paths
                         .iter()
                         .map(|path| planar.boundary_points_on(path))
@@ -180,7 +180,7 @@ impl TissueModel {
             tissue: tissue_of(scene, planar.cells()),
             scene: scene.clone(),
             spacing,
-            held,
+            essential,
             target: planar.value_stencil(&scene.target)?,
             planar,
         })
@@ -251,19 +251,21 @@ impl TissueModel {
         self.scene.paddles.iter().position(|p| p.index == index)
     }
 
-    /// Rows of the held nodes when a paddle is attached, or none where Nitsche's method holds them.
-    pub(crate) fn held_rows(&self, paddle: Option<usize>) -> Option<HeldRows> {
-        match &self.held {
-            Held::Nodes(groups) => Some(HeldRows::new(groups.with_paddle(paddle))),
-            Held::Boundary(_) => None,
+    /// Rows of the constrained nodes when a paddle is attached; none where Nitsche's method imposes the values.
+    pub(crate) fn constrained_rows(&self, paddle: Option<usize>) -> Option<ConstrainedRows> {
+        match &self.essential {
+            EssentialBoundary::Nodes(groups) => Some(ConstrainedRows::new(groups.with_paddle(paddle))),
+            EssentialBoundary::Points(_) => None,
         }
     }
 
-    /// The same with the target's displacement held as well.
-    pub(crate) fn held_rows_with_target(&self, paddle: Option<usize>) -> Option<HeldRows> {
-        match &self.held {
-            Held::Nodes(groups) => Some(HeldRows::new(groups.with_paddle(paddle).chain([&self.target]))),
-            Held::Boundary(_) => None,
+    /// The same with the target's displacement constrained as well.
+    pub(crate) fn constrained_rows_with_target(&self, paddle: Option<usize>) -> Option<ConstrainedRows> {
+        match &self.essential {
+            EssentialBoundary::Nodes(groups) => {
+                Some(ConstrainedRows::new(groups.with_paddle(paddle).chain([&self.target])))
+            }
+            EssentialBoundary::Points(_) => None,
         }
     }
 
@@ -272,21 +274,21 @@ impl TissueModel {
         self.spacing
     }
 
-    fn weakly_held(&self, paddle: Option<usize>) -> Option<Arc<dyn WeaklyHeld>> {
-        match &self.held {
-            Held::Nodes(_) => None,
-            Held::Boundary(groups) => {
+    fn weakly_imposed(&self, paddle: Option<usize>) -> Option<Arc<dyn WeaklyImposed>> {
+        match &self.essential {
+            EssentialBoundary::Nodes(_) => None,
+            EssentialBoundary::Points(groups) => {
                 Some(Arc::new(Nitsche::new(&self.planar, &self.tissue, groups.with_paddle(paddle).cloned())))
             }
         }
     }
 
-    /// Prescribed values of everything held: needle at `depth`, paddle displaced.
-    pub(crate) fn held_values(&self, paddle: Option<usize>, depth: f64, displacement: Vector2<f64>) -> Vec<f64> {
+    /// All prescribed values: needle at `depth`, paddle displaced.
+    pub(crate) fn prescribed_values(&self, paddle: Option<usize>, depth: f64, displacement: Vector2<f64>) -> Vec<f64> {
         let needle = self.scene.needle.axis * depth;
-        match &self.held {
-            Held::Nodes(groups) => groups.values(paddle, needle, displacement),
-            Held::Boundary(groups) => groups.values(paddle, needle, displacement),
+        match &self.essential {
+            EssentialBoundary::Nodes(groups) => groups.values(paddle, needle, displacement),
+            EssentialBoundary::Points(groups) => groups.values(paddle, needle, displacement),
         }
     }
 
@@ -295,20 +297,24 @@ impl TissueModel {
         &self.target
     }
 
+    /// Rule, tissue and nodes, for a solver.
+    pub(crate) fn discrete_body(&self) -> DiscreteBody<'_, 2> {
+        DiscreteBody {
+            rule: Arc::clone(self.planar.rule()),
+            tissue: self.tissue.clone(),
+            positions: self.positions(),
+            spacing: self.spacing,
+        }
+    }
+
     /// A body at rest with the paddle at this place of the scene's list attached, or none.
     ///
     /// # Errors
     /// [`Failure`] when the tangent at rest is singular.
     pub fn body(&self, paddle: Option<usize>, settings: NewtonSettings) -> Result<Body<'_>, Failure> {
-        let equilibrium = Equilibrium::at_rest_with(
-            Arc::clone(self.planar.rule()),
-            self.tissue.clone(),
-            self.held_rows(paddle).unwrap_or_default(),
-            self.weakly_held(paddle),
-            self.positions(),
-            self.spacing,
-            settings,
-        )?;
+        let constraints =
+            Constraints { rows: self.constrained_rows(paddle).unwrap_or_default(), weak: self.weakly_imposed(paddle) };
+        let equilibrium = Equilibrium::at_rest(self.discrete_body(), constraints, settings)?;
         Ok(Body { model: self, equilibrium, attached: paddle, depth: 0.0, paddle: Vector2::zeros() })
     }
 }
@@ -407,7 +413,7 @@ impl Body<'_> {
     /// # Errors
     /// [`Failure`]; depth and paddle are then where the last converged state has them.
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Failure> {
-        let prescribed = self.model.held_values(self.attached, depth, paddle);
+        let prescribed = self.model.prescribed_values(self.attached, depth, paddle);
         let outcome = self.equilibrium.drive(&prescribed);
         let reached = outcome.as_ref().map_or_else(|failure| failure.reached, |()| 1.0);
         self.depth += (depth - self.depth) * reached;
@@ -432,7 +438,7 @@ impl Body<'_> {
     pub fn actuation_jacobian(&mut self) -> Result<Matrix2<f64>, Failure> {
         let mut jacobian = Matrix2::zeros();
         for axis in 0..2 {
-            let rates = self.model.held_values(self.attached, 0.0, Vector2::ith(axis, 1.0));
+            let rates = self.model.prescribed_values(self.attached, 0.0, Vector2::ith(axis, 1.0));
             let response = self.equilibrium.sensitivity(&rates)?;
             jacobian.set_column(axis, &self.model.target.interpolate(&response));
         }
@@ -444,7 +450,7 @@ impl Body<'_> {
     /// # Errors
     /// [`Failure`] when the current state is not stable.
     pub fn depth_sensitivity(&mut self) -> Result<Vector2<f64>, Failure> {
-        let rates = self.model.held_values(self.attached, 1.0, Vector2::zeros());
+        let rates = self.model.prescribed_values(self.attached, 1.0, Vector2::zeros());
         let response = self.equilibrium.sensitivity(&rates)?;
         Ok(self.model.target.interpolate(&response))
     }

@@ -1,10 +1,10 @@
 //! Actuation Jacobians at rest for all paddles at once: one assembly and one symbolic analysis serve them all, since
-//! they differ only in which nodal values are held.
+//! they differ only in which nodal values are constrained.
 
 use super::controllability::best_direction;
 use crate::linalg::Pattern;
-use crate::mechanics::HeldRows;
-use crate::mechanics::assembly::{Scatter, State, internal_force, tangent};
+use crate::mechanics::ConstrainedRows;
+use crate::mechanics::assembly::{BlockPositions, State, internal_force, tangent};
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::ConstrainedSolver;
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
@@ -31,33 +31,34 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
     let rule = model.rule();
     let nodes = model.nodes();
     let count = model.scene().paddles.len();
-    let Some(all) = (0..count).map(|p| model.held_rows(Some(p))).collect::<Option<Vec<HeldRows>>>() else {
-        return (0..count).map(|paddle| rest_response_weakly_held(model, paddle)).collect();
+    let Some(all) = (0..count).map(|p| model.constrained_rows(Some(p))).collect::<Option<Vec<ConstrainedRows>>>()
+    else {
+        return (0..count).map(|paddle| rest_response_weakly_imposed(model, paddle)).collect();
     };
-    let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(all.iter().flat_map(HeldRows::node_lists));
+    let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(all.iter().flat_map(ConstrainedRows::node_lists));
     let pattern = Pattern::new(2, nodes, lists);
-    let scatter = Scatter::new(rule, &pattern);
+    let blocks = BlockPositions::new(rule, &pattern);
     let (mut state, mut force) = (State::default(), vec![0.0; 2 * nodes]);
     internal_force(rule, model.tissue(), &vec![0.0; 2 * nodes], &mut state, &mut force)
         .map_err(|_| singular("at rest"))?;
     let mut at_rest = vec![0.0; pattern.entries()];
-    tangent(rule, model.tissue(), &state, &pattern, &scatter, &mut at_rest);
+    tangent(rule, model.tissue(), &state, &pattern, &blocks, &mut at_rest);
 
-    let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), HeldRows::default());
+    let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), ConstrainedRows::default());
     // Paddle along x, paddle along y, needle along its axis: three right-hand sides pass through each factor together.
     const RATES: usize = 3;
     let zero = vec![0.0; RATES * 2 * nodes];
     let mut response = vec![0.0; RATES * 2 * nodes];
     let mut responses = Vec::with_capacity(all.len());
-    for (paddle, held) in all.into_iter().enumerate() {
-        let mut multipliers = vec![0.0; RATES * 2 * held.len()];
-        solver.hold(held);
+    for (paddle, rows) in all.into_iter().enumerate() {
+        let mut multipliers = vec![0.0; RATES * 2 * rows.len()];
+        solver.constrain(rows);
         solver.load(&at_rest);
         solver.factorise().map_err(|_| singular("the tangent at rest is not positive definite"))?;
         let rates = [
-            model.held_values(Some(paddle), 0.0, Vector2::x()),
-            model.held_values(Some(paddle), 0.0, Vector2::y()),
-            model.held_values(Some(paddle), 1.0, Vector2::zeros()),
+            model.prescribed_values(Some(paddle), 0.0, Vector2::x()),
+            model.prescribed_values(Some(paddle), 0.0, Vector2::y()),
+            model.prescribed_values(Some(paddle), 1.0, Vector2::zeros()),
         ];
         solver.solve(&zero, &rates.concat(), 1e-12, &mut response, &mut multipliers);
         let target = |rate: usize| model.target_row().interpolate(&response[rate * 2 * nodes..]);
@@ -67,7 +68,7 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
 }
 
 /// Nitsche's terms change the matrix with the paddle: each has a body of its own.
-fn rest_response_weakly_held(model: &TissueModel, paddle: usize) -> Result<RestResponse, ModelError> {
+fn rest_response_weakly_imposed(model: &TissueModel, paddle: usize) -> Result<RestResponse, ModelError> {
     let mut body = model.body(Some(paddle), NewtonSettings::default())?;
     let jacobian = body.actuation_jacobian()?;
     let target_per_depth = body.depth_sensitivity()?;

@@ -1,13 +1,12 @@
 //! Static condensation of the linear model: needle, paddle and target are retained, every other displacement is
 //! condensed out. `K_c = K_rr − K_rf K_ff⁻¹ K_fr` (Guyan 1965), exact for the law's small-strain limit.
 
-use super::lifting::{control_values, controls, flat, held_weakly, tangent_at_rest};
-use crate::mechanics::HeldRows;
+use super::lifting::{control_values, controls, flat, imposed_weakly, tangent_at_rest};
+use crate::mechanics::ConstrainedRows;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::{DMatrix, Matrix2, Vector2};
-use std::sync::Arc;
 
 /// The condensed body. Retained, in this order: needle depth, paddle x and y (where one is attached), target x and y.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,12 +22,12 @@ impl Condensed {
     /// Condenses the model with the paddle at this place of the scene's list attached, or none.
     ///
     /// # Errors
-    /// [`ModelError`] when the body is not held, or held by Nitsche's method.
+    /// [`ModelError`] when too little of the body is constrained, or by Nitsche's method.
     pub fn new(model: &TissueModel, paddle: Option<usize>) -> Result<Self, ModelError> {
         let controls = controls(paddle);
-        // The target is held too while the others are condensed out.
-        let held = model.held_rows_with_target(paddle).ok_or_else(held_weakly)?;
-        let shapes = retained_responses(model, paddle, held)?;
+        // The target is constrained too while the others are condensed out.
+        let rows = model.constrained_rows_with_target(paddle).ok_or_else(imposed_weakly)?;
+        let shapes = retained_responses(model, paddle, rows)?;
         let n = shapes.len();
         let mut stiffness = DMatrix::zeros(n, n);
         for (q, point) in model.rule().points().enumerate() {
@@ -79,17 +78,13 @@ impl Condensed {
     }
 }
 
-/// Responses of the whole body to a unit of each retained displacement, the others held at nothing.
-fn retained_responses(model: &TissueModel, paddle: Option<usize>, held: HeldRows) -> Result<Vec<Vec<f64>>, ModelError> {
-    let mut body = Equilibrium::at_rest_with(
-        Arc::clone(model.rule()),
-        model.tissue().clone(),
-        held,
-        None,
-        model.positions(),
-        model.spacing(),
-        NewtonSettings::default(),
-    )?;
+/// Responses of the whole body to a unit of each retained displacement, the others zero.
+fn retained_responses(
+    model: &TissueModel,
+    paddle: Option<usize>,
+    rows: ConstrainedRows,
+) -> Result<Vec<Vec<f64>>, ModelError> {
+    let mut body = Equilibrium::at_rest(model.discrete_body(), rows, NewtonSettings::default())?;
     (0..controls(paddle) + 2)
         .map(|retained| {
             let mut unit = [0.0; 3];
@@ -98,7 +93,7 @@ fn retained_responses(model: &TissueModel, paddle: Option<usize>, held: HeldRows
                 Some(axis) => target[axis] = 1.0,
                 None => unit[retained] = 1.0,
             }
-            let mut rates = model.held_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
+            let mut rates = model.prescribed_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
             rates.extend(target);
             Ok(body.sensitivity(&rates)?)
         })

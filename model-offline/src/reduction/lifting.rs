@@ -16,29 +16,29 @@ pub(super) fn control_values(depth: f64, paddle: Vector2<f64>) -> [f64; 3] {
     [depth, paddle.x, paddle.y]
 }
 
-/// Coefficients of the response at rest to unit rates of every control: they meet the held values exactly, so that
+/// Coefficients of the response at rest to unit rates of every control: they meet the prescribed values exactly, so that
 /// whatever is added to them may vanish there.
 ///
 /// # Errors
-/// [`ModelError::Unsupported`] where Nitsche's method holds the body (its held values are met only weakly);
+/// [`ModelError::Unsupported`] where Nitsche's method holds the body (its prescribed values are met only weakly);
 /// [`ModelError::Solve`] when the body is not held.
 pub(super) fn lifting(model: &TissueModel, paddle: Option<usize>) -> Result<Vec<Vec<f64>>, ModelError> {
-    if model.held_rows(paddle).is_none() {
-        return Err(held_weakly());
+    if model.constrained_rows(paddle).is_none() {
+        return Err(imposed_weakly());
     }
     let mut body = model.body(paddle, NewtonSettings::default())?;
     (0..controls(paddle))
         .map(|control| {
             let mut unit = [0.0; 3];
             unit[control] = 1.0;
-            let rates = model.held_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
+            let rates = model.prescribed_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
             Ok(body.equilibrium_mut().sensitivity(&rates)?)
         })
         .collect()
 }
 
 /// The refusal of bodies that Nitsche's method holds.
-pub(super) fn held_weakly() -> ModelError {
+pub(super) fn imposed_weakly() -> ModelError {
     ModelError::Unsupported(
         "reduced models need nodal values that are held exactly: use essential = \"transformation\"".into(),
     )

@@ -1,6 +1,6 @@
 //! The reduced nonlinear model, step by step.
 //!
-//! Displacements are `d = Σ_c L_c c + Σ_m Φ_m q_m`: the responses at rest to needle and paddle (exact on the held nodes)
+//! Displacements are `d = Σ_c L_c c + Σ_m Φ_m q_m`: the responses at rest to needle and paddle (exact on the constrained nodes)
 //! plus modes that vanish there. The energy is summed over a few integration points with weights of their own,
 //! `E(q) = Σ_s ξ_s w_s W(I + Σ_c c H_sc + Σ_m q_m H_sm)`, and a step is Newton's method on it: r unknowns, no mesh.
 //!

@@ -1,8 +1,8 @@
-//! Held nodal values as constraints in coefficient space.
+//! Prescribed nodal values as constraints in coefficient space.
 //!
 //! The transformation method re-expresses every shape function in nodal values so that boundary values can be
 //! prescribed; that makes all matrices dense. Minimising the energy over the coefficients d subject to `Λ d = g`, with
-//! Λ_bI = Ψ_I(X_b) for the held nodes b only, gives the same displacement and keeps the tangent sparse. Each Newton
+//! Λ_bI = Ψ_I(X_b) for the constrained nodes b only, gives the same displacement and keeps the tangent sparse. Each Newton
 //! step then solves
 //!
 //! ```text
@@ -11,12 +11,12 @@
 //! ```
 //!
 //! by the method of multipliers: factorise `K_ρ = K + Λᵀ ρ Λ` (positive definite exactly when K is on the null space
-//! of Λ, for ρ large enough, so Cholesky detects lost stability; same sparsity as K plus the held stencils) and iterate
+//! of Λ, for ρ large enough, so Cholesky detects lost stability; same sparsity as K plus the constrained stencils) and iterate
 //! on μ. The constraint error shrinks by about ρ⁻¹ K per round; a few rounds reach rounding error.
 
 use crate::geometry::Point;
 use crate::linalg::{NotPositiveDefinite, Pattern, SparseCholesky};
-use crate::mechanics::HeldRows;
+use crate::mechanics::ConstrainedRows;
 
 /// Penalty over the mean diagonal of the tangent. Large enough that two or three rounds of multipliers reach rounding
 /// error, small enough that the factor of K_ρ keeps its digits.
@@ -24,14 +24,14 @@ const PENALTY: f64 = 1e4;
 /// Rounds of multipliers; each costs one back-substitution.
 const MAX_ROUNDS: usize = 12;
 
-/// Solves tangent systems with held rows; see the module documentation.
+/// Solves tangent systems with constrained rows; see the module documentation.
 #[derive(Debug)]
 pub struct ConstrainedSolver<const D: usize> {
     pattern: Pattern,
     cholesky: SparseCholesky,
-    held: HeldRows,
+    constrained: ConstrainedRows,
     penalty: f64,
-    /// Block positions of every pair (row ≥ column) of every held stencil.
+    /// Block positions of every pair (row ≥ column) of every constrained stencil.
     positions: Vec<u32>,
     matrix: Vec<f64>,
     work: Work,
@@ -45,39 +45,40 @@ struct Work {
 }
 
 impl<const D: usize> ConstrainedSolver<D> {
-    /// Analyses the pattern of nodes at `positions`, which must cover the stencils of the held rows.
+    /// Analyses the pattern of nodes at `positions`, which must cover the stencils of the constrained rows.
     ///
     /// # Panics
-    /// When the pattern misses a pair of a held stencil.
-    pub fn new(pattern: Pattern, positions: &[Point<D>], held: HeldRows) -> Self {
+    /// When the pattern misses a pair of a constrained stencil.
+    pub fn new(pattern: Pattern, positions: &[Point<D>], rows: ConstrainedRows) -> Self {
         let cholesky = SparseCholesky::analyse(&pattern, positions);
         let mut solver = Self {
             matrix: vec![0.0; pattern.entries()],
             pattern,
             cholesky,
-            held: HeldRows::default(),
+            constrained: ConstrainedRows::default(),
             penalty: 0.0,
             positions: Vec::new(),
             work: Work::default(),
         };
-        solver.hold(held);
+        solver.constrain(rows);
         solver
     }
 
-    /// Holds other rows from now on; the symbolic analysis is kept. The pattern must cover their stencils too.
+    /// Constrains other rows from now on; the symbolic analysis is kept. The pattern must cover their stencils too.
     ///
     /// # Panics
-    /// When the pattern misses a pair of a held stencil.
-    pub fn hold(&mut self, held: HeldRows) {
+    /// When the pattern misses a pair of a constrained stencil.
+    pub fn constrain(&mut self, rows: ConstrainedRows) {
         self.positions.clear();
-        for nodes in held.node_lists() {
+        for nodes in rows.node_lists() {
             for (column, &j) in nodes.iter().enumerate() {
-                let find =
-                    |&i: &u32| self.pattern.block_position(i, j).expect("the pattern covers the held rows") as u32;
+                let find = |&i: &u32| {
+                    self.pattern.block_position(i, j).expect("the pattern covers the constrained rows") as u32
+                };
                 self.positions.extend(nodes[column..].iter().map(find));
             }
         }
-        self.held = held;
+        self.constrained = rows;
     }
 
     /// The sparsity pattern.
@@ -85,9 +86,9 @@ impl<const D: usize> ConstrainedSolver<D> {
         &self.pattern
     }
 
-    /// The held rows.
-    pub fn held(&self) -> &HeldRows {
-        &self.held
+    /// The constrained rows.
+    pub fn constrained(&self) -> &ConstrainedRows {
+        &self.constrained
     }
 
     /// Entries of the Cholesky factor.
@@ -119,17 +120,17 @@ impl<const D: usize> ConstrainedSolver<D> {
         (0..n).map(|u| self.matrix[self.pattern.diagonal_position(u)]).sum::<f64>() / n as f64
     }
 
-    /// Factorises the assembled tangent with the held rows' penalty. The penalty is fixed by the first call.
+    /// Factorises the assembled tangent with the constrained rows' penalty. The penalty is fixed by the first call.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when the tangent is not, on the displacements that the held values leave free.
+    /// [`NotPositiveDefinite`] when the tangent is not, on the displacements that the prescribed values leave free.
     pub fn factorise(&mut self) -> Result<(), NotPositiveDefinite> {
         if self.penalty == 0.0 {
             self.penalty = PENALTY * self.mean_diagonal();
         }
         let mut next = 0;
-        for b in 0..self.held.len() {
-            let (nodes, values) = self.held.row(b);
+        for b in 0..self.constrained.len() {
+            let (nodes, values) = self.constrained.row(b);
             for (column, &j) in nodes.iter().enumerate() {
                 let stride = self.pattern.column_length(j);
                 for value in &values[column..] {
@@ -162,14 +163,14 @@ impl<const D: usize> ConstrainedSolver<D> {
     /// # Panics
     /// When the lengths do not belong to the same number of right-hand sides.
     pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, x: &mut [f64], mu: &mut [f64]) {
-        let (unknowns, rows) = (self.pattern.unknowns(), self.held.len() * D);
+        let (unknowns, rows) = (self.pattern.unknowns(), self.constrained.len() * D);
         let columns = rhs.len() / unknowns;
         assert!(x.len() == rhs.len() && gap.len() == columns * rows && mu.len() == gap.len(), "one shape");
         let Work { solution, weighted, violation } = &mut self.work;
         solution.resize(rhs.len(), 0.0);
         weighted.resize(gap.len(), 0.0);
         violation.resize(gap.len(), 0.0);
-        // Where nothing is held there are no rows to walk through.
+        // Where nothing is constrained there are no rows to walk through.
         let by_column = |c: usize| (c * unknowns..(c + 1) * unknowns, c * rows..(c + 1) * rows);
 
         // First round: K_ρ x = rhs + Λᵀ (ρ gap − μ).
@@ -177,15 +178,15 @@ impl<const D: usize> ConstrainedSolver<D> {
         for ((w, g), m) in weighted.iter_mut().zip(gap).zip(mu.iter()) {
             *w = self.penalty * g - m;
         }
-        for (free, held) in (0..columns).map(by_column) {
-            self.held.add_transpose::<D>(&weighted[held], &mut solution[free]);
+        for (free, row) in (0..columns).map(by_column) {
+            self.constrained.add_transpose::<D>(&weighted[row], &mut solution[free]);
         }
         self.cholesky.solve(solution, columns);
         x.copy_from_slice(solution);
         let mut previous = f64::INFINITY;
         for _ in 0..MAX_ROUNDS {
-            for (free, held) in (0..columns).map(by_column) {
-                self.held.apply::<D>(&x[free], &mut violation[held]);
+            for (free, row) in (0..columns).map(by_column) {
+                self.constrained.apply::<D>(&x[free], &mut violation[row]);
             }
             let mut largest = 0.0_f64;
             for ((v, g), m) in violation.iter_mut().zip(gap).zip(mu.iter_mut()) {
@@ -202,8 +203,8 @@ impl<const D: usize> ConstrainedSolver<D> {
                 *w = -self.penalty * v;
             }
             solution.fill(0.0);
-            for (free, held) in (0..columns).map(by_column) {
-                self.held.add_transpose::<D>(&weighted[held], &mut solution[free]);
+            for (free, row) in (0..columns).map(by_column) {
+                self.constrained.add_transpose::<D>(&weighted[row], &mut solution[free]);
             }
             self.cholesky.solve(solution, columns);
             for (x, s) in x.iter_mut().zip(solution.iter()) {

@@ -1,4 +1,4 @@
-//! Static equilibrium under held nodal values: Newton's method on the total Lagrangian weak form, with line search on
+//! Static equilibrium under prescribed nodal values: Newton's method on the total Lagrangian weak form, with line search on
 //! the energy and adaptive cutback of the increment.
 //!
 //! Loading is by prescribed displacement and dead loads, so an equilibrium is a stationary point of the potential energy over the
@@ -9,8 +9,8 @@ use super::constrained::ConstrainedSolver;
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::linalg::Pattern;
-use crate::mechanics::assembly::{self, Inverted, Scatter, State, Tissue};
-use crate::mechanics::{HeldRows, WeaklyHeld};
+use crate::mechanics::assembly::{self, BlockPositions, Inverted, State, Tissue};
+use crate::mechanics::{Constraints, WeaklyImposed};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ pub enum FailureReason {
     /// The equilibrium is not stable: its tangent is not positive definite.
     #[error("lost-stability")]
     LostStability,
-    /// The tangent at rest is singular: the body is not held, or the rule has zero-energy modes.
+    /// The tangent at rest is singular: too little of the boundary is constrained, or the rule has zero-energy modes.
     #[error("singular-tangent")]
     SingularTangent,
     /// Newton's method did not converge.
@@ -88,20 +88,33 @@ pub struct Effort {
     pub cutbacks: u32,
 }
 
+/// What a body is made of once it is discretized.
+#[derive(Debug, Clone)]
+pub struct DiscreteBody<'a, const D: usize> {
+    /// Integration rule.
+    pub rule: Arc<Quadrature<D>>,
+    /// Materials by cell.
+    pub tissue: Tissue,
+    /// Positions of the nodes at rest, length units.
+    pub positions: &'a [Point<D>],
+    /// A typical node spacing: the length that step tolerances are relative to.
+    pub spacing: f64,
+}
+
 /// A body in equilibrium, and the means to take it to the next.
 #[derive(Debug)]
 pub struct Equilibrium<const D: usize> {
     rule: Arc<Quadrature<D>>,
     tissue: Tissue,
-    scatter: Scatter,
+    blocks: BlockPositions,
     solver: ConstrainedSolver<D>,
-    weak: Option<Arc<dyn WeaklyHeld>>,
+    weak: Option<Arc<dyn WeaklyImposed>>,
     settings: NewtonSettings,
     /// Length that step tolerances are relative to.
     spacing: f64,
     /// Force that moves a node by a thousandth of the spacing: what residuals are relative to at rest.
     smallest_force: f64,
-    at: Snapshot<D>,
+    at: Configuration<D>,
     /// Whether the factor belongs to the current state.
     factor_is_current: bool,
     factor_exists: bool,
@@ -111,10 +124,10 @@ pub struct Equilibrium<const D: usize> {
 
 /// Everything that a failed increment must give back.
 #[derive(Debug, Clone)]
-struct Snapshot<const D: usize> {
+struct Configuration<const D: usize> {
     coefficients: Vec<f64>,
     multipliers: Vec<f64>,
-    /// Values of the held rows, then those of the weakly held points.
+    /// Values of the constrained rows, then those of the weakly imposed points.
     prescribed: Vec<f64>,
     /// Dead load, D numbers per node.
     external: Vec<f64>,
@@ -130,55 +143,37 @@ enum Attempt {
 }
 
 impl<const D: usize> Equilibrium<D> {
-    /// A body at rest with nodes at `positions`, integrated by `rule`, made of `tissue`, with `held` rows whose
-    /// values will be prescribed. `spacing` is a typical node spacing.
+    /// A body at rest, of which `constraints` will be prescribed.
     ///
     /// # Errors
     /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
     pub fn at_rest(
-        rule: Arc<Quadrature<D>>,
-        tissue: Tissue,
-        held: HeldRows,
-        positions: &[Point<D>],
-        spacing: f64,
+        body: DiscreteBody<'_, D>,
+        constraints: impl Into<Constraints>,
         settings: NewtonSettings,
     ) -> Result<Self, Failure> {
-        Self::at_rest_with(rule, tissue, held, None, positions, spacing, settings)
-    }
-
-    /// The same with points that are held weakly.
-    ///
-    /// # Errors
-    /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
-    pub fn at_rest_with(
-        rule: Arc<Quadrature<D>>,
-        tissue: Tissue,
-        held: HeldRows,
-        weak: Option<Arc<dyn WeaklyHeld>>,
-        positions: &[Point<D>],
-        spacing: f64,
-        settings: NewtonSettings,
-    ) -> Result<Self, Failure> {
+        let DiscreteBody { rule, tissue, positions, spacing } = body;
+        let Constraints { rows, weak } = constraints.into();
         let nodes = positions.len();
         let weak_lists = weak.as_ref().map_or_else(Vec::new, |w| w.node_lists());
         let lists =
-            (0..rule.len()).map(|q| rule.point(q).nodes).chain(held.node_lists()).chain(weak_lists.iter().copied());
+            (0..rule.len()).map(|q| rule.point(q).nodes).chain(rows.node_lists()).chain(weak_lists.iter().copied());
         let pattern = Pattern::new(D, nodes, lists);
-        let scatter = Scatter::new(&rule, &pattern);
-        let at = Snapshot {
+        let blocks = BlockPositions::new(&rule, &pattern);
+        let at = Configuration {
             coefficients: vec![0.0; nodes * D],
-            multipliers: vec![0.0; held.len() * D],
-            prescribed: vec![0.0; held.len() * D + weak.as_ref().map_or(0, |w| w.prescribed())],
+            multipliers: vec![0.0; rows.len() * D],
+            prescribed: vec![0.0; rows.len() * D + weak.as_ref().map_or(0, |w| w.prescribed())],
             external: vec![0.0; nodes * D],
             force: vec![0.0; nodes * D],
             energy: 0.0,
             state: State::default(),
         };
-        let solver = ConstrainedSolver::new(pattern, positions, held);
+        let solver = ConstrainedSolver::new(pattern, positions, rows);
         let mut body = Self {
             rule,
             tissue,
-            scatter,
+            blocks,
             solver,
             weak,
             settings,
@@ -212,7 +207,7 @@ impl<const D: usize> Equilibrium<D> {
         &self.at.coefficients
     }
 
-    /// Forces that hold the held nodes, D numbers per row: −μ.
+    /// Forces that hold the constrained nodes, D numbers per row: −μ.
     pub fn reactions(&self) -> impl Iterator<Item = f64> + '_ {
         self.at.multipliers.iter().map(|m| -m)
     }
@@ -252,7 +247,7 @@ impl<const D: usize> Equilibrium<D> {
         self.solver.factor_entries()
     }
 
-    /// Takes the held values from where they are to `prescribed` (D numbers per row, then those of the weakly held
+    /// Takes the prescribed values from where they are to `prescribed` (D numbers per row, then those of the weakly imposed
     /// points), cutting the way into pieces where it must.
     ///
     /// # Errors
@@ -262,7 +257,7 @@ impl<const D: usize> Equilibrium<D> {
         self.drive_loaded(prescribed, &external)
     }
 
-    /// Takes held values and dead load (D numbers per node) together to what is given.
+    /// Takes prescribed values and dead load (D numbers per node) together to what is given.
     ///
     /// # Errors
     /// [`Failure`] with the reason; the body is then at the last state that converged on the way.
@@ -300,7 +295,7 @@ impl<const D: usize> Equilibrium<D> {
         Ok(())
     }
 
-    /// Response of the coefficients to unit rates of the held values at the current state: solves
+    /// Response of the coefficients to unit rates of the prescribed values at the current state: solves
     /// `K x + Λᵀ μ = 0, Λ x = rates`. This is the exact linearisation of the equilibrium.
     ///
     /// # Errors
@@ -312,8 +307,8 @@ impl<const D: usize> Equilibrium<D> {
         let n = self.at.coefficients.len();
         let (strong, weak) = rates.split_at(self.at.multipliers.len());
         let (mut x, mut mu, mut rhs) = (vec![0.0; n], vec![0.0; strong.len()], vec![0.0; n]);
-        if let Some(held) = &self.weak {
-            held.add_response(&self.tissue, &self.at.coefficients, weak, &mut rhs);
+        if let Some(imposed) = &self.weak {
+            imposed.add_response(&self.tissue, &self.at.coefficients, weak, &mut rhs);
         }
         self.solver.solve(&rhs, strong, 1e-14, &mut x, &mut mu);
         Ok(x)
@@ -340,9 +335,9 @@ impl<const D: usize> Equilibrium<D> {
 
     /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
     fn refactorise(&mut self) -> bool {
-        let (rule, tissue, at, scatter, weak) = (&self.rule, &self.tissue, &self.at, &self.scatter, &self.weak);
+        let (rule, tissue, at, blocks, weak) = (&self.rule, &self.tissue, &self.at, &self.blocks, &self.weak);
         self.solver.assemble(|pattern, values| {
-            assembly::tangent(rule, tissue, &at.state, pattern, scatter, values);
+            assembly::tangent(rule, tissue, &at.state, pattern, blocks, values);
             if let Some(weak) = weak {
                 weak.add_tangent(tissue, &at.coefficients, pattern, values);
             }
@@ -370,7 +365,7 @@ impl<const D: usize> Equilibrium<D> {
     /// Newton's method towards the prescribed values and the load.
     fn attempt(&mut self) -> Attempt {
         let n = self.at.coefficients.len();
-        // Load and weakly held values are part of the energy, which has changed with them.
+        // Load and weakly imposed values are part of the energy, which has changed with them.
         let loaded = self.weak.is_some() || self.at.external.iter().any(|f| *f != 0.0);
         if loaded && self.evaluate().is_err() {
             return Attempt::Failed(FailureReason::ElementInverted, "before the first step".into());
@@ -390,7 +385,7 @@ impl<const D: usize> Equilibrium<D> {
                     return Attempt::Failed(FailureReason::LostStability, "tangent indefinite, no shift helps".into());
                 }
             }
-            self.solver.held().apply::<D>(&self.at.coefficients, &mut gap);
+            self.solver.constrained().apply::<D>(&self.at.coefficients, &mut gap);
             for (g, p) in gap.iter_mut().zip(&self.at.prescribed) {
                 *g = p - *g;
             }
@@ -442,7 +437,7 @@ impl<const D: usize> Equilibrium<D> {
         Attempt::Failed(FailureReason::NotConverged, "no iterations allowed".into())
     }
 
-    /// Takes the step, shortened until the configuration is admissible and (when the held values are already met and
+    /// Takes the step, shortened until the configuration is admissible and (when the prescribed values are already met and
     /// `slope` is given) the energy has decreased enough (Armijo). Where the decrease drowns in the rounding of the
     /// energy, as in the small steps of a simulation, the slope decides instead: the approximate Wolfe condition of
     /// Hager and Zhang (SIAM J. Optim. 16, 2005, equation 4.1).
@@ -492,12 +487,12 @@ impl<const D: usize> Equilibrium<D> {
     /// ‖f + Λᵀ μ‖ over the largest of ‖Λᵀ μ‖, the load, and (near rest) the force of a negligible displacement.
     fn relative_residual(&self, mu: &[f64]) -> f64 {
         let mut reaction = vec![0.0; self.at.force.len()];
-        self.solver.held().add_transpose::<D>(mu, &mut reaction);
+        self.solver.constrained().add_transpose::<D>(mu, &mut reaction);
         let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
         let residual = norm(&mut reaction.iter().zip(&self.at.force).map(|(r, f)| r + f));
-        let held = norm(&mut reaction.iter().copied());
+        let holding = norm(&mut reaction.iter().copied());
         let load = norm(&mut self.at.external.iter().copied());
-        residual / held.max(load).max(self.smallest_force)
+        residual / holding.max(load).max(self.smallest_force)
     }
 }
 

@@ -10,17 +10,20 @@
 
 use super::candidates::{Measured, families, measure};
 use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
+use super::measurement::Linearity;
 use crate::discretization::{Basis, Discretization, Integration, Resolution};
 use crate::model::{ModelError, TissueModel, graded_model};
 use crate::placement::adaptive::Reference;
 use crate::placement::study::best_dynamic;
-use crate::reduction::{Condensed, TrainingOptions, train};
+use crate::reduction::{Condensed, Invalid, TrainingOptions, train};
 use crate::scene::Scene;
 use crate::scene::schema::{FitSection, PlantModel, TableScalar};
+use crate::solver::equilibrium::Failure;
 use crate::table::{TableBuildError, TableOptions, build as build_table};
 use firmware::contract::Table;
 use nalgebra::Vector2;
 use serde::Serialize;
+use std::convert::Infallible;
 use std::time::Instant;
 
 /// Part of the tolerance that the reference may leave open.
@@ -52,8 +55,8 @@ pub struct Chosen {
     pub spacing: f64,
     /// Number of nodes.
     pub nodes: usize,
-    /// `linear` or `nonlinear`.
-    pub law: &'static str,
+    /// Which law.
+    pub law: Linearity,
     /// What a simulator should solve.
     pub plant: PlantModel,
     /// Depth up to which that plant holds, length units.
@@ -64,13 +67,27 @@ pub struct Chosen {
     pub table_scalar: TableScalar,
 }
 
+/// What a fit decides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Decision {
+    /// How the tissue is discretized.
+    Discretization,
+    /// Whether the linear law will do.
+    Law,
+    /// What a simulator solves.
+    Plant,
+    /// Knots and number type of the table.
+    Table,
+}
+
 /// Something cheaper that is not good enough, or something good enough that is dearer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rejected {
     /// What it is.
     pub candidate: String,
-    /// What it decides: `discretization`, `law`, `plant` or `table`.
-    pub decision: &'static str,
+    /// What it decides.
+    pub decision: Decision,
     /// The number that rejected it.
     pub number: f64,
     /// What the number is, or why there is none.
@@ -173,7 +190,7 @@ pub fn discretization(
                 Ok(outcome) => outcome,
                 Err(error) => {
                     let reason = format!("does not work: {error}");
-                    unusable.push(rejection("discretization", candidate.to_string(), f64::NAN, reason));
+                    unusable.push(rejection(Decision::Discretization, candidate.to_string(), f64::NAN, reason));
                     break;
                 }
             };
@@ -196,12 +213,17 @@ pub fn discretization(
         match &chosen {
             Some(best) if error <= tolerance => {
                 let times = outcome.wall_s / best.1.wall_s;
-                rejected.push(rejection("discretization", name, times, "times the time of the chosen one".into()));
+                rejected.push(rejection(
+                    Decision::Discretization,
+                    name,
+                    times,
+                    "times the time of the chosen one".into(),
+                ));
             }
             // Dearer and worse: nothing to say about it.
             Some(_) => {}
             None if error > tolerance => {
-                rejected.push(rejection("discretization", name, error, "estimated error".into()));
+                rejected.push(rejection(Decision::Discretization, name, error, "estimated error".into()));
             }
             None => {
                 let finer = Discretization { resolution: candidate.resolution.finer(), ..candidate };
@@ -212,14 +234,14 @@ pub fn discretization(
                         chosen = Some((candidate, outcome, measure.max(displacement)));
                     }
                     Ok((measure, displacement)) => rejected.push(rejection(
-                        "discretization",
+                        Decision::Discretization,
                         name,
                         measure.max(displacement),
                         "distance from the next finer model".into(),
                     )),
                     Err(error) => {
                         let reason = format!("the next finer model does not work: {error}");
-                        rejected.push(rejection("discretization", name, f64::NAN, reason));
+                        rejected.push(rejection(Decision::Discretization, name, f64::NAN, reason));
                     }
                 }
             }
@@ -233,7 +255,7 @@ fn build(scene: &Scene, discretization: &Discretization) -> Result<TissueModel, 
     TissueModel::new(&scene.with_discretization(*discretization))
 }
 
-fn rejection(decision: &'static str, candidate: String, number: f64, reason: String) -> Rejected {
+fn rejection(decision: Decision, candidate: String, number: f64, reason: String) -> Rejected {
     Rejected { candidate, decision, number, reason }
 }
 
@@ -247,7 +269,7 @@ fn law_and_plant(
     tolerance: f64,
     threads: usize,
     rejected: &mut Vec<Rejected>,
-) -> Result<(&'static str, PlantModel, f64, f64), ModelError> {
+) -> Result<(Linearity, PlantModel, f64, f64), ModelError> {
     let (limited, _) = with_mesh_limit(scene)?;
     let compared = if model.nodes() <= LAW_NODES {
         build(&limited, candidate)?
@@ -259,41 +281,41 @@ fn law_and_plant(
     let paddle = model.paddle_position(best_dynamic(model)?);
     if law_error <= tolerance {
         let condensed = Condensed::new(model, paddle)?;
-        let step_us = step_us(scene, scene.needle.depth, |depth| {
+        let step_us = step_us(scene, scene.needle.depth, |depth| -> Result<_, Infallible> {
             Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
         });
-        return Ok(("linear", PlantModel::Condensed, scene.needle.depth, step_us));
+        return Ok((Linearity::Linear, PlantModel::Condensed, scene.needle.depth, step_us));
     }
     let reason = "error of the target displacement along the insertion by the linear law".to_owned();
-    rejected.push(rejection("law", "linear law, condensed plant".into(), law_error, reason));
+    rejected.push(rejection(Decision::Law, "linear law, condensed plant".into(), law_error, reason));
     let options = TrainingOptions { tolerance, threads, ..TrainingOptions::default() };
     match train(model, paddle, &options) {
         Ok((reduced, report)) => {
             let mut body = reduced.body();
-            let step_us = step_us(scene, report.domain.depth, |depth| {
-                body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
+            let step_us = step_us(scene, report.domain.depth, |depth| -> Result<_, Invalid> {
+                body.drive(depth, Vector2::zeros())?;
                 Ok(body.target_displacement())
             });
-            Ok(("nonlinear", PlantModel::Reduced, report.domain.depth, step_us))
+            Ok((Linearity::Nonlinear, PlantModel::Reduced, report.domain.depth, step_us))
         }
         Err(error) => {
-            rejected.push(rejection("plant", "reduced plant".into(), f64::NAN, error.to_string()));
+            rejected.push(rejection(Decision::Plant, "reduced plant".into(), f64::NAN, error.to_string()));
             let mut body = model.body(paddle, TICK_SETTINGS)?;
             // As far as the tissue goes.
             let _ = body.drive(scene.needle.depth, Vector2::zeros());
             let reached = body.depth();
             let mut body = model.body(paddle, TICK_SETTINGS)?;
-            let step_us = step_us(scene, reached, |depth| {
-                body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
+            let step_us = step_us(scene, reached, |depth| -> Result<_, Failure> {
+                body.drive(depth, Vector2::zeros())?;
                 Ok(body.target_displacement())
             });
-            Ok(("nonlinear", PlantModel::Full, reached, step_us))
+            Ok((Linearity::Nonlinear, PlantModel::Full, reached, step_us))
         }
     }
 }
 
 /// Time of a step over the insertion to `depth`, µs; NaN where it fails.
-fn step_us(scene: &Scene, depth: f64, step: impl FnMut(f64) -> Result<Vector2<f64>, String>) -> f64 {
+fn step_us<E>(scene: &Scene, depth: f64, step: impl FnMut(f64) -> Result<Vector2<f64>, E>) -> f64 {
     let mut shallow = scene.clone();
     shallow.needle.depth = depth;
     time_ticks(&shallow, TICKS, step).map_or(f64::NAN, |(seconds, _)| 1e6 * seconds)
@@ -327,14 +349,14 @@ fn table(model: &TissueModel, tolerance: f64, rejected: &mut Vec<Rejected>) -> R
             break;
         }
         let reason = "error of Jacobian or paddle path between its knots".to_owned();
-        rejected.push(rejection("table", format!("{count} knots"), error, reason));
+        rejected.push(rejection(Decision::Table, format!("{count} knots"), error, reason));
     }
     let rounding = table_distance(&dense.cast::<f32>().cast::<f64>(), &dense);
     // Rounding must disappear in the tolerance, not use it up.
     if rounding <= 0.01 * tolerance {
         return Ok((knots as u32, TableScalar::F32));
     }
-    rejected.push(rejection("table", "f32".into(), rounding, "relative error of rounding".into()));
+    rejected.push(rejection(Decision::Table, "f32".into(), rounding, "relative error of rounding".into()));
     Ok((knots as u32, TableScalar::F64))
 }
 
@@ -382,11 +404,10 @@ impl Fit {
             section["basis"] = toml_edit::value(self.chosen.basis.name());
         }
         let FitSection { plant, table_knots, table_scalar } = self.section();
-        let word = |value: serde_json::Value| value.as_str().unwrap_or_default().to_owned();
         let mut fit = toml_edit::Table::new();
-        fit["plant"] = toml_edit::value(word(serde_json::json!(plant)));
+        fit["plant"] = toml_edit::value(plant.to_string());
         fit["table_knots"] = toml_edit::value(i64::from(table_knots));
-        fit["table_scalar"] = toml_edit::value(word(serde_json::json!(table_scalar)));
+        fit["table_scalar"] = toml_edit::value(table_scalar.to_string());
         document["fit"] = toml_edit::Item::Table(fit);
         Ok(document.to_string())
     }
@@ -419,10 +440,10 @@ impl Fit {
             c.integration,
             c.nodes,
             c.law,
-            serde_json::json!(c.plant).as_str().unwrap_or_default(),
+            c.plant,
             c.plant_depth,
             c.table_knots,
-            serde_json::json!(c.table_scalar).as_str().unwrap_or_default(),
+            c.table_scalar,
             100.0 * self.error_estimate,
             100.0 * self.verified_error,
             1e3 * self.wall_s,

@@ -1,15 +1,16 @@
 //! Finite depth: the insertion by every method and law, and what one tick of it costs a simulator.
 
 use super::candidates::base_spacing;
-use super::pareto::{Job, Point};
+use super::measurement::{Job, Linearity, ModelKind, Point};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::material::{Law, Material};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
-use crate::reduction::{Condensed, TrainingOptions, train};
+use crate::reduction::{Condensed, Invalid, TrainingOptions, train};
 use crate::scene::Scene;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::Vector2;
+use std::convert::Infallible;
 use std::time::Instant;
 use strum::VariantArray as _;
 
@@ -124,12 +125,15 @@ pub(super) fn insertion_points(scene: &Scene, quick: bool) -> Result<Insertion, 
     for &integration in Integration::VARIANTS {
         for &nodes in nodes {
             let candidate = scene.discretization.with(nodes, Method::new(integration));
-            for law in ["nonlinear", "linear"] {
+            for law in [Linearity::Nonlinear, Linearity::Linear] {
                 let mut point = Point::new(Job::Insertion, candidate, law);
                 let start = Instant::now();
                 let outcome = build(scene, candidate).and_then(|model| {
                     (point.nodes, point.spacing) = (model.nodes(), model.spacing());
-                    if law == "linear" { linear_profile(&model) } else { Ok(profile(&model)?) }
+                    match law {
+                        Linearity::Linear => linear_profile(&model),
+                        Linearity::Nonlinear => Ok(profile(&model)?),
+                    }
                 });
                 point.wall_s = start.elapsed().as_secs_f64();
                 match outcome {
@@ -156,53 +160,52 @@ pub(super) fn step_points(scene: &Scene, quick: bool, reference: &Profile) -> Re
         let model = build(scene, candidate)?;
         let paddle = best_dynamic(&model)?;
         let reference = vec![reference[paddle].clone()];
-        let mut add = |method: &'static str, law: &'static str, measured: Result<(f64, Profile), String>| {
-            let mut point = Point::new(Job::Step, candidate, law);
-            if method != "full" {
-                point.method = method;
-            }
-            (point.nodes, point.spacing) = (model.nodes(), model.spacing());
-            match measured {
-                Ok((wall_s, profile)) => {
-                    point.wall_s = wall_s;
-                    point.error_static = profile_distance(&profile, &reference);
-                }
-                Err(reason) => point.failure = Some(reason),
-            }
-            points.push(point);
-        };
+        let ticks = if quick { 200 } else { TICKS };
         let mut body = model.body(Some(paddle), TICK_SETTINGS)?;
-        add(
-            "full",
-            "nonlinear",
-            time_ticks(scene, if quick { 200 } else { TICKS }, |depth| {
-                body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
-                Ok(body.target_displacement())
-            }),
-        );
-        let reduced = train(&model, Some(paddle), &TrainingOptions::default()).map_err(|e| e.to_string());
-        add(
-            "reduced",
-            "nonlinear",
-            reduced.and_then(|(reduced, _)| {
-                let mut body = reduced.body();
-                time_ticks(scene, TICKS, |depth| {
-                    body.drive(depth, Vector2::zeros()).map_err(|e| e.to_string())?;
-                    Ok(body.target_displacement())
-                })
-            }),
-        );
-        let condensed = Condensed::new(&model, Some(paddle))?;
-        let condensed = std::hint::black_box(condensed);
-        add(
-            "condensed",
-            "linear",
-            time_ticks(scene, TICKS, |depth| {
-                Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
-            }),
-        );
+        let full = time_ticks(scene, ticks, |depth| -> Result<_, Failure> {
+            body.drive(depth, Vector2::zeros())?;
+            Ok(body.target_displacement())
+        });
+        let empty = Point::new(Job::Step, candidate, Linearity::Nonlinear);
+        let empty = Point { nodes: model.nodes(), spacing: model.spacing(), ..empty };
+        points.push(timed(empty.clone(), &reference, full));
+        points.push(reduced_point(scene, &model, paddle, &reference, empty.clone()));
+        let condensed = std::hint::black_box(Condensed::new(&model, Some(paddle))?);
+        let linear = time_ticks(scene, TICKS, |depth| -> Result<_, Infallible> {
+            Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
+        });
+        let empty = Point { method: ModelKind::Condensed, law: Linearity::Linear, ..empty };
+        points.push(timed(empty, &reference, linear));
     }
     Ok(points)
+}
+
+/// One tick of a model reduced with the usual options.
+fn reduced_point(scene: &Scene, model: &TissueModel, paddle: usize, reference: &Profile, empty: Point) -> Point {
+    let empty = Point { method: ModelKind::Reduced, ..empty };
+    match train(model, Some(paddle), &TrainingOptions::default()) {
+        Ok((reduced, _)) => {
+            let mut body = reduced.body();
+            let measured = time_ticks(scene, TICKS, |depth| -> Result<_, Invalid> {
+                body.drive(depth, Vector2::zeros())?;
+                Ok(body.target_displacement())
+            });
+            timed(empty, reference, measured)
+        }
+        Err(error) => Point { failure: Some(error.to_string()), ..empty },
+    }
+}
+
+/// A point with its time and error, or with why it has none.
+fn timed<E: std::fmt::Display>(mut point: Point, reference: &Profile, measured: Result<(f64, Profile), E>) -> Point {
+    match measured {
+        Ok((wall_s, profile)) => {
+            point.wall_s = wall_s;
+            point.error_static = profile_distance(&profile, reference);
+        }
+        Err(error) => point.failure = Some(error.to_string()),
+    }
+    point
 }
 
 /// Newton's method for the small steps of a simulator: the last factor nearly always does.
@@ -222,11 +225,14 @@ fn best_dynamic(model: &TissueModel) -> Result<usize, ModelError> {
 }
 
 /// Mean time of a tick over the insertion, best of three, and the displacements at the increments' depths.
-pub(super) fn time_ticks(
+///
+/// # Errors
+/// That of the first step that fails.
+pub(super) fn time_ticks<E>(
     scene: &Scene,
     ticks: u32,
-    mut step: impl FnMut(f64) -> Result<Vector2<f64>, String>,
-) -> Result<(f64, Profile), String> {
+    mut step: impl FnMut(f64) -> Result<Vector2<f64>, E>,
+) -> Result<(f64, Profile), E> {
     let mut best = f64::INFINITY;
     for _ in 0..3 {
         step(0.0)?;

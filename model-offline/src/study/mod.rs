@@ -2,6 +2,7 @@
 pub mod candidates;
 pub mod fit;
 pub mod insertion;
+pub mod measurement;
 pub mod pareto;
 mod pareto_chart;
 pub mod stability;

@@ -9,10 +9,12 @@
 
 use super::candidates::{families, measure};
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
-use crate::discretization::{Discretization, Resolution};
+use super::measurement::{Job, Linearity, Point};
+use crate::discretization::Discretization;
 use crate::model::ModelError;
 use crate::placement::adaptive::Reference;
 use crate::scene::Scene;
+use strum::VariantArray as _;
 
 /// Distance of the reference's two levels at which it is fine enough to judge the finest candidates.
 const REFERENCE_SHARE: f64 = 1e-3;
@@ -21,62 +23,6 @@ const REPEATS: u32 = 5;
 /// A family is not refined beyond a candidate that took longer than this.
 const LONGEST_S: f64 = 1.5;
 const LONGEST_QUICK_S: f64 = 0.2;
-
-/// One setting, measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Point {
-    /// Which job.
-    pub job: Job,
-    /// `rkpm`, `fem`, `reduced` or `condensed`.
-    pub method: &'static str,
-    /// The discretization.
-    pub discretization: Discretization,
-    /// Number of nodes (0 where building failed).
-    pub nodes: usize,
-    /// Finest spacing, length units.
-    pub spacing: f64,
-    /// `linear` or `nonlinear`.
-    pub law: &'static str,
-    /// Best time, s.
-    pub wall_s: f64,
-    /// Worst relative error of the controllability measures; NaN where the job has none.
-    pub error_cm: f64,
-    /// Worst error of the target displacement, over the largest.
-    pub error_static: f64,
-    /// Why it failed.
-    pub failure: Option<String>,
-    /// Whether nothing is both faster and more accurate.
-    pub on_front: bool,
-}
-
-/// What is charted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Job {
-    /// Jacobians and small-depth displacements of all paddles.
-    Placement,
-    /// Target displacement along the insertion, all paddles.
-    Insertion,
-    /// One tick of a simulator.
-    Step,
-}
-
-impl Job {
-    /// Name in the CSV.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Placement => "placement",
-            Self::Insertion => "insertion",
-            Self::Step => "step",
-        }
-    }
-}
-
-impl Point {
-    /// The error by which the job's front is drawn.
-    pub fn error(&self) -> f64 {
-        if self.job == Job::Placement { self.error_cm } else { self.error_static }
-    }
-}
 
 /// A whole comparison.
 #[derive(Debug, Clone)]
@@ -119,7 +65,7 @@ pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Par
     let (open, nodes) = (insertion.open, insertion.reference_nodes);
     points.extend(insertion.points);
     points.extend(steps);
-    for job in [Job::Placement, Job::Insertion, Job::Step] {
+    for &job in Job::VARIANTS {
         mark_front(&mut points, job);
     }
     progress(1.0);
@@ -127,7 +73,7 @@ pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Par
 }
 
 fn placement_point(discretization: Discretization, scene: &Scene, reference: &Reference) -> Point {
-    let mut point = Point::new(Job::Placement, discretization, "linear");
+    let mut point = Point::new(Job::Placement, discretization, Linearity::Linear);
     let start = std::time::Instant::now();
     match measure(discretization, scene, reference, REPEATS) {
         Ok(measured) => {
@@ -140,24 +86,6 @@ fn placement_point(discretization: Discretization, scene: &Scene, reference: &Re
         }
     }
     point
-}
-
-impl Point {
-    pub(super) fn new(job: Job, discretization: Discretization, law: &'static str) -> Self {
-        Self {
-            job,
-            method: if discretization.method.integration.is_element() { "fem" } else { "rkpm" },
-            discretization,
-            nodes: 0,
-            spacing: if let Resolution::Spacing(h) = discretization.resolution { h } else { f64::NAN },
-            law,
-            wall_s: f64::NAN,
-            error_cm: f64::NAN,
-            error_static: f64::NAN,
-            failure: None,
-            on_front: false,
-        }
-    }
 }
 
 /// Marks the points of a job that no other beats in both time and error.
@@ -192,7 +120,7 @@ impl Pareto {
             let method = p.discretization.method;
             let element = method.integration.is_element();
             let fields = [
-                p.method.to_owned(),
+                p.method.to_string(),
                 method.displacement_basis().to_string(),
                 method.integration.to_string(),
                 p.discretization.resolution.is_graded().to_string(),
@@ -200,13 +128,13 @@ impl Pareto {
                 if element { String::new() } else { method.support.to_string() },
                 p.nodes.to_string(),
                 (2 * p.nodes).to_string(),
-                p.law.to_owned(),
+                p.law.to_string(),
                 number(p.wall_s),
                 number(p.error_cm),
                 number(p.error_static),
                 p.failure.is_some().to_string(),
                 p.on_front.to_string(),
-                p.job.name().to_owned(),
+                p.job.to_string(),
                 // One line, no quotes to escape.
                 p.failure.as_deref().unwrap_or("").replace([',', '"', '\n'], ";"),
             ];
@@ -220,13 +148,13 @@ impl Pareto {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::discretization::{Integration, Method};
-    use strum::VariantArray as _;
+    use crate::discretization::{Integration, Method, Resolution};
 
     #[test]
     fn the_front_is_what_nothing_beats() {
         let candidate = Discretization::new(Resolution::Spacing(0.1), Method::new(Integration::Scni));
-        let at = |wall_s, error_cm| Point { wall_s, error_cm, ..Point::new(Job::Placement, candidate, "linear") };
+        let at =
+            |wall_s, error_cm| Point { wall_s, error_cm, ..Point::new(Job::Placement, candidate, Linearity::Linear) };
         let mut points = vec![at(1.0, 0.1), at(2.0, 0.2), at(3.0, 0.05), at(0.5, 0.3), at(0.4, f64::NAN)];
         points.push(Point { failure: Some("x".into()), ..at(0.1, 0.01) });
         mark_front(&mut points, Job::Placement);
@@ -253,12 +181,12 @@ mod tests {
         assert_eq!(csv.lines().count(), pareto.points.len() + 1);
         assert!(csv.lines().all(|line| line.matches(',').count() == 15));
         // The linear law is cheaper and, at full depth, worse than the nonlinear one on the same nodes.
-        let by_law = |law: &str| {
+        let by_law = |law: Linearity| {
             pareto.points.iter().find(|p| {
                 p.job == Job::Insertion && p.law == law && p.discretization.method.integration == Integration::FemT6
             })
         };
-        let (linear, nonlinear) = (by_law("linear").unwrap(), by_law("nonlinear").unwrap());
+        let (linear, nonlinear) = (by_law(Linearity::Linear).unwrap(), by_law(Linearity::Nonlinear).unwrap());
         assert!(linear.wall_s < nonlinear.wall_s && linear.error_static > nonlinear.error_static);
     }
 }

@@ -1,6 +1,7 @@
 //! The comparison as a figure and as a table for the terminal.
 
-use super::pareto::{Job, Pareto, Point};
+use super::measurement::{Job, Linearity, ModelKind, Point};
+use super::pareto::Pareto;
 use crate::discretization::Integration;
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
 use std::fmt::Write as _;
@@ -78,13 +79,13 @@ fn by_rule(point: &Point) -> (String, Marker, bool) {
 }
 
 fn by_law(point: &Point) -> (String, Marker, bool) {
-    look(point, point.law == "nonlinear")
+    look(point, point.law == Linearity::Nonlinear)
 }
 
 fn by_plant(point: &Point) -> (String, Marker, bool) {
     match point.method {
-        "reduced" => ("reduced model".into(), Marker::Square, true),
-        "condensed" => ("condensed linear model".into(), Marker::Diamond, false),
+        ModelKind::Reduced => ("reduced model".into(), Marker::Square, true),
+        ModelKind::Condensed => ("condensed linear model".into(), Marker::Diamond, false),
         _ => ("full model".into(), Marker::Circle, true),
     }
 }
@@ -146,8 +147,8 @@ impl Pareto {
             let _ = writeln!(out, "  {:>11} {:>9} {:>10}  {:<10} settings", "time", "error cm", "static", "method");
             for p in self.front(job) {
                 let name = match p.method {
-                    "reduced" | "condensed" => p.method,
-                    _ => p.discretization.method.integration.name(),
+                    ModelKind::Reduced | ModelKind::Condensed => p.method.to_string(),
+                    ModelKind::Rkpm | ModelKind::Fem => p.discretization.method.integration.to_string(),
                 };
                 let percent = |e: f64| if e.is_finite() { format!("{:.3} %", 100.0 * e) } else { "–".into() };
                 let _ = writeln!(

@@ -7,12 +7,13 @@ use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
 use crate::placement::study::best_dynamic;
 use crate::reduction::online::ReducedModel;
-use crate::reduction::{TrainingOptions, train};
+use crate::reduction::{Invalid, TrainingOptions, train};
+use crate::scene::TableScalar;
 use crate::table::{TableBuildError, TableOptions, build};
 use firmware::contract::frames::TARGET_VISIBLE;
 use firmware::contract::{MAX_TABLE_BYTES, NeedleSample, PaddleSample, Table, TargetSample, encode};
 use firmware::scalar::Scalar;
-use firmware::{Controller, Inputs, Settings, State};
+use firmware::{Controller, Inputs, Settings, SettingsError, State};
 use nalgebra::Vector2;
 use std::collections::VecDeque;
 use std::fmt::Write as _;
@@ -34,8 +35,8 @@ const REPEATS: u32 = 3;
 pub struct TablePoint {
     /// Depth knots.
     pub knots: usize,
-    /// `f32` or `f64`.
-    pub scalar: &'static str,
+    /// Number type of the payload.
+    pub scalar: TableScalar,
     /// Encoded size.
     pub bytes: usize,
     /// Mean time of a controller's step, ns: best of several runs.
@@ -60,6 +61,15 @@ pub enum TableParetoError {
     Plant(#[from] crate::reduction::train::TrainingError),
 }
 
+/// Why a loop stopped.
+#[derive(Debug, thiserror::Error)]
+enum LoopError {
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    #[error(transparent)]
+    Plant(#[from] Invalid),
+}
+
 /// Tries tables of the best dynamic paddle.
 ///
 /// # Errors
@@ -74,13 +84,13 @@ pub fn compare_tables(model: &TissueModel, threads: usize) -> Result<Vec<TablePo
     let mut points = Vec::new();
     for knots in KNOTS {
         let table = build(&model, paddle, &TableOptions { knots, ..TableOptions::default() })?;
-        points.push(try_table(&table.cast::<f32>(), "f32", &plant));
-        points.push(try_table(&table, "f64", &plant));
+        points.push(try_table(&table.cast::<f32>(), TableScalar::F32, &plant));
+        points.push(try_table(&table, TableScalar::F64, &plant));
     }
     Ok(points)
 }
 
-fn try_table<T: Scalar>(table: &Table<T, 2>, scalar: &'static str, plant: &Arc<ReducedModel>) -> TablePoint {
+fn try_table<T: Scalar>(table: &Table<T, 2>, scalar: TableScalar, plant: &Arc<ReducedModel>) -> TablePoint {
     let mut buffer = vec![0; MAX_TABLE_BYTES];
     let mut point = TablePoint {
         knots: table.knots.len(),
@@ -96,16 +106,16 @@ fn try_table<T: Scalar>(table: &Table<T, 2>, scalar: &'static str, plant: &Arc<R
                 point.max_error = error;
                 point.step_ns = point.step_ns.min(step_ns);
             }
-            Err(reason) => point.failure = Some(reason),
+            Err(error) => point.failure = Some(error.to_string()),
         }
     }
     point
 }
 
 /// Largest orthogonal error over the insertion, and mean time of a controller's step, ns.
-fn close_loop<T: Scalar>(table: &Table<T, 2>, plant: &Arc<ReducedModel>) -> Result<(f64, f64), String> {
+fn close_loop<T: Scalar>(table: &Table<T, 2>, plant: &Arc<ReducedModel>) -> Result<(f64, f64), LoopError> {
     let settings = Settings::new(PERIOD_NS, TARGET_PERIOD_NS, LATENCY_NS);
-    let controller = Controller::new(table, &settings).map_err(|e| e.to_string())?;
+    let controller = Controller::new(table, &settings)?;
     let mut state = State::<T>::new();
     let mut tissue = plant.body();
     let index = table.paddle.index;
@@ -120,7 +130,7 @@ fn close_loop<T: Scalar>(table: &Table<T, 2>, plant: &Arc<ReducedModel>) -> Resu
         let phase = (time_ns as f64 * 1e-9 / INSERTION_S).min(1.0) * std::f64::consts::PI;
         let depth = 0.5 * end * (1.0 - phase.cos());
         let velocity = 0.5 * end * phase.sin() * std::f64::consts::PI / INSERTION_S;
-        tissue.drive(depth, paddle).map_err(|invalid| invalid.to_string())?;
+        tissue.drive(depth, paddle)?;
         let target = tissue.target_displacement();
         largest = largest.max(target.dot(&normal).abs());
         if time_ns.is_multiple_of(TARGET_PERIOD_NS) {
@@ -177,7 +187,7 @@ pub fn csv(points: &[TablePoint]) -> String {
 /// Closed-loop error and cost of a step against the table's size.
 pub fn svg(points: &[TablePoint], scene: &str) -> String {
     let series = |key: &dyn Fn(&TablePoint) -> f64| {
-        [("f32", Marker::Square, false), ("f64", Marker::Circle, true)]
+        [(TableScalar::F32, Marker::Square, false), (TableScalar::F64, Marker::Circle, true)]
             .into_iter()
             .map(|(scalar, marker, filled)| {
                 let of = points.iter().filter(|p| p.scalar == scalar);
@@ -186,7 +196,7 @@ pub fn svg(points: &[TablePoint], scene: &str) -> String {
                 Series {
                     line: Some(Dash::Solid),
                     failures: failed.iter().map(place).collect(),
-                    ..Series::scatter(scalar, marker, filled, good.iter().map(place).collect())
+                    ..Series::scatter(&scalar.to_string(), marker, filled, good.iter().map(place).collect())
                 }
             })
             .collect()
@@ -238,15 +248,18 @@ mod tests {
         println!("{}", table(&points));
         assert_eq!(points.len(), 2 * KNOTS.len());
         assert!(points.iter().all(|p| p.failure.is_none()), "{points:?}");
-        let error = |knots: usize, scalar: &str| {
+        let error = |knots: usize, scalar: TableScalar| {
             points.iter().find(|p| p.knots == knots && p.scalar == scalar).unwrap().max_error
         };
         // The path is cubic between knots with its slopes, and feedback removes what is left: already two knots hold the
         // target a hundred times better than the best fixture does (0.00037).
-        assert!(KNOTS.iter().all(|k| error(*k, "f64") < 3.7e-6), "{points:?}");
-        assert!(KNOTS.iter().all(|k| (error(*k, "f32") - error(*k, "f64")).abs() < 0.1 * error(*k, "f64")));
-        let bytes = |scalar: &str| points.iter().find(|p| p.knots == 65 && p.scalar == scalar).unwrap().bytes;
-        assert!(bytes("f32") < bytes("f64"));
+        assert!(KNOTS.iter().all(|k| error(*k, TableScalar::F64) < 3.7e-6), "{points:?}");
+        assert!(
+            KNOTS.iter().all(|k| (error(*k, TableScalar::F32) - error(*k, TableScalar::F64)).abs()
+                < 0.1 * error(*k, TableScalar::F64))
+        );
+        let bytes = |scalar: TableScalar| points.iter().find(|p| p.knots == 65 && p.scalar == scalar).unwrap().bytes;
+        assert!(bytes(TableScalar::F32) < bytes(TableScalar::F64));
         assert_eq!(csv(&points).lines().count(), points.len() + 1);
     }
 }

@@ -20,7 +20,9 @@ pub fn read(text: &str, size: Option<f64>) -> Result<Imported, ImportError> {
     for node in document.descendants().filter(Node::is_element) {
         let path = match node.tag_name().name() {
             "path" => node.attribute("d").map(|d| BezPath::from_svg(d).map_err(|error| error.to_string())),
-            "polygon" => node.attribute("points").map(polygon),
+            "polygon" => {
+                node.attribute("points").map(|p| polygon(p).ok_or_else(|| "polygon without points".to_owned()))
+            }
             _ => None,
         };
         let Some(path) = path else { continue };
@@ -36,12 +38,12 @@ pub fn read(text: &str, size: Option<f64>) -> Result<Imported, ImportError> {
     assemble(loops, size)
 }
 
-fn polygon(points: &str) -> Result<BezPath, String> {
+fn polygon(points: &str) -> Option<BezPath> {
     let mut path = BezPath::new();
     for (i, (x, y)) in svgtypes::PointsParser::from(points).enumerate() {
         if i == 0 { path.move_to((x, y)) } else { path.line_to((x, y)) }
     }
-    if path.elements().is_empty() { Err("polygon without points".to_owned()) } else { Ok(path) }
+    (!path.elements().is_empty()).then_some(path)
 }
 
 /// Transforms of the element and of everything around it.

@@ -33,7 +33,7 @@ pub enum Reason {
     NoTriangulation,
     /// A held feature has no node.
     #[error("nothing-held")]
-    NothingHeld,
+    NothingConstrained,
     /// The law with these numbers is not stable at rest.
     #[error("unstable-law")]
     UnstableLaw,
@@ -145,7 +145,7 @@ fn reason_of(error: &ModelError) -> Reason {
         }
         ModelError::Discretization(DiscretizationError::Triangulation(_)) => Reason::NoTriangulation,
         ModelError::Solve(failure) => Reason::Solve(failure.reason),
-        ModelError::NothingHeld(_) => Reason::NothingHeld,
+        ModelError::NothingConstrained(_) => Reason::NothingConstrained,
         _ => Reason::Unsupported,
     }
 }

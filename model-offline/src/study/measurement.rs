@@ -1,0 +1,94 @@
+//! One setting of a method, measured: time and errors of a job.
+
+use crate::discretization::{Discretization, Resolution};
+use serde::Serialize;
+use strum::{Display, VariantArray};
+
+/// One setting, measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Point {
+    /// Which job.
+    pub job: Job,
+    /// What kind of model answers.
+    pub method: ModelKind,
+    /// The discretization.
+    pub discretization: Discretization,
+    /// Number of nodes (0 where building failed).
+    pub nodes: usize,
+    /// Finest spacing, length units.
+    pub spacing: f64,
+    /// Which law.
+    pub law: Linearity,
+    /// Best time, s.
+    pub wall_s: f64,
+    /// Worst relative error of the controllability measures; NaN where the job has none.
+    pub error_cm: f64,
+    /// Worst error of the target displacement, over the largest.
+    pub error_static: f64,
+    /// Why it failed.
+    pub failure: Option<String>,
+    /// Whether nothing is both faster and more accurate.
+    pub on_front: bool,
+}
+
+/// What is charted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Display, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Job {
+    /// Jacobians and small-depth displacements of all paddles.
+    Placement,
+    /// Target displacement along the insertion, all paddles.
+    Insertion,
+    /// One tick of a simulator.
+    Step,
+}
+
+/// What kind of model answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Display)]
+#[strum(serialize_all = "kebab-case")]
+pub enum ModelKind {
+    /// The full model on reproducing kernels.
+    Rkpm,
+    /// The full model on finite elements.
+    Fem,
+    /// The reduced nonlinear model.
+    Reduced,
+    /// The linear model, statically condensed.
+    Condensed,
+}
+
+/// Whether the law's own nonlinearity is followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Display, Serialize)]
+#[strum(serialize_all = "kebab-case")]
+#[serde(rename_all = "kebab-case")]
+pub enum Linearity {
+    /// The law's small-strain limit.
+    Linear,
+    /// The law itself.
+    Nonlinear,
+}
+
+impl Point {
+    /// The error by which the job's front is drawn.
+    pub fn error(&self) -> f64 {
+        if self.job == Job::Placement { self.error_cm } else { self.error_static }
+    }
+}
+
+impl Point {
+    pub(super) fn new(job: Job, discretization: Discretization, law: Linearity) -> Self {
+        Self {
+            job,
+            method: if discretization.method.integration.is_element() { ModelKind::Fem } else { ModelKind::Rkpm },
+            discretization,
+            nodes: 0,
+            spacing: if let Resolution::Spacing(h) = discretization.resolution { h } else { f64::NAN },
+            law,
+            wall_s: f64::NAN,
+            error_cm: f64::NAN,
+            error_static: f64::NAN,
+            failure: None,
+            on_front: false,
+        }
+    }
+}
