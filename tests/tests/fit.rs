@@ -44,7 +44,7 @@ fn the_scene_that_is_written_is_the_model_that_was_chosen() {
     assert!(kept.controllability <= 0.05 && kept.displacement <= 0.05, "{kept:?}");
     // The paper's law at full depth is far from linear: the linear law is rejected with its number.
     assert_eq!(found.chosen.plant, PlantModel::Reduced);
-    assert!(found.rejected.iter().any(|r| r.decision == "law" && r.number > 0.05));
+    assert!(found.rejected.iter().any(|r| r.decision == Decision::Law && r.number > 0.05));
     // Comments of the original survive.
     let comments = BUNDLED[0].1.lines().filter(|l| l.trim_start().starts_with('#')).count();
     assert!(comments > 0 && text.lines().filter(|l| l.trim_start().starts_with('#')).count() >= comments);

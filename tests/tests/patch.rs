@@ -4,7 +4,7 @@ use model_offline::discretization::{Integration, Method, Planar};
 use model_offline::geometry::Point2;
 use model_offline::material::{Law, Material as _};
 use model_offline::mechanics::nitsche::Nitsche;
-use model_offline::mechanics::{Constraints, ConstrainedRows, Tissue, WeaklyImposed};
+use model_offline::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
 use model_offline::solver::equilibrium::{DiscreteBody, Equilibrium, NewtonSettings};
 use nalgebra::Matrix2;
 use std::sync::Arc;

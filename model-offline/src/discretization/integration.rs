@@ -104,8 +104,10 @@ pub(super) const GAUSS_3: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell by the divergence theorem,
-/// `g_I(L) = (1/A_L) ∮ Ψ_I n dΓ`, two Gauss points per cell edge. Passes the linear patch test and has no spurious
-/// zero-energy modes (Chen, Wu, Yoon & You 2001).
+/// `g_I(L) = (1/A_L) ∮ Ψ_I n dΓ`, two Gauss points per cell edge. Passes the linear patch test
+/// (Chen, Wu, Yoon & You 2001). On a lattice it shares direct nodal integration's ghost modes: fields that alternate from
+/// node to node have no mean gradient over any inner cell, so that the symbol of the stiffness vanishes at (π, 0), (0, π) and
+/// (π, π), and only the boundary keeps them from being free.
 ///
 /// # Errors
 /// [`ShapeError`] names the node in whose cell the moment matrix fails.

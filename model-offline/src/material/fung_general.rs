@@ -3,7 +3,7 @@
 use super::catalogue::{Catalogued, LameParameters};
 use super::error::{MaterialError, not_negative};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, push_forward, zero4};
-use super::material::{Material, Response};
+use super::material::{Material, Response, stable_at_rest};
 use super::section::{MaterialSection, TensorEntry, unused};
 use serde::Serialize;
 
@@ -92,6 +92,10 @@ impl<const D: usize> Material<D> for FungTensors {
                 self.a[i][j][k][l] + exponential * (self.c_tensor[i][j][k][l] + 2.0 * ce[(i, j)] * ce[(k, l)]);
         }
         push_forward(&f, &(ae + ce * exponential), &c)
+    }
+
+    fn check_stable_at_rest(&self) -> Result<(), MaterialError> {
+        if D == 2 { stable_at_rest(&self.tangent(&Matrix::<D>::zeros())) } else { Err(MaterialError::PlanarOnly) }
     }
 }
 

@@ -60,18 +60,22 @@ pub trait Material<const D: usize>: std::fmt::Debug {
     /// # Errors
     /// [`MaterialError::Unstable`] with the lowest eigenvalue; [`MaterialError::NotFinite`].
     fn check_stable_at_rest(&self) -> Result<(), MaterialError> {
-        let a = self.tangent(&Matrix::zeros());
-        // Mandel's notation: strains (ε_ii, √2 ε_ij), so that the matrix has the tensor's own eigenvalues.
-        let pairs: Vec<(usize, usize)> = (0..D).flat_map(|i| (i..D).map(move |j| (i, j))).collect();
-        let weight = |(i, j): (usize, usize)| if i == j { 1.0 } else { std::f64::consts::SQRT_2 };
-        let mandel = DMatrix::from_fn(pairs.len(), pairs.len(), |r, c| {
-            let ((i, j), (k, l)) = (pairs[r], pairs[c]);
-            weight(pairs[r]) * weight(pairs[c]) * a[i][j][k][l]
-        });
-        if !mandel.iter().all(|v| v.is_finite()) {
-            return Err(MaterialError::NotFinite("a modulus"));
-        }
-        let lowest = mandel.symmetric_eigenvalues().min();
-        if lowest > 1e-12 * mandel.norm() { Ok(()) } else { Err(MaterialError::Unstable(lowest)) }
+        stable_at_rest(&self.tangent(&Matrix::zeros()))
     }
+}
+
+/// Whether a tangent at rest is positive definite on symmetric strains.
+pub(super) fn stable_at_rest<const D: usize>(a: &Tensor4<D>) -> Result<(), MaterialError> {
+    // Mandel's notation: strains (ε_ii, √2 ε_ij), so that the matrix has the tensor's own eigenvalues.
+    let pairs: Vec<(usize, usize)> = (0..D).flat_map(|i| (i..D).map(move |j| (i, j))).collect();
+    let weight = |(i, j): (usize, usize)| if i == j { 1.0 } else { std::f64::consts::SQRT_2 };
+    let mandel = DMatrix::from_fn(pairs.len(), pairs.len(), |r, c| {
+        let ((i, j), (k, l)) = (pairs[r], pairs[c]);
+        weight(pairs[r]) * weight(pairs[c]) * a[i][j][k][l]
+    });
+    if !mandel.iter().all(|v| v.is_finite()) {
+        return Err(MaterialError::NotFinite("a modulus"));
+    }
+    let lowest = mandel.symmetric_eigenvalues().min();
+    if lowest > 1e-12 * mandel.norm() { Ok(()) } else { Err(MaterialError::Unstable(lowest)) }
 }
