@@ -6,7 +6,7 @@ use model_offline::placement::adaptive::Reference;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::schema::PlantModel;
 use model_offline::scene::{BUNDLED, Scene};
-use model_offline::study::fit::{Rejected, discretization, fit};
+use model_offline::study::fit::{Decision, Rejected, discretization, fit};
 use tests::continuum::{errors, limits};
 
 #[test]
