@@ -35,9 +35,10 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 /// Writes a value as JSON for people to read.
 ///
 /// # Errors
-/// [`FileError::Write`].
+/// [`FileError::Write`]; also for a value that JSON has no form for.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), FileError> {
-    let mut bytes = serde_json::to_vec_pretty(value).expect("results have only plain fields");
+    let encoded = serde_json::to_vec_pretty(value);
+    let mut bytes = encoded.map_err(std::io::Error::from).map_err(FileError::write(path))?;
     bytes.push(b'\n');
     write_bytes(path, &bytes)
 }

@@ -55,10 +55,11 @@ pub fn write_run(directory: &Path, result: &RunResult, artifacts: Vec<Artifact>)
     let new = temporary.path().join("new");
     std::fs::create_dir(&new).map_err(FileError::write(&new))?;
     let page = Artifact { name: REPORT_FILE.to_owned(), bytes: render(result).into_bytes() };
+    let encoded = serde_json::to_vec(result);
     // Node positions by the thousand: in one line it is half the size.
     let summary = Artifact {
         name: RESULT_FILE.to_owned(),
-        bytes: serde_json::to_vec(result).expect("results have only plain fields"),
+        bytes: encoded.map_err(std::io::Error::from).map_err(FileError::write(directory))?,
     };
     for artifact in artifacts.iter().chain([&page, &summary]) {
         let path = new.join(&artifact.name);

@@ -68,7 +68,7 @@ pub fn schedule(seed: u64, period_ns: u64, length: f64) -> Vec<Event> {
 /// Runs the schedules of the seeds from `first` on.
 ///
 /// # Errors
-/// [`SimError::Settings`].
+/// [`SimError::Runtime`] for settings that the controller refuses.
 pub fn composed(table: &Table<f64, 2>, first: u64, count: u64, progress: &dyn Fn()) -> Result<Composed, SimError> {
     let mut sum = Composed::default();
     let mut digest = Sha256::new();

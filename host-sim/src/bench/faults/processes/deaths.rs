@@ -11,6 +11,8 @@ use super::stage::{Process, Stage, children, descriptors, left_behind, ms, read_
 use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
 use crate::bench::faults::fault::below;
+use crate::record::error::RecordError;
+use crate::record::files::read_bytes;
 use crate::record::recording::{Record, Recording};
 use crate::record::replay::replay;
 use crate::runtime::controller::process::ControllerResult;
@@ -19,14 +21,18 @@ use crate::runtime::plant::process::PlantResult;
 /// Pairs of processes at work at once.
 const WORKERS: u64 = 4;
 
-/// A recording that must be whole and replay bit by bit.
-fn whole_and_replayed(path: &Path, finished: bool) -> Result<Vec<Record>, String> {
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    let (recording, end) = Recording::whole_records(&bytes).map_err(|error| error.to_string())?;
-    if finished && !end {
-        return Err(format!("no end mark after {} records", recording.records.len()));
-    }
-    replay(&recording, path).map_err(|error| error.to_string())?;
+/// The records of a file whose end mark is there; they must replay bit by bit.
+fn whole_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
+    let recording = Recording::read(path)?;
+    replay(&recording, path)?;
+    Ok(recording.records)
+}
+
+/// The whole records of a file that may have been cut off; they must replay bit by bit.
+fn cut_off_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
+    let (recording, _) = Recording::whole_records(&read_bytes(path)?)
+        .map_err(|source| RecordError::Recording { path: path.to_owned(), source })?;
+    replay(&recording, path)?;
     Ok(recording.records)
 }
 
@@ -81,7 +87,7 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Result<
         let expected = if was_run { Mode::Safe } else { Mode::Hold };
         let state = result.accounts.final_state;
         evidence.require(state == Some(expected), || format!("{}: ended in {state:?} instead of {expected:?}", what()));
-        match whole_and_replayed(&record, true) {
+        match whole_and_replayed(&record) {
             Ok(records) => {
                 let fresh = records.iter().rposition(|record| record.tick.inputs.needle.is_some());
                 let safe = records.iter().position(|record| record.tick.command.state == Mode::Safe as u32);
@@ -153,7 +159,7 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
         controller.kill();
         kills += 1;
         evidence.injected += 1;
-        match whole_and_replayed(&record, false) {
+        match cut_off_and_replayed(&record) {
             Ok(records) => takes_over_gently(&records, evidence, &what),
             Err(error) => evidence.require(false, || format!("{}: its record: {error}", what())),
         }
@@ -164,7 +170,7 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
     let code = last.code();
     evidence.require(code == Some(0), || format!("the last controller ended with {code:?}: {}", last.message()));
     let what = || "the last controller".to_owned();
-    match whole_and_replayed(&record, true) {
+    match whole_and_replayed(&record) {
         Ok(records) => takes_over_gently(&records, evidence, &what),
         Err(error) => evidence.require(false, || format!("its record: {error}")),
     }

@@ -19,16 +19,22 @@ fn refusals(bench: &ClosedLoop<'_>, stream: Stream, reason: Discard) -> u64 {
     .discarded_for(reason)
 }
 
-/// A single sample with `fault` is refused for one of `reasons`, does not touch the integral, and the paddle moves as
-/// if it had never arrived.
+/// A fault of single samples, and what they are refused for.
+struct Bad<'r> {
+    stream: Stream,
+    fault: Fault,
+    reasons: &'r [Discard],
+}
+
+/// A single sample with the fault is refused for one of the reasons, does not touch the integral, and the paddle moves
+/// as if it had never arrived.
 fn refused(
     trial: &Trial<'_>,
     evidence: &mut Evidence,
     random: &mut rand_pcg::Pcg64,
-    stream: Stream,
-    fault: Fault,
-    reasons: &[Discard],
+    bad: &Bad<'_>,
 ) -> Result<(), SimError> {
+    let Bad { stream, fault, reasons } = *bad;
     let what = || format!("{fault:?}");
     let [mut lost, mut hit] = trial.twins(random)?;
     // Until the next sample of the target is due, so that each kind of sample is hit once.
@@ -68,13 +74,14 @@ pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
         for field in 0..2 {
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, -5e-324] {
                 let fault = Fault::Field(stream, field, value);
-                refused(trial, evidence, &mut random, stream, fault, &[Discard::NotFinite])?;
+                refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &[Discard::NotFinite] })?;
             }
         }
         // Before the last one, or in the future; 20 ms is the latency of the target.
         let ahead = if stream == Stream::Target { 25_000_000 } else { 5_000_000 };
         for by_ns in [i64::MIN, i64::MAX, ahead] {
-            refused(trial, evidence, &mut random, stream, Fault::Stamped(stream, by_ns), &[Discard::Time])?;
+            let fault = Fault::Stamped(stream, by_ns);
+            refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &[Discard::Time] })?;
         }
     }
     Ok(())
@@ -86,9 +93,11 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
     let reasons = [Discard::OutOfRange, Discard::Innovation];
     for value in [1e3, -1e3, f64::MAX, f64::MIN, 1.0, -1.0] {
         for stream in Stream::ALL {
-            refused(trial, evidence, &mut random, stream, Fault::Field(stream, 0, value), &reasons)?;
+            let fault = Fault::Field(stream, 0, value);
+            refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
             if stream != Stream::Needle {
-                refused(trial, evidence, &mut random, stream, Fault::Field(stream, 1, value), &reasons)?;
+                let fault = Fault::Field(stream, 1, value);
+                refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
             }
         }
         // A speed has no range of its own: the needle is too fast, the paddle stays.
