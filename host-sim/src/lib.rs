@@ -8,12 +8,42 @@
 //! ```
 //!
 //! Where to begin: [run simulations](guide::run_simulations), [check timing](guide::check_timing),
+//! [inject faults](guide::inject_faults), [run on a microcontroller](guide::run_on_a_microcontroller),
 //! [precompute tables](model_offline::guide::precompute), [how it works](model_offline::guide::how_it_works).
 //!
-//! Two modes of time, never mixed: in [`lockstep`](runtime::plant::lockstep) it comes from the messages, and the same seed gives the same bytes;
-//! in [`free_run`](runtime::plant::free_run) both processes follow the machine's steady clock with absolute deadlines. Either way every tick is
-//! [recorded](record::recording) and every sample accounted for ([`accounts`](runtime::accounts)). [`comparison`](bench::comparison) puts it together, [`result`](bench::result) is what
-//! comes out.
+//! A folder for each step of the data, each using only those before it:
+//!
+//! | | |
+//! |---|---|
+//! | [`world`] | tissue, needle drive, actuator, sensors: no I/O, no clock |
+//! | [`exchange`] | shared memory between plant and controller, the serial line to a board |
+//! | [`runtime`] | the loop at work: both processes, in [lockstep](runtime::plant::lockstep) and in [free-run](runtime::plant::free_run) |
+//! | [`record`] | recordings of every tick, their replay, files for other tools |
+//! | [`bench`] | strategies [compared](bench::comparison), [faults](bench::faults), [timing](bench::timing), [stability](bench::stability), the controller on a [board](bench::board) |
+//! | [`report`], [`view`] | what a person sees |
+//!
+//! Two modes of time, never mixed: in lockstep it comes from the messages, and the same seed gives the same bytes; in
+//! free-run both processes follow the machine's steady clock with absolute deadlines. Either way every tick is recorded and
+//! every sample accounted for ([`runtime::accounts`]).
+//!
+//! The controller with a tissue that is linear about its own table, in one thread and virtual time:
+//!
+//! ```
+//! use host_sim::bench::{faults::closed_loop::{ClosedLoop, Setup}, fixture::fixture};
+//!
+//! # fn main() -> Result<(), host_sim::SimError> {
+//! let table = fixture()?;
+//! let mut closed_loop = ClosedLoop::new(&table, Setup::new(&table, 1))?;
+//! closed_loop.run(5_500);
+//! assert_eq!(closed_loop.mode(), firmware::Mode::Run);
+//! assert!(closed_loop.max_error < 1e-3 * table.validity.depth_end);
+//! assert_eq!(closed_loop.unaccounted(), 0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! An [`Insertion`] has the full tissue and the controller in a process of its own; a [`Comparison`] is what
+//! `host-sim run` does.
 
 pub mod bench;
 pub mod exchange;
@@ -24,4 +54,16 @@ pub mod runtime;
 pub mod view;
 pub mod world;
 
+pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
 pub use bench::error::SimError;
+pub use bench::result::RunResult;
+pub use bench::strategy::{ControllerSetup, Extras, Insertion, Label};
+pub use bench::tissue::Tissue;
+pub use exchange::Space;
+pub use record::recording::Recording;
+pub use record::replay::replay_file;
+pub use runtime::mode::RunMode;
+pub use world::World;
+pub use world::loop_settings::LoopSettings;
+pub use world::simulation::Simulation;
+pub use world::tissue::PlantChoice;

@@ -27,7 +27,7 @@ use crate::runtime::plant::observer::Spectator;
 use crate::runtime::signals;
 use crate::world::simulation::Simulation;
 
-/// What is compared, and how. The default is everything, on this machine.
+/// What is compared, and how.
 #[derive(Clone, Debug)]
 pub struct ComparisonOptions {
     /// Tissue of the simulation; none: both, and the inclusion with a table that does not know it.
@@ -180,7 +180,26 @@ struct Studied {
 /// `none` and `static` of a case.
 type Uncontrolled = (Option<Measured>, Option<Measured>);
 
-/// A comparison that is ready to run: the scene studied, the tables computed, nothing simulated yet.
+/// A comparison that is ready to run.
+///
+/// ```no_run
+/// use host_sim::{Comparison, ComparisonOptions, Silent, Simulation};
+/// use model_offline::scene::Scene;
+///
+/// # fn main() -> Result<(), host_sim::SimError> {
+/// let scene = Scene::read("my.toml".as_ref())?;
+/// let simulation = Simulation::new(&scene);
+/// let options = ComparisonOptions::new("target/release/host-sim".into());
+/// let compared = Comparison::prepare(scene, simulation, options, &Silent)?.run(None)?;
+/// for case in &compared.result.cases {
+///     println!("{}: {:?} times less", case.tissue, case.improvement);
+/// }
+/// host_sim::report::directory::write_run("my-report".as_ref(), &compared.result, compared.artifacts)?;
+/// # Ok(())
+/// # }
+/// ```
+///
+/// The scene is studied and the tables are computed; nothing is simulated yet.
 pub struct Comparison<'p> {
     scene: Scene,
     simulation: Simulation,

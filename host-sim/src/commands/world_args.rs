@@ -4,15 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::world::actuator::ActuatorModel;
 use host_sim::world::error::{not_negative, positive};
 use host_sim::world::loop_settings::LoopSettings;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::tissue::PlantChoice;
 use model_offline::scene::Scene;
-
-/// Time simulated after the needle has arrived, s: long enough for the feedback to remove what is left.
-const SETTLE_S: f64 = 0.5;
 
 /// Options of the simulated world.
 #[derive(Args, Clone, Debug)]
@@ -63,23 +59,17 @@ impl WorldArgs {
     pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
         self.loop_settings.check()?;
         positive("--insertion-time", self.insertion_time)?;
-        let duration_s = self.duration.unwrap_or(self.insertion_time + SETTLE_S);
-        positive("--duration", duration_s)?;
         not_negative("--paddle-lag", self.paddle_lag)?;
         not_negative("--paddle-gain", self.paddle_gain)?;
-        Ok(Simulation {
-            loop_settings: self.loop_settings,
-            insertion_s: self.insertion_time,
-            duration_s,
-            depth: scene.needle.depth,
-            actuator: ActuatorModel {
-                max_rate: scene.actuator.max_rate,
-                lag_s: self.paddle_lag * 1e-3,
-                delay_ticks: self.paddle_delay,
-                gain: self.paddle_gain,
-            },
-            seed: self.seed,
-            plant: self.plant,
-        })
+        let mut simulation = Simulation::new(scene).with_insertion(self.insertion_time);
+        simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
+        positive("--duration", simulation.duration_s)?;
+        simulation.loop_settings = self.loop_settings;
+        simulation.actuator.lag_s = self.paddle_lag * 1e-3;
+        simulation.actuator.delay_ticks = self.paddle_delay;
+        simulation.actuator.gain = self.paddle_gain;
+        simulation.seed = self.seed;
+        simulation.plant = self.plant;
+        Ok(simulation)
     }
 }

@@ -22,6 +22,12 @@ pub struct Replayed {
 
 /// Reads and checks a recording file, then replays it.
 ///
+/// ```no_run
+/// let replayed = host_sim::replay_file("report/inclusion-dynamic.rec".as_ref())?;
+/// println!("{} commands agree bit by bit", replayed.ticks);
+/// # Ok::<(), host_sim::record::error::RecordError>(())
+/// ```
+///
 /// # Errors
 /// [`RecordError::File`], [`RecordError::Recording`], and as [`replay`].
 pub fn replay_file(path: &Path) -> Result<Replayed, RecordError> {

@@ -9,20 +9,35 @@ use super::error::{OutOfRange, not_negative, positive};
 pub const DEFAULT_NOISE_PER_DEPTH: f64 = 1e-4;
 
 /// Rates, latency and noise of the loop, as command-line options.
+///
+/// ```
+/// use host_sim::LoopSettings;
+///
+/// let settings = LoopSettings { rate: 500.0, ..LoopSettings::default() };
+/// assert_eq!(settings.period_ns(), 2_000_000);
+/// assert!(LoopSettings { rate: 0.0, ..settings }.check().is_err());
+/// ```
 #[derive(Args, Clone, Copy, Debug, PartialEq)]
 pub struct LoopSettings {
     /// Rate of the control loop, Hz
-    #[arg(long, default_value_t = 1000.0, value_name = "HZ")]
+    #[arg(long, default_value_t = Self::default().rate, value_name = "HZ")]
     pub rate: f64,
     /// Rate of the target sensor, Hz
-    #[arg(long, default_value_t = 50.0, value_name = "HZ")]
+    #[arg(long, default_value_t = Self::default().target_rate, value_name = "HZ")]
     pub target_rate: f64,
     /// Time from a measurement of the target to its arrival, ms
-    #[arg(long, default_value_t = 20.0, value_name = "MS")]
+    #[arg(long, default_value_t = Self::default().latency, value_name = "MS")]
     pub latency: f64,
     /// Standard deviation of the target sensor per component, length [default: 1e-4 of the insertion depth]
     #[arg(long, value_name = "LENGTH")]
     pub noise: Option<f64>,
+}
+
+impl Default for LoopSettings {
+    /// 1 kHz, with the target seen at 50 Hz and 20 ms late.
+    fn default() -> Self {
+        Self { rate: 1000.0, target_rate: 50.0, latency: 20.0, noise: None }
+    }
 }
 
 impl LoopSettings {

@@ -1,5 +1,7 @@
 //! The numbers of a simulation.
 
+use model_offline::scene::Scene;
+
 use super::actuator::ActuatorModel;
 use super::loop_settings::LoopSettings;
 use super::tissue::PlantChoice;
@@ -7,7 +9,19 @@ use super::tissue::PlantChoice;
 /// The controller needs one target sample to arrive; everything longer is a fault of the set-up.
 pub const LONGEST_WAIT_FOR_RUN_NS: u64 = 2_000_000_000;
 
+/// Time simulated after the needle has arrived, s: long enough for the feedback to remove what is left.
+const SETTLE_S: f64 = 0.5;
+
 /// Numbers of a simulation.
+///
+/// ```
+/// use host_sim::Simulation;
+/// use model_offline::scene::Scene;
+///
+/// let scene = Scene::bundled("paper").expect("it comes with the program");
+/// let slow = Simulation::new(&scene).with_insertion(10.0);
+/// assert_eq!((slow.insertion_s, slow.duration_s), (10.0, 10.5));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Simulation {
     /// Rates, latency, noise.
@@ -27,6 +41,21 @@ pub struct Simulation {
 }
 
 impl Simulation {
+    /// An insertion to the scene's depth in 5 s, with a servo that follows at the scene's largest rate.
+    pub fn new(scene: &Scene) -> Self {
+        let actuator = ActuatorModel { max_rate: scene.actuator.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
+        let loop_settings = LoopSettings::default();
+        let plant = PlantChoice::default();
+        Self { loop_settings, insertion_s: 0.0, duration_s: 0.0, depth: scene.needle.depth, actuator, seed: 1, plant }
+            .with_insertion(5.0)
+    }
+
+    /// The same in so many seconds, with half a second for what is left then.
+    #[must_use]
+    pub fn with_insertion(self, insertion_s: f64) -> Self {
+        Self { insertion_s, duration_s: insertion_s + SETTLE_S, ..self }
+    }
+
     /// Ticks of a run, with the wait for RUN.
     pub fn ticks(&self) -> u64 {
         let longest_ns = self.duration_ns() + LONGEST_WAIT_FOR_RUN_NS;

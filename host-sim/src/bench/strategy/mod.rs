@@ -109,6 +109,25 @@ pub struct ControllerSetup<'a> {
 }
 
 /// One insertion that is to be simulated.
+///
+/// ```
+/// use host_sim::{Insertion, Label, LoopSettings, Simulation};
+/// use model_offline::{placement::discretise, scene::Scene};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let scene = Scene::bundled("paper").expect("it comes with the program");
+/// let (model, _) = discretise(&scene)?;
+/// let loop_settings = LoopSettings { rate: 50.0, ..LoopSettings::default() };
+/// let simulation = Simulation { loop_settings, ..Simulation::new(&scene).with_insertion(1.0) };
+/// let label = Label { tissue: "inclusion", table_tissue: "inclusion", strategy: "static" };
+/// let insertion = Insertion::new(&model, &simulation, &label);
+///
+/// let without = insertion.uncontrolled(None)?.result;
+/// let held = insertion.uncontrolled(Some(2))?.result;
+/// assert!(held.max_orthogonal_error < without.max_orthogonal_error);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy)]
 pub struct Insertion<'a> {
     /// The tissue.
@@ -139,6 +158,11 @@ struct Finished<'m> {
 }
 
 impl<'a> Insertion<'a> {
+    /// An insertion without files for other tools, whose progress nobody follows.
+    pub fn new(model: &'a TissueModel, simulation: &'a Simulation, label: &'a Label<'a>) -> Self {
+        Self { model, simulation, label, extras: Extras::default(), progress: &|| {} }
+    }
+
     /// Without a paddle, or with one that does not move: nothing to control, time in ticks all the same.
     ///
     /// # Errors

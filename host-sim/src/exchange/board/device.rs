@@ -29,6 +29,23 @@ pub struct Answer {
 }
 
 /// A device.
+///
+/// On a real board, instead of QEMU's pipes, its serial port:
+///
+/// ```no_run
+/// use firmware::scalar::ScalarKind;
+/// use host_sim::exchange::board::{Device, SerialLine};
+/// use std::{fs::File, time::Duration};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let port = File::options().read(true).write(true).open("/dev/ttyACM0")?;
+/// let mut device = Device::connect(SerialLine::new(port.try_clone()?, port), ScalarKind::F64, None)?;
+/// let settings = firmware::Settings::new(1_000_000, 20_000_000, 20_000_000);
+/// device.begin(&std::fs::read("my.table")?, &settings)?;
+/// let answer = device.step(&firmware::Inputs::default(), Duration::from_secs(1))?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Device {
     line: SerialLine,

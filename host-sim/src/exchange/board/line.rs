@@ -12,6 +12,16 @@ use super::error::BoardError;
 use super::tamper::Tamper;
 
 /// Sends requests, receives replies; a thread reads.
+///
+/// Any pair of byte streams will do. Here the other end is nobody:
+///
+/// ```
+/// use host_sim::exchange::board::{BoardError, SerialLine};
+/// use std::time::Instant;
+///
+/// let mut line = SerialLine::new(std::io::empty(), std::io::sink());
+/// assert!(matches!(line.receive(Instant::now()), Ok(None) | Err(BoardError::Closed)));
+/// ```
 pub struct SerialLine {
     sink: Box<dyn Write + Send>,
     writer: FrameWriter,
