@@ -34,9 +34,9 @@
 //! let scene = Scene::bundled("paper").expect("bundled").without_inclusions();
 //! let study = PlacementStudy::run(&scene, &PlacementOptions::default())?;
 //! let optimum = study.placement.optimum;
-//! assert_eq!((optimum.fixture, optimum.dynamic), (4, 3)); // the paper's optima
+//! assert_eq!((optimum.static_paddle, optimum.dynamic_paddle), (4, 3)); // the paper's optima
 //!
-//! let table = model_offline::table::build(&study.model, optimum.dynamic, &Default::default())?;
+//! let table = model_offline::table::build(&study.model, optimum.dynamic_paddle, &Default::default())?;
 //! assert_eq!(table.paddle.index, 3);
 //! # Ok::<(), model_offline::table::TableBuildError>(())
 //! ```

@@ -46,7 +46,7 @@ fn results_do_not_depend_on_the_units() {
     assert_eq!(one.optimum, other.optimum);
     for (a, b) in one.paddles.iter().zip(&other.paddles) {
         assert!((a.controllability_measure / b.controllability_measure - 1.0).abs() < 1e-9);
-        assert!((a.fixture.max_orthogonal * length / b.fixture.max_orthogonal - 1.0).abs() < 1e-6);
+        assert!((a.static_study.max_orthogonal * length / b.static_study.max_orthogonal - 1.0).abs() < 1e-6);
     }
 }
 

@@ -138,9 +138,9 @@ fn too_deep_is_a_typed_failure_with_the_last_converged_state() {
     let model = TissueModel::new(&scene).unwrap();
     let placement = place(&model, &PlacementOptions { threads: 2, ..Default::default() }).unwrap();
     for paddle in &placement.paddles {
-        let failure = paddle.fixture.failure.as_ref().expect("the law loses stability before depth 0.4");
+        let failure = paddle.static_study.failure.as_ref().expect("the law loses stability before depth 0.4");
         assert!(failure.depth > 0.08 && failure.depth < 0.3, "{failure:?}");
-        assert_eq!(failure.depth, paddle.fixture.reached_depth);
+        assert_eq!(failure.depth, paddle.static_study.reached_depth);
         assert!(matches!(
             failure.reason,
             FailureReason::LostStability | FailureReason::ElementInverted | FailureReason::NotConverged
@@ -156,11 +156,11 @@ fn a_paddle_that_failed_never_ranks_above_one_that_reached_the_depth() {
     scene.needle.increments = 14;
     let model = TissueModel::new(&scene).unwrap();
     let placement = place(&model, &PlacementOptions { threads: 2, ..Default::default() }).unwrap();
-    let failed: Vec<bool> = placement.paddles.iter().map(|p| p.fixture.failure.is_some()).collect();
+    let failed: Vec<bool> = placement.paddles.iter().map(|p| p.static_study.failure.is_some()).collect();
     println!("{failed:?}");
     assert!(failed.contains(&true) && failed.contains(&false), "the depth does not tell the paddles apart: {failed:?}");
-    let best = placement.paddles.iter().find(|p| p.index == placement.optimum.fixture).unwrap();
-    assert_eq!(best.fixture.failure, None);
+    let best = placement.paddles.iter().find(|p| p.index == placement.optimum.static_paddle).unwrap();
+    assert_eq!(best.static_study.failure, None);
 }
 
 #[test]
@@ -188,14 +188,14 @@ fn the_volumetric_barrier_gives_the_finite_depth_profile_a_mesh_limit() {
         scene.discretization.resolution = Resolution::Spacing(spacing);
         place(&TissueModel::new(&scene).unwrap(), &PlacementOptions { threads: 2, ..Default::default() }).unwrap()
     };
-    assert!(study(text, 0.05).paddles.iter().all(|p| p.fixture.failure.is_some()));
+    assert!(study(text, 0.05).paddles.iter().all(|p| p.static_study.failure.is_some()));
     let worst: Vec<Vec<f64>> = [0.2, 0.1, 0.05]
         .into_iter()
         .map(|spacing| {
             let placement = study(&guarded, spacing);
-            assert!(placement.paddles.iter().all(|p| p.fixture.failure.is_none()), "spacing {spacing}");
-            assert_eq!(placement.optimum.fixture, 4, "spacing {spacing}");
-            placement.paddles.iter().map(|p| p.fixture.max_orthogonal).collect()
+            assert!(placement.paddles.iter().all(|p| p.static_study.failure.is_none()), "spacing {spacing}");
+            assert_eq!(placement.optimum.static_paddle, 4, "spacing {spacing}");
+            placement.paddles.iter().map(|p| p.static_study.max_orthogonal).collect()
         })
         .collect();
     let change = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

@@ -343,7 +343,7 @@ impl<'p> Comparison<'p> {
     fn compute_table(&self, tissue: Tissue) -> Result<EncodedTable, SimError> {
         self.progress.say(&format!("{tissue}: controller table"));
         let studied = self.studied(tissue);
-        let table = build(&studied.model, studied.placement.optimum.dynamic, &TableOptions::default())?;
+        let table = build(&studied.model, studied.placement.optimum.dynamic_paddle, &TableOptions::default())?;
         let bytes = to_bytes(&table)?;
         Ok(EncodedTable { table, bytes })
     }
@@ -357,7 +357,7 @@ impl<'p> Comparison<'p> {
             .enumerate()
             .flat_map(|(i, case)| {
                 let none = (!case.is_mismatch).then_some((i, None, "none"));
-                let paddle = self.studied(case.table_tissue).placement.optimum.fixture;
+                let paddle = self.studied(case.table_tissue).placement.optimum.static_paddle;
                 none.into_iter().chain([(i, Some(paddle), "static")])
             })
             .collect();

@@ -77,8 +77,8 @@ pub fn placement(tissue: Tissue, model: &TissueModel, placement: &Placement, wal
         nodes: model.nodes(),
         integration: integration.ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default(),
         wall_s,
-        best_static: placement.optimum.fixture,
-        best_dynamic: placement.optimum.dynamic,
+        best_static: placement.optimum.static_paddle,
+        best_dynamic: placement.optimum.dynamic_paddle,
         paddles: placement
             .paddles
             .iter()
@@ -87,12 +87,12 @@ pub fn placement(tissue: Tissue, model: &TissueModel, placement: &Placement, wal
                 jacobian: paddle.jacobian,
                 controllability_measure: paddle.controllability_measure,
                 best_direction: paddle.best_direction,
-                depth: paddle.fixture.depth.clone(),
-                orthogonal: paddle.fixture.orthogonal.clone(),
-                max_orthogonal: paddle.fixture.max_orthogonal,
-                reached_depth: paddle.fixture.reached_depth,
+                depth: paddle.static_study.depth.clone(),
+                orthogonal: paddle.static_study.orthogonal.clone(),
+                max_orthogonal: paddle.static_study.max_orthogonal,
+                reached_depth: paddle.static_study.reached_depth,
                 failure: paddle
-                    .fixture
+                    .static_study
                     .failure
                     .as_ref()
                     .map(|failure| format!("{}: {}", failure.reason, failure.detail)),

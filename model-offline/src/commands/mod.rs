@@ -30,7 +30,7 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Full placement study: every paddle, as a fixture and as an actuator.
+    /// Full placement study: every paddle, static and dynamic.
     #[command(after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json")]
     Place(place::PlaceArgs),
     /// One equilibrium: needle at a depth, one paddle displaced.

@@ -37,7 +37,7 @@ fn place(scene: &Scene, args: &PlaceArgs) -> Result<(), CliError> {
     let study = PlacementStudy::run(scene, &options)?;
     bar.finish_and_clear();
     if let Some(path) = &args.table {
-        let built = table::build(&study.model, study.placement.optimum.dynamic, &TableOptions::default())?;
+        let built = table::build(&study.model, study.placement.optimum.dynamic_paddle, &TableOptions::default())?;
         output::write_whole(path, &table::to_bytes(&built)?)?;
     }
     let check = study.cross_check();
@@ -67,7 +67,7 @@ fn place(scene: &Scene, args: &PlaceArgs) -> Result<(), CliError> {
 fn summary(study: &PlacementStudy) -> String {
     let (scene, optimum) = (study.model.scene(), study.placement.optimum);
     let mut out = format!(
-        "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖   J⁻¹n                  max orthogonal (fixture)\n",
+        "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖   J⁻¹n                  max orthogonal (static)\n",
         scene.name,
         scene.tissue(),
         study.model.nodes(),
@@ -76,7 +76,7 @@ fn summary(study: &PlacementStudy) -> String {
     for p in &study.placement.paddles {
         let mark = |best: u32| if p.index == best { "*" } else { " " };
         let stopped = p
-            .fixture
+            .static_study
             .failure
             .as_ref()
             .map_or(String::new(), |f| format!("  stopped at depth {:.4}: {}", f.depth, f.reason));
@@ -85,11 +85,11 @@ fn summary(study: &PlacementStudy) -> String {
             "{:>7}  {:8.4}{} ({:8.4}, {:8.4})  {:12.6}{}{stopped}",
             p.index,
             p.controllability_measure,
-            mark(optimum.dynamic),
+            mark(optimum.dynamic_paddle),
             p.best_direction[0],
             p.best_direction[1],
-            p.fixture.max_orthogonal,
-            mark(optimum.fixture),
+            p.static_study.max_orthogonal,
+            mark(optimum.static_paddle),
         );
     }
     if let Some(e) = study.error_estimate {
@@ -102,8 +102,8 @@ fn summary(study: &PlacementStudy) -> String {
     }
     let _ = writeln!(
         out,
-        "\nbest as a fixture: paddle {}; best as an actuator: paddle {}",
-        optimum.fixture, optimum.dynamic
+        "\nbest static paddle: {}; best dynamic paddle: {}",
+        optimum.static_paddle, optimum.dynamic_paddle
     );
     for line in study.verdict() {
         let _ = writeln!(out, "{line}");

@@ -21,7 +21,7 @@ pub(super) struct StabilityArgs {
     /// Fewer values and one spacing for the sweeps.
     #[arg(long)]
     quick: bool,
-    /// Index of the paddle attached as a fixture (default: the best dynamic paddle).
+    /// Index of the paddle attached, static (default: the best dynamic paddle).
     #[arg(long, value_name = "K")]
     paddle: Option<u32>,
     #[command(flatten)]

@@ -3,6 +3,8 @@
 use super::nodal_cells::{Across, NodalCell};
 use super::{Quadrature, Stencil};
 use crate::geometry::{Point, Point2, cross};
+use rstar::primitives::{GeomWithData, Rectangle};
+use rstar::{AABB, RTree};
 use std::collections::BTreeMap;
 
 /// Triangles with their nodes: three corners, or also the middles of the edges 01, 12, 20.
@@ -11,12 +13,19 @@ pub struct Elements {
     corners: Vec<[u32; 3]>,
     middles: Option<Vec<[u32; 3]>>,
     positions: Vec<Point2>,
+    /// Bounding boxes of the triangles, with their numbers: for finding the one that a point is in.
+    boxes: RTree<GeomWithData<Rectangle<[f64; 2]>, usize>>,
 }
+
+/// Boxes within this much of a point (relative to the body) are looked into, and a point this far outside a triangle in its
+/// barycentric coordinates is on its edge but for rounding. The first is well above the second, so that no triangle is missed.
+const BOX_MARGIN: f64 = 1e-9;
+const ON_EDGE: f64 = 1e-12;
 
 impl Elements {
     /// Linear triangles.
     pub fn linear(nodes: Vec<Point2>, triangles: Vec<[u32; 3]>) -> Self {
-        Self { corners: triangles, middles: None, positions: nodes }
+        Self { boxes: boxes(&nodes, &triangles), corners: triangles, middles: None, positions: nodes }
     }
 
     /// Quadratic triangles: nodes are added in the middle of every edge.
@@ -34,7 +43,7 @@ impl Elements {
                 })
             })
             .collect();
-        Self { corners: triangles, middles: Some(middles), positions: nodes }
+        Self { boxes: boxes(&nodes, &triangles), corners: triangles, middles: Some(middles), positions: nodes }
     }
 
     /// All nodes, corners first.
@@ -86,18 +95,9 @@ impl Elements {
 
     /// Values of the shape functions at a point; the triangle nearest to it is used where it lies outside all.
     pub fn value_stencil(&self, x: &Point<2>) -> Stencil<2> {
-        let barycentric = |t: &[u32; 3]| -> [f64; 3] {
-            let p = t.map(|i| self.positions[i as usize]);
-            let twice = cross(p[1] - p[0], p[2] - p[0]);
-            std::array::from_fn(|i| cross(p[(i + 1) % 3] - x, p[(i + 2) % 3] - x) / twice)
-        };
-        let lowest = |l: &[f64; 3]| l.iter().copied().fold(f64::INFINITY, f64::min);
-        let best = self
-            .corners
-            .iter()
-            .enumerate()
-            .map(|(cell, t)| (cell, barycentric(t)))
-            .max_by(|a, b| lowest(&a.1).total_cmp(&lowest(&b.1)));
+        let best = self.deepest(x, self.near(x)).filter(|found| lowest(&found.1) >= -ON_EDGE);
+        // Outside all triangles, the nearest may be any.
+        let best = best.or_else(|| self.deepest(x, 0..self.corners.len()));
         let Some((cell, l)) = best else { return Stencil::default() };
         // A node's own row is exactly one: rounding must not couple it to its neighbours.
         let l = l.map(|v| {
@@ -126,6 +126,30 @@ impl Elements {
         }
     }
 
+    /// Triangles whose bounding box contains the point, in ascending order.
+    fn near(&self, x: &Point<2>) -> Vec<usize> {
+        let all = self.boxes.root().envelope();
+        let margin = BOX_MARGIN * (Point2::from(all.upper()) - Point2::from(all.lower())).amax();
+        let around = AABB::from_corners([x.x - margin, x.y - margin], [x.x + margin, x.y + margin]);
+        let mut found: Vec<usize> = self.boxes.locate_in_envelope_intersecting(&around).map(|b| b.data).collect();
+        found.sort_unstable();
+        found
+    }
+
+    /// The triangle that the point is deepest in, with the point's barycentric coordinates.
+    fn deepest(&self, x: &Point<2>, cells: impl IntoIterator<Item = usize>) -> Option<(usize, [f64; 3])> {
+        cells
+            .into_iter()
+            .map(|cell| (cell, self.barycentric(&self.corners[cell], x)))
+            .max_by(|a, b| lowest(&a.1).total_cmp(&lowest(&b.1)))
+    }
+
+    fn barycentric(&self, t: &[u32; 3], x: &Point<2>) -> [f64; 3] {
+        let p = t.map(|i| self.positions[i as usize]);
+        let twice = cross(p[1] - p[0], p[2] - p[0]);
+        std::array::from_fn(|i| cross(p[(i + 1) % 3] - x, p[(i + 2) % 3] - x) / twice)
+    }
+
     fn barycentric_slopes(&self, t: &[u32; 3]) -> [Point<2>; 3] {
         let p = t.map(|i| self.positions[i as usize]);
         let twice = cross(p[1] - p[0], p[2] - p[0]);
@@ -136,9 +160,52 @@ impl Elements {
     }
 }
 
+fn lowest(barycentric: &[f64; 3]) -> f64 {
+    barycentric.iter().copied().fold(f64::INFINITY, f64::min)
+}
+
+fn boxes(nodes: &[Point2], triangles: &[[u32; 3]]) -> RTree<GeomWithData<Rectangle<[f64; 2]>, usize>> {
+    let of = |(cell, t): (usize, &[u32; 3])| {
+        let [a, b, c] = t.map(|i| nodes[i as usize]);
+        let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
+        GeomWithData::new(Rectangle::from_corners(low.into(), high.into()), cell)
+    };
+    RTree::bulk_load(triangles.iter().enumerate().map(of).collect())
+}
+
 fn push_sorted(rule: &mut Quadrature<2>, weight: f64, cell: usize, pairs: impl Iterator<Item = (u32, Point<2>)>) {
     let mut pairs: Vec<_> = pairs.collect();
     pairs.sort_unstable_by_key(|p| p.0);
     let (nodes, gradients): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
     rule.push(weight, cell, &nodes, &gradients);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Points in, on and outside of a fan of triangles: the tree finds what a look at every triangle does.
+    #[test]
+    fn the_triangle_of_a_point_is_the_one_that_a_full_search_finds() {
+        let side = 12_u32;
+        let at = |i: u32, j: u32| i * (side + 1) + j;
+        let skew = |i: u32, j: u32| Point2::new(f64::from(i) + 0.3 * f64::from(j % 2), f64::from(j) / 3.0);
+        let nodes: Vec<Point2> = (0..=side).flat_map(|i| (0..=side).map(move |j| skew(i, j))).collect();
+        let squares = (0..side).flat_map(|i| (0..side).map(move |j| (i, j)));
+        let triangles: Vec<[u32; 3]> = squares
+            .flat_map(|(i, j)| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]])
+            .collect();
+        let elements = Elements::quadratic(nodes, triangles);
+        let mut points = elements.positions().to_vec();
+        points.extend((0..500).map(|k| {
+            let k = f64::from(k);
+            Point2::new(-1.0 + 15.0 * (k * 0.618).fract(), -0.5 + 5.0 * (k * 0.414).fract())
+        }));
+        for x in points {
+            let every = elements.deepest(&x, 0..elements.corners.len()).unwrap();
+            let near = elements.deepest(&x, elements.near(&x)).filter(|found| lowest(&found.1) >= -ON_EDGE);
+            assert!(near.is_none_or(|near| near == every), "{x:?}: {near:?} {every:?}");
+            assert!(near.is_some() || lowest(&every.1) < -ON_EDGE, "{x:?} is inside and not found");
+        }
+    }
 }

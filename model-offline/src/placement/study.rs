@@ -23,7 +23,7 @@ pub struct StaticFailure {
     pub detail: String,
 }
 
-/// The insertion with the paddle as a fixture.
+/// The insertion with a static paddle: attached, and held still.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StaticStudy {
     /// Needle depths, from the first increment.
@@ -57,19 +57,20 @@ pub struct PaddleResult {
     pub target_per_depth: [f64; 2],
     /// Jacobians along the insertion, at the depths of the static study.
     pub jacobians: Vec<[[f64; 2]; 2]>,
-    /// The insertion with this paddle as a fixture.
+    /// The insertion with this paddle static.
     #[serde(rename = "static")]
-    pub fixture: StaticStudy,
+    pub static_study: StaticStudy,
 }
 
 /// The best paddle for each approach, by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Optimum {
-    /// Smallest largest orthogonal displacement as a fixture.
+    /// Smallest largest orthogonal displacement with a static paddle.
     #[serde(rename = "static")]
-    pub fixture: u32,
+    pub static_paddle: u32,
     /// Smallest controllability measure.
-    pub dynamic: u32,
+    #[serde(rename = "dynamic")]
+    pub dynamic_paddle: u32,
 }
 
 /// A whole placement study.
@@ -179,7 +180,7 @@ fn study_paddle(
     let normal = scene.needle.orthogonal();
     let mut body = model.body(Some(paddle), options.newton.unwrap_or_default())?;
 
-    let mut fixture = StaticStudy {
+    let mut study = StaticStudy {
         depth: Vec::new(),
         target_displacement: Vec::new(),
         orthogonal: Vec::new(),
@@ -197,16 +198,16 @@ fn study_paddle(
             Ok(jacobian) => {
                 let displacement = body.target_displacement();
                 let orthogonal = displacement.dot(&normal);
-                fixture.depth.push(depth);
-                fixture.target_displacement.push(displacement.into());
-                fixture.orthogonal.push(orthogonal);
-                fixture.max_orthogonal = fixture.max_orthogonal.max(orthogonal.abs());
-                fixture.reached_depth = depth;
+                study.depth.push(depth);
+                study.target_displacement.push(displacement.into());
+                study.orthogonal.push(orthogonal);
+                study.max_orthogonal = study.max_orthogonal.max(orthogonal.abs());
+                study.reached_depth = depth;
                 jacobians.push(rows(&jacobian));
             }
             Err(Failure { reason, detail, .. }) => {
-                fixture.reached_depth = body.depth();
-                fixture.failure = Some(StaticFailure { reason, depth: body.depth(), detail });
+                study.reached_depth = body.depth();
+                study.failure = Some(StaticFailure { reason, depth: body.depth(), detail });
                 break;
             }
         }
@@ -219,22 +220,25 @@ fn study_paddle(
         best_direction: rest.best_direction.into(),
         target_per_depth: rest.target_per_depth.into(),
         jacobians,
-        fixture,
+        static_study: study,
     })
 }
 
-/// The best paddles. A fixture that did not reach the depth ranks below every one that did. When none did, they are
+/// The best paddles. A static paddle that did not reach the depth ranks below every one that did. When none did, they are
 /// compared over the depth that all of them reached, or by their small-depth limit when there is none.
 fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
-    let complete = paddles.iter().any(|p| p.fixture.failure.is_none());
-    let common = paddles.iter().map(|p| p.fixture.depth.len()).min().unwrap_or(0);
-    let key = |p: &PaddleResult| match &p.fixture.failure {
-        None => p.fixture.max_orthogonal,
+    let complete = paddles.iter().any(|p| p.static_study.failure.is_none());
+    let common = paddles.iter().map(|p| p.static_study.depth.len()).min().unwrap_or(0);
+    let key = |p: &PaddleResult| match &p.static_study.failure {
+        None => p.static_study.max_orthogonal,
         Some(_) if complete => f64::INFINITY,
-        Some(_) if common > 0 => p.fixture.orthogonal[..common].iter().fold(0.0, |m, x| f64::max(m, x.abs())),
+        Some(_) if common > 0 => p.static_study.orthogonal[..common].iter().fold(0.0, |m, x| f64::max(m, x.abs())),
         Some(_) => Vector2::from(p.target_per_depth).dot(&normal).abs(),
     };
-    let fixture = paddles.iter().min_by(|a, b| key(a).total_cmp(&key(b)));
-    let dynamic = paddles.iter().min_by(|a, b| a.controllability_measure.total_cmp(&b.controllability_measure));
-    Optimum { fixture: fixture.map_or(0, |p| p.index), dynamic: dynamic.map_or(0, |p| p.index) }
+    let static_paddle = paddles.iter().min_by(|a, b| key(a).total_cmp(&key(b)));
+    let dynamic_paddle = paddles.iter().min_by(|a, b| a.controllability_measure.total_cmp(&b.controllability_measure));
+    Optimum {
+        static_paddle: static_paddle.map_or(0, |p| p.index),
+        dynamic_paddle: dynamic_paddle.map_or(0, |p| p.index),
+    }
 }

@@ -52,7 +52,7 @@ pub fn verdict(placement: &Placement, scene: &Scene) -> Vec<String> {
         })
         .collect();
     if hindered.len() == placement.paddles.len() {
-        lines.push("no paddle of this scene can: move a paddle, turn the needle, or accept the fixture".to_owned());
+        lines.push("no paddle of this scene can: move a paddle, turn the needle, or accept a static one".to_owned());
     }
     lines
 }

@@ -18,7 +18,7 @@ use std::time::Instant;
 ///
 /// let scene = Scene::bundled("paper").expect("bundled").without_inclusions();
 /// let study = PlacementStudy::run(&scene, &PlacementOptions::default())?;
-/// assert_eq!((study.placement.optimum.fixture, study.placement.optimum.dynamic), (4, 3)); // the paper's optima
+/// assert_eq!((study.placement.optimum.static_paddle, study.placement.optimum.dynamic_paddle), (4, 3)); // the paper's optima
 /// assert!(study.cross_check().is_some_and(|check| check.controllability < 0.5));
 /// # Ok::<(), model_offline::model::ModelError>(())
 /// ```

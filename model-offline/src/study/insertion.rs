@@ -63,7 +63,7 @@ fn depths(scene: &Scene) -> impl Iterator<Item = f64> + '_ {
     (1..=n).map(move |k| scene.needle.depth * f64::from(k) / f64::from(n))
 }
 
-/// Follows the insertion with every paddle as a fixture.
+/// Follows the insertion with every paddle static.
 ///
 /// # Errors
 /// [`Failure`] of the first paddle that does not reach the depth.

@@ -3,7 +3,7 @@
 //! Three jobs are charted, since they ask for different things:
 //! - `placement`: nodes, shape functions, the Jacobians and small-depth displacements of all paddles; against quadratic
 //!   triangles far finer than the rest, extrapolated.
-//! - `insertion`: the target displacement along the whole insertion, every paddle as a fixture, by the nonlinear law and
+//! - `insertion`: the target displacement along the whole insertion, every paddle static, by the nonlinear law and
 //!   by the linear one; on a law that has a mesh limit at finite depth.
 //! - `step`: one tick of a simulator: the full, the reduced and the condensed model, against the same fine insertion.
 

@@ -70,7 +70,7 @@ impl Sweep {
         response.target_per_depth.dot(&self.scene.needle.orthogonal())
     }
 
-    /// Best paddle as a fixture for small depths, and as an actuator.
+    /// Best static paddle for small depths, and best dynamic one.
     pub fn optima(&self, responses: &[RestResponse]) -> (u32, u32) {
         let best = |key: &dyn Fn(&RestResponse) -> f64| {
             let paddles = self.scene.paddles.iter().zip(responses);
@@ -99,7 +99,7 @@ impl Sweep {
             "integration,mesh,nodes,paddle,controllability_measure,orthogonal_per_depth,best_static,best_dynamic\n",
         );
         for (rule, mesh, nodes, responses) in self.rows() {
-            let (fixture, dynamic) = self.optima(responses);
+            let (best_static, best_dynamic) = self.optima(responses);
             for (paddle, response) in self.scene.paddles.iter().zip(responses) {
                 let _ = writeln!(
                     out,
@@ -107,8 +107,8 @@ impl Sweep {
                     paddle.index,
                     response.controllability_measure,
                     self.orthogonal(response),
-                    paddle.index == fixture,
-                    paddle.index == dynamic
+                    paddle.index == best_static,
+                    paddle.index == best_dynamic
                 );
             }
         }
@@ -120,8 +120,8 @@ impl Sweep {
         let mut out =
             format!("{:<8} {:<16} {:>7} {:>13} {:>14}\n", "method", "mesh", "nodes", "best fixture", "best actuator");
         for (rule, mesh, nodes, responses) in self.rows() {
-            let (fixture, dynamic) = self.optima(responses);
-            let _ = writeln!(out, "{rule:<8} {mesh:<16} {nodes:>7} {fixture:>13} {dynamic:>14}");
+            let (best_static, best_dynamic) = self.optima(responses);
+            let _ = writeln!(out, "{rule:<8} {mesh:<16} {nodes:>7} {best_static:>13} {best_dynamic:>14}");
         }
         let _ = writeln!(
             out,

@@ -84,12 +84,12 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
     let scene = model.scene();
     let position = model.paddle_position(paddle_index).ok_or(TableBuildError::NoSuchPaddle(paddle_index))?;
     let settings = NewtonSettings::default();
-    let mut fixture = model.body(Some(position), settings).map_err(ModelError::from)?;
+    let mut still = model.body(Some(position), settings).map_err(ModelError::from)?;
     let mut steered = model.body(Some(position), settings).map_err(ModelError::from)?;
     let mut knots = heapless::Vec::new();
     for k in 0..options.knots {
         let depth = scene.needle.depth * k as f64 / (options.knots - 1) as f64;
-        match knot(&mut fixture, &mut steered, depth, paddle_index, scene.needle.orthogonal()) {
+        match knot(&mut still, &mut steered, depth, paddle_index, scene.needle.orthogonal()) {
             Ok(knot) => {
                 let condition = condition_number(&knot.jacobian);
                 if condition > CONDITION_LIMIT {
@@ -155,13 +155,13 @@ fn label<const N: usize>(text: &str) -> Result<heapless::String<N>, TableBuildEr
 
 /// One knot: takes both bodies to the depth, and steers the paddle so that the target is back on the needle's line.
 fn knot(
-    fixture: &mut Body<'_>,
+    still: &mut Body<'_>,
     steered: &mut Body<'_>,
     depth: f64,
     paddle: u32,
     normal: Vector2<f64>,
 ) -> Result<Knot<f64, 2>, ModelError> {
-    fixture.drive(depth, Vector2::zeros())?;
+    still.drive(depth, Vector2::zeros())?;
     // Start where the last knot's slope points to.
     let (_, direction, sensitivity) = linearise(steered, paddle, normal)?;
     let ahead = path_slope(direction, sensitivity, normal) * (depth - steered.depth());
@@ -176,7 +176,7 @@ fn knot(
         paddle_path_slope: slope,
         target_displacement: steered.target_displacement(),
         target_displacement_slope: sensitivity + jacobian * slope,
-        static_target_displacement: fixture.target_displacement(),
+        static_target_displacement: still.target_displacement(),
     })
 }
 

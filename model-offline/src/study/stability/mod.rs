@@ -43,7 +43,7 @@ pub struct Stability {
     pub scene: Scene,
     /// Spacing that the sweeps are made at, length units.
     pub spacing: f64,
-    /// Index of the paddle that was attached, as a fixture.
+    /// Index of the paddle that was attached, static.
     pub paddle: u32,
     /// What was varied, and what came of it, in the order of the files.
     pub rows: Vec<(Entry, Outcome)>,

@@ -62,7 +62,7 @@ pub struct Outcome {
     pub energy: f64,
 }
 
-/// Runs a setting with the paddle at this place of the scene's list as a fixture.
+/// Runs a setting with the paddle at this place of the scene's list static.
 pub fn run(scene: &Scene, paddle: usize, setting: &Setting) -> Outcome {
     let stopped = |nodes: usize, error: ModelError| Outcome {
         nodes,
