@@ -28,17 +28,16 @@
 //!
 //! # Example
 //! ```
-//! use model_offline::placement::{PlacementOptions, PlacementStudy};
-//! use model_offline::scene::Scene;
+//! use model_offline::{PlacementOptions, PlacementStudy, Scene, table};
 //!
 //! let scene = Scene::bundled("paper").expect("bundled").without_inclusions();
 //! let study = PlacementStudy::run(&scene, &PlacementOptions::default())?;
 //! let optimum = study.placement.optimum;
 //! assert_eq!((optimum.static_paddle, optimum.dynamic_paddle), (4, 3)); // the paper's optima
 //!
-//! let table = model_offline::table::build(&study.model, optimum.dynamic_paddle, &Default::default())?;
+//! let table = table::build(&study.model, optimum.dynamic_paddle, &Default::default())?;
 //! assert_eq!(table.paddle.index, 3);
-//! # Ok::<(), model_offline::table::TableBuildError>(())
+//! # Ok::<(), table::TableBuildError>(())
 //! ```
 
 pub mod discretization;
@@ -56,3 +55,12 @@ pub mod scene;
 pub mod solver;
 pub mod study;
 pub mod table;
+
+pub use discretization::{Basis, Discretization, Essential, Integration, Method, Resolution};
+pub use geometry::{Point2, Polygon};
+pub use material::{Law, Material};
+pub use model::{Body, ModelError, TissueModel};
+pub use placement::{Placement, PlacementOptions, PlacementStudy, discretise, place};
+pub use scene::{Scene, SceneError};
+pub use solver::equilibrium::{Failure, FailureReason, NewtonSettings};
+pub use table::{TableBuildError, TableOptions};

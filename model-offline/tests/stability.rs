@@ -107,12 +107,12 @@ fn the_checkerboard_is_felt_by_rules_that_see_the_gradient_vary() {
         |integration, jitter| *measured.iter().find(|z| (z.integration, z.jitter) == (integration, jitter)).unwrap();
     for blind in [Integration::Dni, Integration::Scni] {
         let z = of(blind, 0.0);
-        assert!(z.interior_felt.abs() < 1e-12 && z.least_felt < 0.2, "{z:?}");
+        assert!(z.interior_energy_ratio.abs() < 1e-12 && z.least_energy_ratio < 0.2, "{z:?}");
     }
     for seeing in [Integration::Nsni, Integration::Gauss] {
         let z = of(seeing, 0.0);
-        assert!(z.interior_felt > 0.9 && z.least_felt > 0.8, "{z:?}");
-        assert!(of(seeing, 0.4).least_felt > 5.0 * of(Integration::Dni, 0.4).least_felt);
+        assert!(z.interior_energy_ratio > 0.9 && z.least_energy_ratio > 0.8, "{z:?}");
+        assert!(of(seeing, 0.4).least_energy_ratio > 5.0 * of(Integration::Dni, 0.4).least_energy_ratio);
     }
 }
 

@@ -67,6 +67,17 @@ pub enum ModelError {
 }
 
 /// The discrete model of a scene: everything that all paddles share.
+///
+/// # Example
+/// ```
+/// use model_offline::{NewtonSettings, Scene, TissueModel};
+///
+/// let model = TissueModel::new(&Scene::bundled("paper").expect("bundled"))?;
+/// let mut body = model.body(model.paddle_position(3), NewtonSettings::default())?;
+/// body.drive(0.1, [0.0, 0.0].into())?; // needle to depth 0.1, paddle still
+/// assert!(body.target_displacement().norm() > 0.0);
+/// # Ok::<(), model_offline::ModelError>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct TissueModel {
     scene: Scene,

@@ -6,7 +6,7 @@ use crate::linalg::Pattern;
 use crate::mechanics::ConstrainedRows;
 use crate::mechanics::assembly::{BlockPositions, State, internal_force, tangent};
 use crate::model::{ModelError, TissueModel};
-use crate::solver::constrained::ConstrainedSolver;
+use crate::solver::constrained::{ConstrainedSolver, Unknowns};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 
@@ -60,7 +60,8 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
             model.prescribed_values(Some(paddle), 0.0, Vector2::y()),
             model.prescribed_values(Some(paddle), 1.0, Vector2::zeros()),
         ];
-        solver.solve(&zero, &rates.concat(), 1e-12, &mut response, &mut multipliers);
+        let unknowns = Unknowns { x: &mut response, multipliers: &mut multipliers };
+        solver.solve(&zero, &rates.concat(), 1e-12, unknowns);
         let target = |rate: usize| model.target_row().interpolate(&response[rate * 2 * nodes..]);
         responses.push(response_of(model, paddle, Matrix2::from_columns(&[target(0), target(1)]), target(2))?);
     }

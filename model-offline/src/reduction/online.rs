@@ -89,7 +89,7 @@ pub struct ReducedModel {
     /// Target displacement per residual on the guard modes (2 × guards).
     pub(super) guard_response: DMatrix<f64>,
     /// What to add to the estimate, length.
-    pub(super) missed: f64,
+    pub(super) underestimate: f64,
     /// Largest error estimate that is accepted, length.
     pub(super) tolerance: f64,
     /// Largest norm of q in training.
@@ -135,7 +135,7 @@ impl ReducedModel {
             amplitudes: vec![0.0; self.controls + self.modes],
             residual: vec![0.0; self.modes + self.guards],
             factor: None,
-            estimate: self.missed,
+            estimate: self.underestimate,
         }
     }
 
@@ -284,7 +284,7 @@ impl ReducedBody {
         for (column, residual) in model.guard_response.column_iter().zip(&self.residual[model.modes..]) {
             correction += Vector2::new(column[0], column[1]) * *residual;
         }
-        self.estimate = correction.norm() + model.missed;
+        self.estimate = correction.norm() + model.underestimate;
         if self.estimate > model.tolerance {
             return Err(Invalid::TooInaccurate { estimate: self.estimate, tolerance: model.tolerance });
         }

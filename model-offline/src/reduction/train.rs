@@ -153,7 +153,7 @@ pub fn train(
     for (modes, misfit) in tries.filter(|(modes, _)| *modes <= available.max(MODES[0])) {
         let modes = modes.min(available);
         let guards = GUARDS.min(available - modes);
-        let mut reduced = space.reduce(model, modes, guards, misfit, domain);
+        let mut reduced = space.reduce(model, Size { modes, guards, misfit }, domain);
         // Half the tolerance for the states tried, so that those between them keep to the whole.
         let (worst_error, worst_estimate) = trial(&mut reduced, &trials);
         reduced.tolerance = options.tolerance * scale;
@@ -269,9 +269,19 @@ fn trial(reduced: &mut ReducedModel, trials: &[Snapshot]) -> (f64, f64) {
         return (f64::INFINITY, f64::INFINITY);
     }
     let outcomes: Vec<(f64, f64)> = outcomes.into_iter().flatten().collect();
-    reduced.missed = outcomes.iter().map(|(error, estimate)| error - estimate).fold(0.0, f64::max);
+    reduced.underestimate = outcomes.iter().map(|(error, estimate)| error - estimate).fold(0.0, f64::max);
     let worst = |part: fn(&(f64, f64)) -> f64| outcomes.iter().map(part).fold(0.0, f64::max);
-    (worst(|o| o.0), worst(|o| o.1) + reduced.missed)
+    (worst(|o| o.0), worst(|o| o.1) + reduced.underestimate)
+}
+
+/// How large a reduced model is.
+#[derive(Debug, Clone, Copy)]
+struct Size {
+    modes: usize,
+    /// Modes behind them that only the error estimate sees.
+    guards: usize,
+    /// Relative misfit of the weighted points.
+    misfit: f64,
 }
 
 /// Modes of the snapshots, with what the full model says about them.
@@ -330,11 +340,12 @@ impl Space {
     }
 
     /// The reduced model on the first `modes` modes, with guards behind them.
-    fn reduce(&self, model: &TissueModel, modes: usize, guards: usize, misfit: f64, domain: Domain) -> ReducedModel {
+    fn reduce(&self, model: &TissueModel, size: Size, domain: Domain) -> ReducedModel {
+        let Size { modes, guards, .. } = size;
         let controls = self.lifts.len();
         let width = controls + modes + guards;
         let tangent_at_rest = self.tangent_at_rest(model, modes + guards);
-        let sample = self.sample(model, modes, guards, misfit);
+        let sample = self.sample(model, size);
         let rule = model.rule();
         let points: Vec<SampledPoint> = sample
             .iter()
@@ -357,7 +368,7 @@ impl Space {
             gradients,
             target: self.target[..controls + modes].to_vec(),
             guard_response,
-            missed: 0.0,
+            underestimate: 0.0,
             tolerance: f64::INFINITY,
             amplitude: self.states.iter().map(|s| s.1.norm()).fold(f64::MIN_POSITIVE, f64::max),
             domain,
@@ -387,7 +398,8 @@ impl Space {
     /// Points and weights that give the forces on the modes, on the way from the response at rest to equilibrium at
     /// every snapshot, as all points together do; and the mode stiffness at rest. (At equilibrium alone these forces
     /// vanish, and any sample would do.)
-    fn sample(&self, model: &TissueModel, modes: usize, guards: usize, misfit: f64) -> Vec<(usize, f64)> {
+    fn sample(&self, model: &TissueModel, size: Size) -> Vec<(usize, f64)> {
+        let Size { modes, guards, misfit } = size;
         let rule = model.rule();
         let seen = modes + guards;
         let all = 2 * self.states.len() * seen;

@@ -28,6 +28,16 @@ pub const BUNDLED: [(&str, &str); 5] = [
 ];
 
 /// A validated scene.
+///
+/// # Example
+/// ```
+/// use model_offline::Scene;
+///
+/// let scene = Scene::bundled("paper").expect("bundled");
+/// assert_eq!(scene.paddles.len(), 5);
+/// let error = Scene::parse("[scene]\nname = 1", "mine.toml").unwrap_err();
+/// assert_eq!((error.line, error.column), (2, 8)); // where the text is wrong
+/// ```
 #[derive(Debug, Clone)]
 pub struct Scene {
     /// Name used in reports and in the table.

@@ -32,6 +32,15 @@ pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
     Validator { source, file: &file }.scene()
 }
 
+/// What targets and paddles must keep clear of.
+struct Surroundings<'a> {
+    outline: &'a Polygon,
+    immobile: &'a [Vec<Point2>],
+    needle: &'a Needle,
+    /// Distance within which points touch, length units.
+    tolerance: f64,
+}
+
 struct Validator<'a> {
     source: Source<'a>,
     file: &'a SceneFile,
@@ -52,8 +61,9 @@ impl Validator<'_> {
         let immobile = self.immobile(&outline, tolerance)?;
         let needle = self.needle(&outline, &immobile, tolerance)?;
         let target = self.point(file.target.position.get(), file.target.position.span(), "target")?;
-        self.target(target, &outline, &immobile, &needle, tolerance)?;
-        let paddles = self.paddles(&outline, &immobile, &needle, tolerance)?;
+        let around = Surroundings { outline: &outline, immobile: &immobile, needle: &needle, tolerance };
+        self.target(target, &around)?;
+        let paddles = self.paddles(&around)?;
         let inclusions = file.inclusion.iter().map(|i| self.inclusion(i, &outline)).collect::<Checked<_>>()?;
         Ok(Scene {
             name: file.scene.name.clone(),
@@ -192,14 +202,8 @@ impl Validator<'_> {
         Ok(Needle { contact, axis: axis.normalize(), depth, increments })
     }
 
-    fn target(
-        &self,
-        target: Point2,
-        outline: &Polygon,
-        immobile: &[Vec<Point2>],
-        needle: &Needle,
-        tolerance: f64,
-    ) -> Checked<()> {
+    fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {
+        let Surroundings { outline, immobile, needle, tolerance } = *around;
         let span = self.file.target.position.span();
         if outline.locate(target, tolerance) == Location::Outside {
             return Err(self.error(span, "the target is outside the outline", "move the target into the body"));
@@ -221,13 +225,8 @@ impl Validator<'_> {
         Ok(())
     }
 
-    fn paddles(
-        &self,
-        outline: &Polygon,
-        immobile: &[Vec<Point2>],
-        needle: &Needle,
-        tolerance: f64,
-    ) -> Checked<Vec<Paddle>> {
+    fn paddles(&self, around: &Surroundings<'_>) -> Checked<Vec<Paddle>> {
+        let Surroundings { outline, immobile, needle, tolerance } = *around;
         if self.file.paddle.is_empty() {
             return Err(self.error(
                 self.file.domain.outline.span(),

@@ -37,6 +37,15 @@ pub struct ConstrainedSolver<const D: usize> {
     work: Work,
 }
 
+/// The unknowns of a constrained system.
+#[derive(Debug)]
+pub struct Unknowns<'a> {
+    /// Coefficients x, D numbers per node.
+    pub x: &'a mut [f64],
+    /// Multipliers μ, D numbers per constrained row.
+    pub multipliers: &'a mut [f64],
+}
+
 #[derive(Debug, Default)]
 struct Work {
     solution: Vec<f64>,
@@ -157,12 +166,13 @@ impl<const D: usize> ConstrainedSolver<D> {
     }
 
     /// Solves `K x + Λᵀ μ = rhs`, `Λ x = gap` with the last factor, for as many right-hand sides as `rhs` holds one after
-    /// the other (several at once pass through the factor together). `mu` comes in as a first guess (zeros will do) and
-    /// leaves as the multipliers; the constraint is met to `tolerance` (length units) or to rounding error.
+    /// the other (several at once pass through the factor together). The multipliers come in as a first guess (zeros will
+    /// do); the constraint is met to `tolerance` (length units) or to rounding error.
     ///
     /// # Panics
     /// When the lengths do not belong to the same number of right-hand sides.
-    pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, x: &mut [f64], mu: &mut [f64]) {
+    pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, solution: Unknowns<'_>) {
+        let Unknowns { x, multipliers: mu } = solution;
         let (unknowns, rows) = (self.pattern.unknowns(), self.constrained.len() * D);
         let columns = rhs.len() / unknowns;
         assert!(x.len() == rhs.len() && gap.len() == columns * rows && mu.len() == gap.len(), "one shape");

@@ -5,7 +5,7 @@
 //! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
 //! tangent is not positive definite is reported as lost stability, never passed off as an answer.
 
-use super::constrained::ConstrainedSolver;
+use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::linalg::Pattern;
@@ -310,7 +310,7 @@ impl<const D: usize> Equilibrium<D> {
         if let Some(imposed) = &self.weak {
             imposed.add_response(&self.tissue, &self.at.coefficients, weak, &mut rhs);
         }
-        self.solver.solve(&rhs, strong, 1e-14, &mut x, &mut mu);
+        self.solver.solve(&rhs, strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
         Ok(x)
     }
 
@@ -393,7 +393,8 @@ impl<const D: usize> Equilibrium<D> {
             for (r, f) in rhs.iter_mut().zip(&self.at.force) {
                 *r = -f;
             }
-            self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, &mut step, &mut mu);
+            let unknowns = Unknowns { x: &mut step, multipliers: &mut mu };
+            self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, unknowns);
             self.effort.iterations += 1;
             let slope = dot(&step, &self.at.force);
             match self.search(&step, feasible.then_some(slope)) {

@@ -130,8 +130,7 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelEr
     let (candidate, outcome, verified_error) = discretization(scene, tolerance, &reference, REPEATS, &mut rejected)?;
     let error_estimate = worst(&outcome, &reference);
     let model = build(scene, &candidate)?;
-    let (law, plant, plant_depth, step_us) =
-        law_and_plant(scene, &candidate, &model, tolerance, threads, &mut rejected)?;
+    let PlantChoice { law, plant, depth: plant_depth, step_us } = plant(&model, tolerance, threads, &mut rejected)?;
     let (table_knots, table_scalar) = table(&model, tolerance, &mut rejected)?;
     let chosen = Chosen {
         integration: candidate.method.integration,
@@ -262,29 +261,33 @@ fn rejection(decision: Decision, candidate: String, number: f64, reason: String)
 /// Largest model on which the finite-depth profiles of both laws are compared: the law's error hardly depends on nodes.
 const LAW_NODES: usize = 1500;
 
-fn law_and_plant(
-    scene: &Scene,
-    candidate: &Discretization,
+/// What a simulator should solve.
+struct PlantChoice {
+    law: Linearity,
+    plant: PlantModel,
+    /// Depth up to which it holds, length units.
+    depth: f64,
+    /// Time of a step, µs.
+    step_us: f64,
+}
+
+/// The cheapest plant that keeps the tolerance on the model's scene; fills `rejected`.
+fn plant(
     model: &TissueModel,
     tolerance: f64,
     threads: usize,
     rejected: &mut Vec<Rejected>,
-) -> Result<(Linearity, PlantModel, f64, f64), ModelError> {
-    let (limited, _) = with_mesh_limit(scene)?;
-    let compared = if model.nodes() <= LAW_NODES {
-        build(&limited, candidate)?
-    } else {
-        graded_model(&limited, candidate.method, -2)?
-    };
-    let nonlinear = profile(&compared)?;
-    let law_error = profile_distance(&linear_profile(&compared)?, &nonlinear);
+) -> Result<PlantChoice, ModelError> {
+    let scene = model.scene();
+    let law_error = linear_law_error(model)?;
     let paddle = model.paddle_position(best_dynamic(model)?);
     if law_error <= tolerance {
         let condensed = Condensed::new(model, paddle)?;
-        let step_us = step_us(scene, scene.needle.depth, |depth| -> Result<_, Infallible> {
+        let depth = scene.needle.depth;
+        let step_us = step_us(scene, depth, |depth| -> Result<_, Infallible> {
             Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
         });
-        return Ok((Linearity::Linear, PlantModel::Condensed, scene.needle.depth, step_us));
+        return Ok(PlantChoice { law: Linearity::Linear, plant: PlantModel::Condensed, depth, step_us });
     }
     let reason = "error of the target displacement along the insertion by the linear law".to_owned();
     rejected.push(rejection(Decision::Law, "linear law, condensed plant".into(), law_error, reason));
@@ -292,26 +295,39 @@ fn law_and_plant(
     match train(model, paddle, &options) {
         Ok((reduced, report)) => {
             let mut body = reduced.body();
-            let step_us = step_us(scene, report.domain.depth, |depth| -> Result<_, Invalid> {
+            let depth = report.domain.depth;
+            let step_us = step_us(scene, depth, |depth| -> Result<_, Invalid> {
                 body.drive(depth, Vector2::zeros())?;
                 Ok(body.target_displacement())
             });
-            Ok((Linearity::Nonlinear, PlantModel::Reduced, report.domain.depth, step_us))
+            Ok(PlantChoice { law: Linearity::Nonlinear, plant: PlantModel::Reduced, depth, step_us })
         }
         Err(error) => {
             rejected.push(rejection(Decision::Plant, "reduced plant".into(), f64::NAN, error.to_string()));
             let mut body = model.body(paddle, TICK_SETTINGS)?;
             // As far as the tissue goes.
             let _ = body.drive(scene.needle.depth, Vector2::zeros());
-            let reached = body.depth();
+            let depth = body.depth();
             let mut body = model.body(paddle, TICK_SETTINGS)?;
-            let step_us = step_us(scene, reached, |depth| -> Result<_, Failure> {
+            let step_us = step_us(scene, depth, |depth| -> Result<_, Failure> {
                 body.drive(depth, Vector2::zeros())?;
                 Ok(body.target_displacement())
             });
-            Ok((Linearity::Nonlinear, PlantModel::Full, reached, step_us))
+            Ok(PlantChoice { law: Linearity::Nonlinear, plant: PlantModel::Full, depth, step_us })
         }
     }
+}
+
+/// Error of the target displacement over the whole insertion by the law's small-strain limit.
+fn linear_law_error(model: &TissueModel) -> Result<f64, ModelError> {
+    let (limited, _) = with_mesh_limit(model.scene())?;
+    let compared = if model.nodes() <= LAW_NODES {
+        TissueModel::new(&limited)?
+    } else {
+        graded_model(&limited, limited.discretization.method, -2)?
+    };
+    let nonlinear = profile(&compared)?;
+    Ok(profile_distance(&linear_profile(&compared)?, &nonlinear))
 }
 
 /// Time of a step over the insertion to `depth`, µs; NaN where it fails.

@@ -11,6 +11,16 @@ use firmware::stability::default_gain;
 use nalgebra::{Matrix2, Vector2};
 
 /// How a table is made.
+///
+/// # Example
+/// ```
+/// use model_offline::{Scene, TableOptions, TissueModel, table};
+///
+/// let model = TissueModel::new(&Scene::bundled("paper").expect("bundled"))?;
+/// let few = table::build(&model, 3, &TableOptions { knots: 5, ..TableOptions::default() })?;
+/// assert_eq!(few.knots.len(), 5);
+/// # Ok::<(), table::TableBuildError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableOptions {
     /// Depth knots, at least 2.

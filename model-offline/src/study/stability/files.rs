@@ -63,9 +63,9 @@ pub fn zero_energy_csv(study: &Stability) -> String {
             z.nodes,
             z.zero_modes,
             z.checkerboard_over_smooth,
-            z.checkerboard_felt,
-            z.interior_felt,
-            z.least_felt
+            z.checkerboard_energy_ratio,
+            z.interior_energy_ratio,
+            z.least_energy_ratio
         );
     }
     out
@@ -196,8 +196,8 @@ pub fn figure(study: &Stability) -> Figure {
     };
     let zero = Panel {
         series: vec![
-            energies("checkerboard in the interior", Marker::Square, true, &|z| z.interior_felt),
-            energies("mode felt least", Marker::Square, false, &|z| z.least_felt),
+            energies("checkerboard in the interior", Marker::Square, true, &|z| z.interior_energy_ratio),
+            energies("mode felt least", Marker::Square, false, &|z| z.least_energy_ratio),
         ],
         ..Panel::new(
             "Energy felt over true energy",

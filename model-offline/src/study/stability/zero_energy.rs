@@ -36,11 +36,11 @@ pub struct ZeroEnergy {
     /// Energy of the checkerboard displacement over that of one sine wave over the body with the same ‖d‖.
     pub checkerboard_over_smooth: f64,
     /// Energy of the checkerboard displacement over the energy that the same field has when integrated accurately.
-    pub checkerboard_felt: f64,
+    pub checkerboard_energy_ratio: f64,
     /// The same, in the cells that are far enough from the boundary not to feel it; not a number when there are none.
-    pub interior_felt: f64,
+    pub interior_energy_ratio: f64,
     /// The least share of its energy, integrated accurately, that the rule gives to any deformation.
-    pub least_felt: f64,
+    pub least_energy_ratio: f64,
 }
 
 /// Measures every method at a spacing, on a regular lattice and with nodes jittered by 40 %.
@@ -90,7 +90,7 @@ fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelErro
             phase.x.sin() * phase.y.sin()
         })
         .collect();
-    let interior_felt = accurate.as_ref().map_or(1.0, |(rule, cells)| {
+    let interior_energy_ratio = accurate.as_ref().map_or(1.0, |(rule, cells)| {
         // Cells in which no kernel feels the boundary.
         let clear = setting.method.support * spacing - 1e-9 * extent;
         let inside = |cells: &[NodalCell]| -> Vec<bool> {
@@ -111,9 +111,9 @@ fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelErro
         nodes: model.nodes(),
         zero_modes: eigenvalues.iter().filter(|v| v.abs() <= zero).count(),
         checkerboard_over_smooth: energy(&stiffness, &checkerboard) / energy(&stiffness, &smooth),
-        checkerboard_felt: energy(&stiffness, &checkerboard) / energy(&exact, &checkerboard),
-        interior_felt,
-        least_felt: if !integration.is_element() { least_share(&stiffness, &exact) } else { 1.0 },
+        checkerboard_energy_ratio: energy(&stiffness, &checkerboard) / energy(&exact, &checkerboard),
+        interior_energy_ratio,
+        least_energy_ratio: if !integration.is_element() { least_share(&stiffness, &exact) } else { 1.0 },
     })
 }
 
