@@ -47,20 +47,40 @@
 //!
 //! # Example
 //! ```
-//! use firmware::{contract, Controller, Inputs, Settings, State};
+//! use firmware::contract::frames::TARGET_VISIBLE;
+//! use firmware::{Controller, Inputs, Mode, NeedleSample, PaddleSample, Settings, State, TargetSample, decode};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let bytes: &[u8] = &[];
-//! match contract::decode::<f64, 2>(bytes) {
-//!     Ok(table) => {
-//!         // 1 kHz loop; target at 50 Hz, 20 ms old when it arrives.
-//!         let controller = Controller::new(&table, &Settings::new(1_000_000, 20_000_000, 20_000_000))?;
-//!         let mut state = State::new();
-//!         let command = controller.step(&mut state, &Inputs { tick: 0, time_ns: 0, ..Inputs::default() });
-//!         assert!(!command.is_valid(), "nothing is known about the paddle yet");
+//! // Tissue that takes the target along by 2 % of the depth sideways; paddle number 3.
+//! let table = decode::<f64, 2>(&std::fs::read("tests/planar.table")?)?;
+//! // 1 kHz loop; target at 50 Hz, 20 ms old when it arrives.
+//! let controller = Controller::new(&table, &Settings::new(1_000_000, 20_000_000, 20_000_000))?;
+//! let mut state = State::new();
+//!
+//! // The needle goes in at 0.02 per second; the target stays where it is.
+//! let mut paddle = [0.0; 2];
+//! for tick in 0..1000 {
+//!     let (sequence, time_ns) = (tick as u32, tick * 1_000_000);
+//!     let depth = 2e-5 * tick as f64;
+//!     let needle = NeedleSample { sequence, time_ns, depth, velocity: 0.02, ..Default::default() };
+//!     let target = TargetSample { sequence, time_ns, flags: TARGET_VISIBLE, displacement: [0.0, -0.1 * depth] };
+//!     let measured = PaddleSample { sequence, time_ns, paddle_index: 3, displacement: paddle };
+//!     let inputs = Inputs {
+//!         tick,
+//!         time_ns,
+//!         needle: Some(needle),
+//!         target: (tick % 20 == 0).then_some(target),
+//!         paddle: Some(measured),
+//!     };
+//!     let command = controller.step(&mut state, &inputs);
+//!     if command.is_valid() {
+//!         paddle = command.displacement; // what an ideal actuator does until the next tick
 //!     }
-//!     Err(refusal) => println!("{refusal}"), // 0 bytes cannot hold a controller table; ...
 //! }
+//! assert_eq!(state.mode(), Mode::Run);
+//! // The feed-forward acts against the needle: the paddle has pushed by 2 % of the depth of 0.02, over J.
+//! let pushed = 0.30 * paddle[0] + 0.05 * paddle[1];
+//! assert!((pushed + 0.02 * 0.02).abs() < 1e-5);
 //! # Ok(())
 //! # }
 //! ```

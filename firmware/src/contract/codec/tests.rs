@@ -172,3 +172,12 @@ fn a_small_buffer_is_an_error() {
         assert_eq!(encode(&table, &mut buffer), Err(TableError::BufferTooSmall { bytes }));
     }
 }
+
+/// `tests/planar.table` is the example table as version 1 of the format wrote it on 21 November 2026. After a change of
+/// the format it is to be made again: from `encode(&example::table())`.
+#[test]
+fn the_format_is_that_of_the_file_in_the_examples() {
+    let file = include_bytes!("../../../tests/planar.table");
+    assert_eq!(encoded(&example::table()), file);
+    assert_eq!(decode::<f64, 2>(file).unwrap(), example::table());
+}
