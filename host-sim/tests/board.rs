@@ -8,7 +8,7 @@ use firmware::contract::frames::TARGET_VISIBLE;
 use firmware::contract::{Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample};
 use firmware::contract::{Units, Validity};
 use firmware::scalar::ScalarKind;
-use firmware::serial::{Board, Memory, Reply, Request, ResetCause, serve};
+use firmware::serial::{Board, Memory, Refusal, Reply, Request, ResetCause, serve};
 use firmware::{Faults, Inputs, Mode, Settings};
 use host_sim::exchange::board::tamper::{Damage, Tamper};
 use host_sim::exchange::board::{BoardError, Device, Image, Processor, SerialLine};
@@ -319,8 +319,16 @@ fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
     let mut plant = Plant::default();
     assert_eq!(drive(&mut device, &mut plant, 200).last.state, Mode::Run as u32);
 
+    // In RUN a patient depends on it; in SAFE it may be tested.
     device.tell(Request::TestWatchdog).unwrap();
     let patience = Duration::from_secs(20);
+    let refused = device.hear(patience).unwrap();
+    assert_eq!(refused, Some(Reply::Refused(Refusal::Order)));
+    assert_eq!(drive(&mut device, &mut plant, 100).last.state, Mode::Run as u32);
+    let silence = Inputs { tick: plant.tick + 600, time_ns: (plant.tick + 600) * MS, ..Inputs::default() };
+    let stopped = device.step(&silence, PATIENCE).unwrap().unwrap().command;
+    assert_eq!(stopped.state, Mode::Safe as u32);
+    device.tell(Request::TestWatchdog).unwrap();
     let Some(Reply::Command { command, .. }) = device.hear(patience).unwrap() else { panic!("no last word") };
     assert_eq!((command.state, command.is_valid()), (Mode::Safe as u32, false));
     assert_eq!(command.faults, Faults::WATCHDOG.bits());

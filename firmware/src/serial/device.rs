@@ -4,14 +4,13 @@
 //! served once per pass, so that a step that never returns is noticed, and a silent host is not: silence is the
 //! controller's own business (ages of samples, HOLD, SAFE).
 
-use super::frame::{FrameReader, FrameWriter};
+use super::frame::{Frame, FrameReader, FrameWriter};
 use super::message::{Account, ClockSource, Identity, PROTOCOL_VERSION, Refusal, Reply, Request, ResetCause};
 use crate::contract::codec::FORMAT_VERSION;
 use crate::contract::frames::LAYOUT_VERSION;
 use crate::contract::{Faults, Mode};
 use crate::contract::{PaddleCommand, Table, decode_into};
 use crate::controller::{Controller, State};
-use crate::inputs::Arrival;
 use crate::inputs::Inputs;
 use crate::scalar::Scalar;
 use crate::schedule::Releases;
@@ -99,24 +98,27 @@ pub fn serve<T: Scalar, B: Board>(board: &mut B, memory: &mut Memory<T>, reset: 
         reset,
     };
     line.send_hello(board, identity);
+    // From 1: the 0 of a host that knows of no run ends none.
+    let mut session = 1u32;
     while !board.is_closed() {
         board.alive();
-        if line.poll(board).is_none() {
-            continue;
-        }
+        let Some(frame) = line.poll(board) else { continue };
         match line.reader.message() {
-            Some(Request::Hello) => line.send_hello(board, identity),
+            // Without a run nothing can be ended.
+            Some(Request::Hello { .. }) => line.welcome(board, identity),
+            _ if frame == Frame::Start => {}
             Some(Request::Table { offset, bytes }) => match take(encoded, filled, offset, bytes) {
                 Ok(bytes) => line.send_taken(board, bytes),
                 Err(refusal) => line.send_refusal(board, refusal),
             },
             Some(Request::Begin { settings, clock }) => {
                 let begun = check_table(encoded.get(..*filled).unwrap_or_default(), table)
-                    .and_then(|()| run(board, line, table, &settings, clock));
+                    .and_then(|()| run(board, line, table, &Start { settings, clock, session }));
+                session = session.checked_add(1).unwrap_or(1);
                 match begun {
                     Ok(()) if board.is_closed() => {}
                     // The run was ended by a Hello.
-                    Ok(()) => line.send_hello(board, identity),
+                    Ok(()) => line.welcome(board, identity),
                     Err(refusal) => line.send_refusal(board, refusal),
                 }
             }
@@ -161,27 +163,30 @@ fn build<'t, T: Scalar>(table: &'t Table<T, 2>, settings: &Settings) -> Result<C
 
 /// Builds the controller and runs it until the host says Hello.
 #[inline(never)]
-fn run<T: Scalar, B: Board>(
-    board: &mut B,
-    line: &mut Line,
-    table: &Table<T, 2>,
-    settings: &Settings,
-    clock: ClockSource,
-) -> Result<(), Refusal> {
-    let controller = build(table, settings)?;
+fn run<T: Scalar, B: Board>(board: &mut B, line: &mut Line, table: &Table<T, 2>, start: &Start) -> Result<(), Refusal> {
+    let controller = build(table, &start.settings)?;
+    let period_ns = start.settings.loop_period_ns;
     let mut state = State::new();
     line.send_ready(board);
     Run {
         controller: &controller,
         state: &mut state,
         inbox: Inputs::default(),
-        clock,
+        clock: start.clock,
+        session: start.session,
         now: Now::new(board.counter()),
-        period_ns: settings.loop_period_ns,
-        releases: Releases::new(0, settings.loop_period_ns),
+        period_ns,
+        releases: Releases::new(0, period_ns),
     }
     .serve(board, line);
     Ok(())
+}
+
+/// What a run begins with.
+struct Start {
+    settings: Settings,
+    clock: ClockSource,
+    session: u32,
 }
 
 /// A controller at work.
@@ -191,6 +196,8 @@ struct Run<'r, T: Scalar> {
     /// Newest sample of each stream since the last step.
     inbox: Inputs,
     clock: ClockSource,
+    /// Number of the run since the reset.
+    session: u32,
     now: Now,
     period_ns: u64,
     /// Those of the board's clock, in the host's time.
@@ -212,26 +219,36 @@ impl<T: Scalar> Run<'_, T> {
                     self.releases.finish(end_ns);
                 }
             }
-            let Some(arrival) = line.poll(board) else { continue };
-            let message = line.reader.message();
-            let new = arrival == Arrival::New;
-            match message {
+            let Some(frame) = line.poll(board) else { continue };
+            let is_safe = self.state.mode() == Mode::Safe;
+            match line.reader.message() {
+                Some(Request::Hello { session }) if frame == Frame::Start => {
+                    if session == self.session {
+                        return;
+                    }
+                    line.send_refusal(board, Refusal::Session { current: self.session });
+                }
+                // Frame 0 is a Hello, or nothing.
+                _ if frame == Frame::Start => {}
                 Some(Request::Needle(sample)) => keep_newest(&mut self.inbox.needle, sample, |s| s.sequence),
                 Some(Request::Target(sample)) => keep_newest(&mut self.inbox.target, sample, |s| s.sequence),
                 Some(Request::Paddle(sample)) => keep_newest(&mut self.inbox.paddle, sample, |s| s.sequence),
                 // Anything but a sample means something only in its place.
-                _ if !new => {}
+                _ if frame == Frame::Late => {}
                 Some(Request::Time { tick, time_ns }) => match self.clock {
                     ClockSource::Frames => self.step(board, line, tick, time_ns),
                     ClockSource::Board => self.set_clock(board, time_ns),
                 },
-                Some(Request::Rearm) => self.state.rearm(),
+                Some(Request::Rearm) if is_safe => self.state.rearm(),
                 Some(Request::Account) => self.send_account(board, line),
-                Some(Request::Hello) => return,
-                Some(Request::TestWatchdog) => board.hang(),
-                Some(Request::Table { .. } | Request::Begin { .. }) => {
-                    line.send_refusal(board, Refusal::Order);
-                }
+                Some(Request::TestWatchdog) if is_safe => board.hang(),
+                Some(
+                    Request::Rearm
+                    | Request::TestWatchdog
+                    | Request::Hello { .. }
+                    | Request::Table { .. }
+                    | Request::Begin { .. },
+                ) => line.send_refusal(board, Refusal::Order),
                 None => line.reader.count_unknown(),
             }
         }
@@ -367,6 +384,12 @@ impl Line {
         self.send(board, &Reply::Hello(identity));
     }
 
+    /// Answers a host that starts.
+    fn welcome<B: Board>(&mut self, board: &mut B, identity: Identity) {
+        self.reader.follow();
+        self.send_hello(board, identity);
+    }
+
     #[inline(never)]
     fn send_taken<B: Board>(&mut self, board: &mut B, bytes: u32) {
         self.send(board, &Reply::Taken { bytes });
@@ -385,11 +408,11 @@ impl Line {
     }
 
     /// Takes the bytes that have arrived, up to the end of a frame.
-    fn poll<B: Board>(&mut self, board: &mut B) -> Option<Arrival> {
+    fn poll<B: Board>(&mut self, board: &mut B) -> Option<Frame> {
         while let Some(byte) = board.read() {
-            let arrival = self.reader.feed(byte);
-            if arrival.is_some() {
-                return arrival;
+            let frame = self.reader.feed(byte);
+            if frame.is_some() {
+                return frame;
             }
         }
         None

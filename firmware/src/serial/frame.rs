@@ -3,7 +3,9 @@
 //! `0 ‖ COBS(counter ‖ message ‖ CRC-32) ‖ 0`: counter (u32) and message in postcard, the CRC-32 (ISO-HDLC,
 //! little-endian) over both. COBS leaves no 0 inside, so that a reader finds the next frame after any damage; with a
 //! delimiter on both sides one lost delimiter costs one frame, not two. The counter tells lost, late and doubled
-//! frames. It starts at 0, which tells the reader that the sender has started anew, and wraps to 1.
+//! frames. It starts at 0, with which a sender says that it starts anew, and wraps to 1. Anybody can send frame 0 again:
+//! the reader only reports it as a [`Frame::Start`], and whoever understands its message decides whether to
+//! [follow](FrameReader::follow).
 
 use cobs::{CobsEncoder, DecodeResult, DecoderState};
 use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
@@ -13,7 +15,7 @@ use crate::inputs::{Arrival, SequenceTracker};
 use crate::inputs::{Discard, StreamLedger};
 
 /// Largest content of a frame, bytes: an account with every counter full fits.
-pub const MAX_CONTENT_BYTES: usize = 640;
+pub const MAX_CONTENT_BYTES: usize = 704;
 /// Largest frame on the line: COBS adds one byte and one more per 254, the delimiters two.
 pub const MAX_FRAME_BYTES: usize = MAX_CONTENT_BYTES + MAX_CONTENT_BYTES / 254 + 4;
 
@@ -30,8 +32,10 @@ pub struct LineLedger {
     pub damaged: u64,
     /// Intact frames whose message is none of this version's.
     pub unknown: u64,
-    /// Starts of the sender.
+    /// Starts of the sender that were followed.
     pub starts: u64,
+    /// Frames 0 that were not followed, or not yet: sent again.
+    pub replayed_starts: u64,
 }
 
 /// Makes frames out of messages.
@@ -78,6 +82,17 @@ impl Default for FrameWriter {
     }
 }
 
+/// What a reader has found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frame {
+    /// A frame with the number 0: a sender that starts, or an old frame sent again. Nothing of the reader has changed.
+    Start,
+    /// A new frame.
+    New,
+    /// A frame that comes after a newer one.
+    Late,
+}
+
 /// Finds frames in a stream of bytes.
 #[derive(Debug)]
 pub struct FrameReader {
@@ -111,9 +126,9 @@ impl FrameReader {
         &self.ledger
     }
 
-    /// Takes one byte. Once it completes an intact frame that has not come before: whether it is new or late.
+    /// Takes one byte. Once it completes an intact frame that has not come before: what it is.
     /// Its [`message`](Self::message) stays until the next byte.
-    pub fn feed(&mut self, byte: u8) -> Option<Arrival> {
+    pub fn feed(&mut self, byte: u8) -> Option<Frame> {
         if byte == 0 {
             return self.end();
         }
@@ -132,8 +147,18 @@ impl FrameReader {
         None
     }
 
+    /// Follows the sender whose [`Frame::Start`] has just come: its numbers count from now on.
+    pub fn follow(&mut self) {
+        self.tracker = SequenceTracker::new();
+        self.ledger.starts += 1;
+        self.ledger.replayed_starts = self.ledger.replayed_starts.saturating_sub(1);
+        self.ledger.frames.delivered += 1;
+        self.tracker.register(0, &mut self.ledger.frames);
+        self.ledger.frames.consumed += 1;
+    }
+
     /// A delimiter: the end of a frame, or one of several between two.
-    fn end(&mut self) -> Option<Arrival> {
+    fn end(&mut self) -> Option<Frame> {
         let empty = matches!(self.state, DecoderState::Idle);
         let whole = matches!(self.state.feed(0), Ok(DecodeResult::DataComplete)) && !self.broken;
         self.state = DecoderState::Idle;
@@ -148,15 +173,16 @@ impl FrameReader {
             return None;
         };
         if counter == 0 {
-            self.tracker = SequenceTracker::new();
-            self.ledger.starts += 1;
+            self.ledger.replayed_starts += 1;
+            return Some(Frame::Start);
         }
+        self.ledger.frames.delivered += 1;
         match self.tracker.register(counter, &mut self.ledger.frames) {
             Arrival::New => {
                 self.ledger.frames.consumed += 1;
-                Some(Arrival::New)
+                Some(Frame::New)
             }
-            Arrival::Late => Some(Arrival::Late),
+            Arrival::Late => Some(Frame::Late),
             Arrival::Duplicate | Arrival::Stray => None,
         }
     }
@@ -194,7 +220,7 @@ impl Default for FrameReader {
 impl LineLedger {
     /// Accounts before the first byte.
     pub const fn new() -> Self {
-        Self { frames: StreamLedger::new(), damaged: 0, unknown: 0, starts: 0 }
+        Self { frames: StreamLedger::new(), damaged: 0, unknown: 0, starts: 0, replayed_starts: 0 }
     }
 
     /// Frames that came after a newer one.
@@ -219,7 +245,10 @@ mod tests {
         let mut reader = FrameReader::new();
         let mut numbers = Vec::new();
         for byte in bytes {
-            if reader.feed(byte).is_some() {
+            if let Some(frame) = reader.feed(byte) {
+                if frame == Frame::Start {
+                    reader.follow();
+                }
                 numbers.push(reader.message::<(u32, u8, f64)>().unwrap().0);
             }
         }
@@ -277,14 +306,14 @@ mod tests {
     fn a_message_too_large_for_a_frame_is_not_sent() {
         let mut writer = FrameWriter::new();
         let large = [1u8; 32];
-        assert!(writer.encode(&[large; 21]).is_none());
-        assert!(writer.encode(&[large; 19]).is_some());
+        assert!(writer.encode(&[large; 22]).is_none());
+        assert!(writer.encode(&[large; 21]).is_some());
     }
 
     #[test]
     fn frames_are_no_larger_than_promised() {
         let mut writer = FrameWriter::new();
-        let content = [[1u8; 30]; 21];
+        let content = [[1u8; 29]; 24];
         assert!(writer.encode(&content).is_some_and(|frame| frame.len() <= MAX_FRAME_BYTES));
     }
 }

@@ -10,7 +10,7 @@ use crate::inputs::Ledger;
 use crate::settings::Settings;
 
 /// Version of the messages; the host refuses a device of another one.
-pub const PROTOCOL_VERSION: u32 = 1;
+pub const PROTOCOL_VERSION: u32 = 2;
 
 /// Bytes of a table in one message: whole frames stay small against the line's buffers.
 pub const TABLE_CHUNK_BYTES: usize = 256;
@@ -18,8 +18,14 @@ pub const TABLE_CHUNK_BYTES: usize = 256;
 /// Host to device.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Request<'a> {
-    /// Ends a run, if there is one, and asks who is there.
-    Hello,
+    /// Asks who is there, and ends the run with this number; always the first frame of its sender.
+    ///
+    /// A device without a run answers any number. One with a run answers [`Refusal::Session`] unless the number is the
+    /// run's: a Hello sent again, or one of a host that does not know of the run, ends nothing.
+    Hello {
+        /// Number of the run that is to end; anything where there is none.
+        session: u32,
+    },
     /// A piece of the encoded table.
     Table {
         /// Where it begins; must be where the piece before ended, or 0 to begin anew.
@@ -47,11 +53,12 @@ pub enum Request<'a> {
         /// Time on the clock that stamps the samples, ns.
         time_ns: u64,
     },
-    /// Leaves SAFE; see [`crate::controller::State::rearm`].
+    /// Leaves SAFE; see [`crate::controller::State::rearm`]. Refused in any other mode.
     Rearm,
     /// Asks for the accounts.
     Account,
-    /// Proof test of the watchdog: the device stops serving it, as a step that never returns would.
+    /// Proof test of the watchdog: the device stops serving it, as a step that never returns would. Refused in a run
+    /// that is not in SAFE.
     TestWatchdog,
 }
 
@@ -155,6 +162,11 @@ pub enum Refusal {
     Settings,
     /// Makes no sense now: no run, or one that has begun.
     Order,
+    /// A run is under way, and the Hello did not say that this is the one to end.
+    Session {
+        /// Number of the run.
+        current: u32,
+    },
 }
 
 /// Accounts of a run.

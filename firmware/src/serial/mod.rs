@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! host                                     device
-//! Hello                      ───────────→
+//! Hello { session }          ───────────→
 //!                            ←───────────  Hello: what it is, why it started
 //! Table { offset, bytes } …  ───────────→
 //!                            ←───────────  Taken { bytes } …
@@ -16,6 +16,7 @@
 //!                            ←───────────  Command { command, counts }
 //! Account                    ───────────→
 //!                            ←───────────  Account: ledger, line, stack
+//! Hello { session }          ───────────→  ends this run, and no other
 //! ```
 
 pub mod device;
@@ -23,5 +24,5 @@ pub mod frame;
 pub mod message;
 
 pub use device::{Board, Memory, serve};
-pub use frame::{FrameReader, FrameWriter, LineLedger};
+pub use frame::{Frame, FrameReader, FrameWriter, LineLedger};
 pub use message::{Account, ClockSource, Identity, Refusal, Reply, Request, ResetCause};

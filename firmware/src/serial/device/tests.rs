@@ -8,6 +8,8 @@ use super::*;
 use crate::contract::example::table;
 use crate::contract::{MAX_TABLE_BYTES, encode};
 use crate::controller::plant::{MS, Plant};
+use crate::inputs::{Discard, Ledger, StreamLedger, TickLedger};
+use crate::serial::LineLedger;
 
 /// A board whose line is closed once the host has nothing left to say.
 #[derive(Default)]
@@ -55,6 +57,8 @@ fn encoded<T: Scalar>(table: &Table<T, 2>) -> Vec<u8> {
     bytes
 }
 
+const HELLO: Request<'_> = Request::Hello { session: 0 };
+
 /// The requests that give a device this table, and begin a run.
 fn loading(table: &[u8], clock: ClockSource) -> Vec<Request<'_>> {
     let pieces = table.chunks(TABLE_CHUNK_BYTES).enumerate();
@@ -67,14 +71,30 @@ fn loading(table: &[u8], clock: ClockSource) -> Vec<Request<'_>> {
 /// What a device answers to these requests.
 fn answers<T: Scalar>(bench: &mut Bench, requests: &[Request<'_>]) -> Vec<Reply> {
     let mut writer = FrameWriter::new();
-    for request in requests {
+    let begun = matches!(requests.first(), Some(Request::Hello { .. }));
+    for request in [HELLO].iter().take(usize::from(!begun)).chain(requests) {
+        if matches!(request, Request::Hello { .. }) {
+            writer.restart();
+        }
         bench.to_device.extend(writer.encode(request).unwrap());
     }
+    answers_of::<T>(bench)
+}
+
+/// What a device answers to what is on the line.
+fn answers_of<T: Scalar>(bench: &mut Bench) -> Vec<Reply> {
     let mut memory = std::boxed::Box::new(Memory::<T>::new());
     serve(bench, &mut memory, ResetCause::PowerOn);
     let mut reader = FrameReader::new();
-    let replies = bench.from_device.iter().filter_map(|byte| reader.feed(*byte).and_then(|_| reader.message()));
-    replies.collect()
+    let mut replies = Vec::new();
+    for byte in &bench.from_device {
+        let frame = reader.feed(*byte);
+        if frame == Some(Frame::Start) {
+            reader.follow();
+        }
+        replies.extend(frame.and_then(|_| reader.message::<Reply>()));
+    }
+    replies
 }
 
 /// Inputs of a closed loop and the commands that the controller gives by itself.
@@ -184,7 +204,7 @@ fn the_board_releases_its_own_steps_without_drift() {
 #[test]
 fn the_watchdog_is_served_and_its_proof_test_stops_that() {
     let mut bench = Bench::default();
-    answers::<f64>(&mut bench, &[Request::Hello, Request::TestWatchdog]);
+    answers::<f64>(&mut bench, &[HELLO, Request::TestWatchdog]);
     assert!(bench.hung && bench.served > 0);
 }
 
@@ -193,9 +213,118 @@ fn the_last_word_is_a_safe_command_that_moves_nothing() {
     let mut memory = std::boxed::Box::new(Memory::<f64>::new());
     let mut reader = FrameReader::new();
     let arrival = memory.last_word().iter().filter_map(|byte| reader.feed(*byte)).last();
-    assert_eq!(arrival, Some(Arrival::New));
+    assert_eq!(arrival, Some(Frame::Start));
     let Some(Reply::Command { command, .. }) = reader.message() else { panic!("no command") };
     assert_eq!((command.state, command.is_valid()), (Mode::Safe as u32, false));
     assert_eq!(command.faults, Faults::WATCHDOG.bits());
     assert!(memory.last_word().len() <= 64, "fits where an exception finds it");
+}
+
+/// A run in RUN, then these requests, then some more of the insertion: the mode at its end and the replies in between.
+fn disturbed(disturbance: &[u8]) -> (Mode, Vec<Reply>) {
+    let bytes = encoded(&table());
+    let expected = insertion::<f64>(200);
+    let mut writer = FrameWriter::new();
+    let mut stream = Vec::new();
+    let requests = [HELLO].into_iter().chain(loading(&bytes, ClockSource::Frames));
+    let (before, after) = expected.split_at(100);
+    for request in requests.chain(before.iter().flat_map(|(inputs, _)| requests_of(inputs))) {
+        stream.extend_from_slice(writer.encode(&request).unwrap());
+    }
+    stream.extend_from_slice(disturbance);
+    for (inputs, _) in after {
+        for request in requests_of(inputs) {
+            stream.extend_from_slice(writer.encode(&request).unwrap());
+        }
+    }
+    let mut bench = Bench { to_device: stream.into(), ..Bench::default() };
+    let replies = answers_of::<f64>(&mut bench);
+    let commands: Vec<_> = replies
+        .iter()
+        .filter_map(|reply| match reply {
+            Reply::Command { command, .. } => Some(*command),
+            _ => None,
+        })
+        .collect();
+    assert!(!bench.hung, "the proof test of the watchdog ran in RUN");
+    assert!(commands.iter().eq(expected.iter().map(|(_, command)| command)), "the run went on as if undisturbed");
+    let others = replies.into_iter().filter(|reply| !matches!(reply, Reply::Command { .. })).collect();
+    (Mode::from_wire(commands.last().unwrap().state).unwrap(), others)
+}
+
+#[test]
+fn no_request_ends_or_resets_a_run_in_run() {
+    let bytes = encoded(&table());
+    // Frames of the run itself, sent again: the Hello that began it, and all that followed.
+    let mut writer = FrameWriter::new();
+    let mut again: Vec<Vec<u8>> = Vec::new();
+    let requests = [HELLO].into_iter().chain(loading(&bytes, ClockSource::Frames));
+    for request in requests.chain(insertion::<f64>(100).iter().flat_map(|(inputs, _)| requests_of(inputs))) {
+        again.push(writer.encode(&request).unwrap().to_vec());
+    }
+    let (mode, _) = disturbed(&again[..5].concat());
+    assert_eq!(mode, Mode::Run);
+    disturbed(&again.concat());
+    // A host that knows nothing of the run.
+    let stranger = FrameWriter::new().encode(&Request::Hello { session: 7 }).unwrap().to_vec();
+    let (_, replies) = disturbed(&stranger);
+    assert_eq!(replies.last(), Some(&Reply::Refused(Refusal::Session { current: 1 })));
+    // Frame 0 with any other message is no start.
+    for request in [Request::Rearm, Request::TestWatchdog, Request::Time { tick: 1 << 40, time_ns: 1 << 60 }] {
+        let frame = FrameWriter::new().encode(&request).unwrap().to_vec();
+        disturbed(&frame);
+    }
+}
+
+#[test]
+fn the_watchdog_is_not_tested_and_nothing_rearmed_in_run() {
+    let bytes = encoded(&table());
+    for request in [Request::Rearm, Request::TestWatchdog] {
+        let expected = insertion::<f64>(200);
+        let mut requests = loading(&bytes, ClockSource::Frames);
+        for (i, (inputs, _)) in expected.iter().enumerate() {
+            if i == 100 {
+                requests.push(request);
+            }
+            requests.extend(requests_of(inputs));
+        }
+        let mut bench = Bench::default();
+        let replies = answers::<f64>(&mut bench, &requests);
+        assert!(!bench.hung);
+        assert!(replies.contains(&Reply::Refused(Refusal::Order)), "{request:?}");
+        let Some(Reply::Command { command, .. }) = replies.last() else { panic!("no command") };
+        assert_eq!(Some(command), expected.last().map(|(_, command)| command), "{request:?}");
+    }
+}
+
+#[test]
+fn a_host_that_knows_the_run_ends_it() {
+    let bytes = encoded(&table());
+    let mut requests = loading(&bytes, ClockSource::Frames);
+    requests.extend(insertion::<f64>(100).iter().flat_map(|(inputs, _)| requests_of(inputs)));
+    requests.push(Request::Hello { session: 1 });
+    requests.push(Request::Account);
+    let replies = answers::<f64>(&mut Bench::default(), &requests);
+    let [.., Reply::Hello(_), Reply::Refused(Refusal::Order)] = replies[..] else { panic!("{:?}", replies.last()) };
+}
+
+#[test]
+fn an_account_with_every_counter_full_fits_into_a_frame() {
+    let stream = StreamLedger {
+        delivered: u64::MAX,
+        published: u64::MAX,
+        consumed: u64::MAX,
+        lost: u64::MAX,
+        discarded: [u64::MAX; Discard::ALL.len()],
+        duplicates: u64::MAX,
+        strays: u64::MAX,
+    };
+    let most = u64::MAX;
+    let ticks = TickLedger { due: most, run: most, hold: most, safe: most, skipped: most };
+    let line = LineLedger { frames: stream, damaged: most, unknown: most, starts: most, replayed_starts: most };
+    let ledger = Ledger { needle: stream, target: stream, paddle: stream, ticks };
+    let account = Account { ledger, line, state: u32::MAX, faults: Faults::from_bits(most), stack_bytes: u32::MAX };
+    let mut writer = FrameWriter::new();
+    writer.encode(&HELLO).unwrap();
+    assert!(writer.encode(&Reply::Account(account)).is_some());
 }

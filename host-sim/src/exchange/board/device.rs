@@ -69,11 +69,7 @@ impl Device {
     /// # Errors
     /// [`BoardError::Silent`], [`BoardError::Identity`].
     pub fn connect(mut line: SerialLine, scalar: ScalarKind, qemu: Option<Qemu>) -> Result<Self, BoardError> {
-        line.send(&[Request::Hello])?;
-        let identity = line.await_reply("Hello", PATIENCE, |reply| match reply {
-            Reply::Hello(identity) => Some(*identity),
-            _ => None,
-        })?;
+        let identity = hello(&mut line)?;
         let expected = Identity {
             protocol: PROTOCOL_VERSION,
             layout: LAYOUT_VERSION,
@@ -120,11 +116,7 @@ impl Device {
     /// # Errors
     /// As [`Device::begin`].
     pub fn begin_with(&mut self, table: &[u8], settings: &Settings, clock: ClockSource) -> Result<(), BoardError> {
-        self.line.send(&[Request::Hello])?;
-        self.identity = self.expect("Hello", |reply| match reply {
-            Reply::Hello(identity) => Some(*identity),
-            _ => None,
-        })?;
+        self.identity = hello(&mut self.line)?;
         for (i, bytes) in table.chunks(TABLE_CHUNK_BYTES).enumerate() {
             let offset = (i * TABLE_CHUNK_BYTES) as u32;
             self.line.send(&[Request::Table { offset, bytes }])?;
@@ -199,4 +191,22 @@ impl Device {
 /// The scalar of an encoded table, if it is one.
 pub fn scalar_of(table: &[u8]) -> Option<ScalarKind> {
     Header::read(table).ok().map(|header| header.scalar)
+}
+
+/// Says Hello, and once more with the number of the run that this ends, if one is under way.
+fn hello(line: &mut SerialLine) -> Result<Identity, BoardError> {
+    let mut session = 0;
+    for _ in 0..2 {
+        line.send(&[Request::Hello { session }])?;
+        let answer = line.await_reply("Hello", PATIENCE, |reply| match reply {
+            Reply::Hello(identity) => Some(Ok(*identity)),
+            Reply::Refused(Refusal::Session { current }) => Some(Err(*current)),
+            _ => None,
+        })?;
+        match answer {
+            Ok(identity) => return Ok(identity),
+            Err(current) => session = current,
+        }
+    }
+    Err(BoardError::Refused { to: "Hello", refusal: Refusal::Session { current: session } })
 }

@@ -5,8 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use firmware::inputs::Arrival;
-use firmware::serial::{FrameReader, FrameWriter, LineLedger, Reply, Request};
+use firmware::serial::{Frame, FrameReader, FrameWriter, LineLedger, Reply, Request};
 
 use super::error::BoardError;
 use super::tamper::Tamper;
@@ -73,6 +72,10 @@ impl SerialLine {
     pub fn send(&mut self, requests: &[Request<'_>]) -> Result<(), BoardError> {
         let mut bytes = Vec::new();
         for request in requests {
+            // A Hello is always the first frame of its sender.
+            if matches!(request, Request::Hello { .. }) {
+                self.writer.restart();
+            }
             // Every request fits into a frame by construction.
             let frame = self.writer.encode(request).unwrap_or_default();
             bytes.extend(self.tamper.pass(frame));
@@ -127,14 +130,18 @@ fn receive(mut source: impl Read, mut tamper: Tamper, replies: &Sender<Reply>, l
             Err(_) => return,
         };
         for byte in tamper.pass(&buffer[..count]) {
-            let arrival = reader.feed(byte);
+            let frame = reader.feed(byte);
+            // A board that starts, or starts again, is believed: it is the only one at the other end.
+            if frame == Some(Frame::Start) {
+                reader.follow();
+            }
             if byte == 0
                 && let Ok(mut shared) = ledger.lock()
             {
                 *shared = *reader.ledger();
             }
             // A late reply answers a question that nobody asks any more.
-            if arrival == Some(Arrival::New) {
+            if matches!(frame, Some(Frame::Start | Frame::New)) {
                 match reader.message() {
                     Some(reply) if replies.send(reply).is_err() => return,
                     Some(_) => {}
