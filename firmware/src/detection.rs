@@ -24,17 +24,58 @@ pub const PADDLE_MARGIN: f64 = 1.1;
 /// Following error at rest, part of the paddle's range: ten times the resolution of ordinary actuators.
 pub const FOLLOWING_FRACTION: f64 = 0.02;
 
+/// The paddle's resolution as a part of its following error: its position is adopted when it has rested this well.
+pub const RESOLUTION_PER_FOLLOWING_ERROR: f64 = 0.1;
+
+/// Largest jump of sequence numbers that is a loss: 17 s at 1 MHz, 4 h at 1 kHz. What jumps further counts anew.
+pub const SEQUENCE_JUMP: i32 = 1 << 24;
+
+/// Samples in a row with new times, old numbers, and good content that take up a sender that counts anew.
+pub const RESTART_SAMPLES: u32 = 5;
+
+/// How far the numbers of two such samples may be apart.
+pub const RESTART_SPACING: u32 = 64;
+
 /// How much faster than the table's limit the needle may seem between two samples: jitter of their times.
 pub const NEEDLE_JUMP_MARGIN: f64 = 2.0;
 
 /// Depth jump that is always plausible, part of the table's depth range: sensor resolution.
 pub const NEEDLE_JUMP_FLOOR: f64 = 0.01;
 
+/// How much faster than the table's limit a needle may say that it goes: faster is a wrong unit. What is slower, and
+/// too fast for the table, leads to HOLD.
+pub const NEEDLE_SPEED_MARGIN: f64 = 10.0;
+
+/// Contradiction of depth and velocity that is no fault, part of the depth range: resolution of the encoder.
+pub const NEEDLE_CONTRADICTION: f64 = 0.005;
+
+/// The same as a part of the motion: calibration of the velocity.
+pub const NEEDLE_CONTRADICTION_RATIO: f64 = 0.25;
+
+/// Motion over which depth and velocity are compared, part of the depth range. A depth that freezes, or a velocity
+/// that sticks, is seen within 2 % of the depth range (there is a test); an encoder that says in both numbers that the
+/// needle rests cannot be told from a needle that rests.
+pub const NEEDLE_WINDOW: f64 = 0.02;
+
+/// Longest time over which they are compared, ns: a velocity that is off by less than 0.05 % of the depth range per
+/// second at rest is no fault.
+pub const NEEDLE_WINDOW_NS: u64 = 10_000_000_000;
+
 /// Identical samples that are still a coincidence.
 pub const FROZEN_SAMPLES: u32 = 5;
 
-/// Travel that must change a value, part of the range of the depth or the paddle: well above any sensor's resolution.
+/// Travel that must change the paddle's position, part of its range: well above any sensor's resolution.
 pub const FROZEN_TRAVEL: f64 = 0.005;
+
+/// Steps of the sensor's resolution that the target moves according to the table before an unchanged value is frozen:
+/// real tissue may move a quarter as far as the table says.
+pub const FROZEN_STEPS: f64 = 4.0;
+
+/// Finest resolution that a target sensor is credited with, part of the plausible range of the target.
+pub const FROZEN_RESOLUTION: f64 = 0.0005;
+
+/// Coarsest resolution that a target sensor may have: assumed until its value has changed for the first time.
+pub const FROZEN_UNSEEN_RESOLUTION: f64 = 0.025;
 
 /// Standard deviations of noise that one innovation may show: one false alarm in 10¹⁴ samples.
 pub const GATE_SIGMAS: f64 = 8.0;
@@ -48,7 +89,12 @@ pub const GATE_FLOOR: f64 = 0.01;
 /// The same for a sensor whose noise is stated: only what the table may be wrong by between two samples.
 pub const GATE_FLOOR_STATED: f64 = 0.002;
 
-/// Successive paddle samples off the command that are a fault: longer than any hiccup of a servo.
+/// What an event adds to a leaky bucket; a sample without one takes 1. With 4, every share of events above 1 in 5 is
+/// found, and a share q far below is a false alarm about once in (1/q)ⁿ samples for a bucket of n events.
+pub const BUCKET_EVENT: u32 = 4;
+
+/// Paddle samples off the command that are a fault, if in a row: longer than any hiccup of a servo. Otherwise
+/// n of m, see [`BUCKET_EVENT`].
 pub const FOLLOWING_SAMPLES: u32 = 20;
 
 /// A window ends after this many time constants 1/g of the loop: enough for e³ of growth, too short for drift.
@@ -63,6 +109,6 @@ pub const DIVERGENCE_SIGMAS: f64 = 8.0;
 /// Errors below this part of the plausible target range are left to the feedback.
 pub const DIVERGENCE_FLOOR: f64 = 0.01;
 
-/// Successive ticks with skipped periods before them that are tolerated: a loop that skips every second period no
-/// longer runs at the rate that its gain was chosen for.
+/// Ticks with skipped periods before them that are a fault, if in a row; otherwise n of m, see [`BUCKET_EVENT`]. A loop
+/// that skips every second period no longer runs at the rate that its gain was chosen for.
 pub const MAX_SUCCESSIVE_OVERRUNS: u32 = 10;

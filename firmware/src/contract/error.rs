@@ -112,6 +112,11 @@ pub enum TableError {
     },
     /// The suggested gain is outside (0, 1) or the model error margin is below 1.
     Gains,
+    /// A number is out of proportion with the rest of the table.
+    Implausible {
+        /// Field that holds it.
+        field: &'static str,
+    },
     /// The output buffer cannot hold the table.
     BufferTooSmall {
         /// Bytes given.
@@ -148,6 +153,7 @@ impl TableError {
             Self::PathBeyondLimit { .. } => 23,
             Self::Gains => 24,
             Self::BufferTooSmall { .. } => 25,
+            Self::Implausible { .. } => 26,
         }
     }
 }
@@ -208,6 +214,9 @@ impl fmt::Display for TableError {
                 write!(f, "the feed-forward path leaves the paddle's range at knot {knot}: raise the paddle's limit")
             }
             Self::Gains => write!(f, "the suggested gain must lie in (0, 1) and lambda_max be at least 1"),
+            Self::Implausible { field } => {
+                write!(f, "{field} is out of proportion with the rest of the table: check its unit in the scene")
+            }
             Self::BufferTooSmall { bytes } => {
                 write!(f, "{bytes} bytes cannot hold the table: give {}", super::codec::MAX_TABLE_BYTES)
             }

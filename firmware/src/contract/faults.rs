@@ -74,15 +74,19 @@ fault_codes! {
     TARGET_LOST = 4;
     /// Needle faster than the table holds for. HOLD.
     NEEDLE_TOO_FAST = 5;
+    /// The measured paddle moves: its position is not adopted. HOLD.
+    PADDLE_MOVING = 6;
+    /// The measured paddle is further out than it may be commanded: its position is not adopted. HOLD.
+    PADDLE_BEYOND_LIMIT = 7;
     /// Needle sample older than its second limit. SAFE.
     NEEDLE_DEAD = 8;
     /// Target sample older than its second limit. SAFE.
     TARGET_DEAD = 9;
     /// Paddle sample older than its second limit. SAFE.
     PADDLE_DEAD = 10;
-    /// The tick's time or number went back; the tick's inputs were not read. SAFE.
+    /// The tick's time or number did not go on; the tick's inputs were not read. SAFE.
     CLOCK_REVERSED = 11;
-    /// Too many successive ticks were preceded by skipped ones. SAFE.
+    /// Too many ticks were preceded by skipped ones. SAFE.
     OVERRUN = 12;
     /// The paddle does not follow its commands. SAFE.
     FOLLOWING_ERROR = 13;
@@ -94,6 +98,8 @@ fault_codes! {
     INTERNAL = 16;
     /// The watchdog outside of the controller has taken over. SAFE; never set by the controller itself.
     WATCHDOG = 17;
+    /// The tick's time and number went on by different amounts; the tick's inputs were not read. SAFE.
+    CLOCK_JUMPED = 18;
     /// Depth outside the table, its nearest end is used. Goes on.
     DEPTH_CLAMPED = 24;
     /// Command limited in position. Goes on.

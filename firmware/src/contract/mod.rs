@@ -3,6 +3,7 @@
 //! The constrained side owns the contract. A change of a frame's layout bumps [`frames::LAYOUT_VERSION`], a change
 //! of the table's payload bumps [`codec::FORMAT_VERSION`]; readers refuse versions that they do not know.
 
+mod bounds;
 pub mod codec;
 pub mod error;
 #[cfg(test)]
@@ -12,6 +13,7 @@ pub mod frames;
 pub mod table;
 mod validate;
 
+pub(crate) use bounds::TableBounds;
 pub use codec::{Header, MAX_TABLE_BYTES, decode, decode_into, encode};
 pub use error::TableError;
 pub use faults::{Faults, Mode};

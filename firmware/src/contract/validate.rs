@@ -2,12 +2,27 @@
 
 use nalgebra::{SMatrix, SVector};
 
+use super::bounds::TableBounds;
 use super::{Knot, Table, TableError};
 use crate::scalar::Scalar;
 
 /// Largest admitted [`condition_number`] of a Jacobian. Past it, one part in a thousand of noise or model error along
 /// the weak direction moves the paddle as much as the signal does, and no gain margin covers that.
 pub const CONDITION_LIMIT: f64 = 1e3;
+
+/// How much larger than the table's own geometry a length of it may be.
+const LENGTH_MARGIN: f64 = 10.0;
+/// Depth range and distance from paddle to target differ at most by this factor.
+const ASPECT_LIMIT: f64 = 1e3;
+/// Most often that the paddle may cross its range in a second, and the needle the table: faster, and the monitors that
+/// follow from the speeds could no longer tell a fault from motion.
+const CROSSINGS_PER_SECOND: f64 = 100.0;
+/// Largest ‖J‖: tissue does not amplify what moves it.
+const JACOBIAN_LIMIT: f64 = 100.0;
+/// Largest motion of the target per motion of the needle that drags it.
+const DRAG_LIMIT: f64 = 3.0;
+/// A slope m at a knot lifts a cubic over an interval h by up to 4/27·m·h.
+const HERMITE_LIFT: f64 = 4.0 / 27.0;
 
 /// Condition number ‖J‖·‖J⁻¹‖ in the Frobenius norm; infinite for a singular matrix.
 ///
@@ -27,7 +42,8 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     pub fn validate(&self) -> Result<(), TableError> {
         self.validate_geometry()?;
         self.validate_limits()?;
-        self.validate_knots()
+        self.validate_knots()?;
+        self.validate_proportions()
     }
 
     fn validate_geometry(&self) -> Result<(), TableError> {
@@ -81,6 +97,29 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     }
 }
 
+impl<T: Scalar, const D: usize> Table<T, D> {
+    /// Every number against the table's own geometry: what is finite but out of all proportion would switch off the
+    /// monitors that follow from it.
+    fn validate_proportions(&self) -> Result<(), TableError> {
+        let depth = (self.validity.depth_end - self.validity.depth_start).to_f64();
+        let reach = |end: &SVector<T, D>| (end - self.target_position).norm().to_f64();
+        let [start, end] = &self.paddle.segment;
+        let distance = reach(start).max(reach(end));
+        in_proportion("depth range", depth, ASPECT_LIMIT * distance)?;
+        in_proportion("distance from paddle to target", distance, ASPECT_LIMIT * depth)?;
+        let extent = LENGTH_MARGIN * (depth + distance);
+        in_proportion("valid paddle displacement", self.validity.paddle_displacement.to_f64(), extent)?;
+        let range = self.paddle.max_displacement.to_f64();
+        in_proportion("paddle rate limit", self.paddle.max_rate.to_f64(), CROSSINGS_PER_SECOND * range)?;
+        in_proportion("needle speed limit", self.validity.needle_speed.to_f64(), CROSSINGS_PER_SECOND * depth)?;
+        let bounds = TableBounds::of(self);
+        in_proportion("knot Jacobian", bounds.jacobian_norm, JACOBIAN_LIMIT)?;
+        in_proportion("target displacement", bounds.target_displacement, extent)?;
+        in_proportion("target displacement slope", bounds.target_slope, DRAG_LIMIT)?;
+        in_proportion("paddle path slope", HERMITE_LIFT * bounds.path_lift, range)
+    }
+}
+
 impl<T: Scalar, const D: usize> Knot<T, D> {
     fn validate_finite(&self) -> Result<(), TableError> {
         finite("knot depth", &[self.depth])?;
@@ -107,6 +146,12 @@ fn finite<T: Scalar>(field: &'static str, values: &[T]) -> Result<(), TableError
 fn positive<T: Scalar>(field: &'static str, value: T) -> Result<(), TableError> {
     finite(field, &[value])?;
     ensure(value.to_f64() > 0.0, TableError::NotPositive { field })
+}
+
+/// Not a number is out of proportion, too: overflow on the way here.
+#[inline(never)]
+fn in_proportion(field: &'static str, value: f64, limit: f64) -> Result<(), TableError> {
+    ensure(value <= limit, TableError::Implausible { field })
 }
 
 fn unit<T: Scalar, const D: usize>(field: &'static str, vector: &SVector<T, D>) -> Result<(), TableError> {

@@ -3,12 +3,14 @@
 use nalgebra::SVector;
 
 use super::D;
-use crate::contract::{Faults, Mode, NeedleSample, PaddleSample, TargetSample};
-use crate::detection::MAX_SUCCESSIVE_OVERRUNS;
-use crate::inputs::monitors::{DivergenceMonitor, FollowingMonitor, FrozenMonitor, FrozenPaddle, InnovationGate};
+use super::clock::Clock;
+use crate::contract::{Faults, Mode};
+use crate::inputs::Ledger;
+use crate::inputs::monitors::{
+    DivergenceMonitor, FollowingMonitor, FrozenMonitor, InnovationGate, NeedleMonitor, Resolution, RestMonitor,
+};
 use crate::inputs::stream::Stream;
 use crate::inputs::supervisor::Supervisor;
-use crate::inputs::{Inputs, Ledger};
 use crate::scalar::Scalar;
 
 /// Everything that changes from tick to tick. Equal states and inputs give equal commands, bit by bit.
@@ -18,9 +20,7 @@ pub struct State<T: Scalar> {
     pub(super) mode: Mode,
     pub(super) faults: Faults,
     pub(super) ledger: Ledger,
-    /// Tick number and time of the last tick, ns.
-    pub(super) last_tick: Option<(u64, u64)>,
-    pub(super) successive_overruns: u32,
+    pub(super) clock: Clock,
     pub(super) command_sequence: u32,
     /// RUN has been reached since the start or the last re-arming; ages lead to SAFE from then on.
     pub(super) armed: bool,
@@ -30,13 +30,15 @@ pub struct State<T: Scalar> {
     pub(super) integral: Option<SVector<T, D>>,
     /// The last motion at full rate.
     pub(super) underway: Option<Underway<T>>,
-    pub(super) needle: Stream<NeedleSample>,
-    pub(super) target: Stream<TargetSample>,
-    pub(super) paddle: Stream<PaddleSample>,
+    pub(super) needle: Stream,
+    pub(super) target: Stream,
+    pub(super) paddle: Stream,
     pub(super) target_lost: bool,
-    pub(super) needle_frozen: FrozenMonitor,
+    pub(super) needle_monitor: NeedleMonitor,
     pub(super) target_frozen: FrozenMonitor,
-    pub(super) paddle_frozen: FrozenPaddle,
+    pub(super) target_resolution: Resolution,
+    pub(super) paddle_frozen: FrozenMonitor,
+    pub(super) rest: RestMonitor,
     pub(super) gate: InnovationGate,
     pub(super) following: FollowingMonitor,
     pub(super) divergence: DivergenceMonitor,
@@ -68,12 +70,21 @@ impl<T: Scalar> State<T> {
         self.integral.as_ref().map(to_frame)
     }
 
-    /// Leaves SAFE after somebody has looked: accounts go on, everything else starts over. The next command adopts
-    /// the paddle's measured position.
+    /// The paddle's position is no longer known.
+    pub(super) fn forget_position(&mut self) {
+        (self.displacement, self.integral) = (None, None);
+        self.rest = RestMonitor::default();
+    }
+
+    /// Leaves SAFE after somebody has looked: accounts go on, everything else starts over, and the paddle's measured
+    /// position is adopted once more. Does nothing in any other mode.
     pub fn rearm(&mut self) {
+        if self.mode != Mode::Safe {
+            return;
+        }
         *self = Self {
             ledger: self.ledger,
-            last_tick: self.last_tick,
+            clock: self.clock.rearmed(),
             command_sequence: self.command_sequence,
             ..Self::default()
         };
@@ -97,29 +108,6 @@ impl<T: Scalar> Underway<T> {
     pub(super) fn explains(&self, time_ns: u64, correction: &SVector<T, D>) -> bool {
         self.since_ns < time_ns && time_ns < self.until_ns && self.step.dot(correction) > T::zero()
     }
-}
-
-/// Enters the tick into the accounts and checks that time goes on. A tick from the past is rejected: nothing of it
-/// is read.
-pub(super) fn start_tick<T: Scalar>(state: &mut State<T>, inputs: &Inputs, faults: &mut Faults) -> bool {
-    let Some((tick, time_ns)) = state.last_tick else {
-        state.ledger.ticks.start(0);
-        state.last_tick = Some((inputs.tick, inputs.time_ns));
-        return true;
-    };
-    let skipped = inputs.tick.saturating_sub(tick).saturating_sub(1);
-    state.ledger.ticks.start(skipped);
-    if inputs.tick <= tick || inputs.time_ns < time_ns {
-        // A number that went on is used up all the same: the next tick must not count it as skipped.
-        state.last_tick = Some((inputs.tick.max(tick), time_ns));
-        *faults |= Faults::CLOCK_REVERSED;
-        return false;
-    }
-    state.last_tick = Some((inputs.tick, inputs.time_ns));
-    state.successive_overruns = if skipped > 0 { state.successive_overruns.saturating_add(1) } else { 0 };
-    faults.set_if(Faults::TICKS_SKIPPED, skipped > 0);
-    faults.set_if(Faults::OVERRUN, state.successive_overruns >= MAX_SUCCESSIVE_OVERRUNS);
-    true
 }
 
 pub(super) fn to_frame<T: Scalar>(vector: &SVector<T, D>) -> [f64; D] {

@@ -6,9 +6,12 @@ use proptest::prelude::*;
 use super::plant::{MS, Plant};
 use super::*;
 use crate::contract::example::{jacobian, table};
-use crate::detection::MAX_SUCCESSIVE_OVERRUNS;
+use crate::contract::{Table, TargetSample};
+use crate::detection::{MAX_SUCCESSIVE_OVERRUNS, TICKS_TO_HOLD};
 use crate::inputs::Discard;
 use crate::stability;
+
+mod attacks;
 
 fn settings() -> Settings {
     Settings::new(MS, 20 * MS, 20 * MS)
@@ -37,7 +40,8 @@ impl<'t> Loop<'t> {
         let command = self.controller.step(&mut self.state, &inputs);
         let displacement = Vector2::from(command.displacement);
         assert!(displacement.norm() <= 0.05 * (1.0 + 1e-12));
-        if let Some(last) = self.last.filter(PaddleCommand::is_valid) {
+        // A command that is not valid is none: the actuator keeps its position, wherever that is.
+        if let Some(last) = self.last.filter(|last| last.is_valid() && command.is_valid()) {
             assert!((displacement - Vector2::from(last.displacement)).norm() <= 1e-4 * (1.0 + 1e-9));
         }
         assert_eq!(self.state.ledger().unaccounted(), 0);
@@ -138,10 +142,10 @@ fn a_start_moves_nothing_and_restarts_where_the_paddle_is() {
     closed.plant.depth = 0.05;
     let command = closed.tick(|inputs| inputs.paddle = None);
     assert!(!command.is_valid() && command.state == Mode::Hold as u32);
-    for _ in 0..100 {
+    for tick in 0..100 {
         let command = closed.tick(|_| {});
-        assert!(command.is_valid());
-        if command.state == Mode::Hold as u32 {
+        assert_eq!(command.is_valid(), tick >= TICKS_TO_HOLD, "at rest for as long as a sample may be old");
+        if command.is_valid() && command.state == Mode::Hold as u32 {
             assert_eq!(command.displacement, [0.01, -0.02]);
         }
         if command.state == Mode::Run as u32 {

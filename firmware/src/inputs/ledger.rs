@@ -60,6 +60,8 @@ impl Discard {
 /// Account of one input stream.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StreamLedger {
+    /// Deliveries, counted before anything is known of them.
+    pub delivered: u64,
     /// Samples that the publisher must have sent, from the sequence numbers.
     pub published: u64,
     /// Samples accepted.
@@ -77,7 +79,15 @@ pub struct StreamLedger {
 impl StreamLedger {
     /// An account without entries.
     pub const fn new() -> Self {
-        Self { published: 0, consumed: 0, lost: 0, discarded: [0; Discard::ALL.len()], duplicates: 0, strays: 0 }
+        Self {
+            delivered: 0,
+            published: 0,
+            consumed: 0,
+            lost: 0,
+            discarded: [0; Discard::ALL.len()],
+            duplicates: 0,
+            strays: 0,
+        }
     }
 
     /// Counts one refusal.
@@ -92,10 +102,12 @@ impl StreamLedger {
         self.discarded.get(reason as usize).copied().unwrap_or(0)
     }
 
-    /// Publications without an entry: 0 unless the controller is wrong.
+    /// Publications and deliveries without an entry: 0 unless the controller is wrong.
+    ///
+    /// Both are counted apart from the entries: publications from the sequence numbers, deliveries at the door.
     pub fn unaccounted(&self) -> u64 {
-        let entries = self.consumed + self.lost + self.discarded.iter().sum::<u64>();
-        self.published.abs_diff(entries)
+        let used = self.consumed + self.discarded.iter().sum::<u64>();
+        self.published.abs_diff(used + self.lost) + self.delivered.abs_diff(used + self.duplicates + self.strays)
     }
 }
 

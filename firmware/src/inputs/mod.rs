@@ -6,6 +6,7 @@ use crate::contract::{NeedleSample, PaddleSample, TargetSample};
 pub(crate) mod checks;
 pub mod ledger;
 pub(crate) mod monitors;
+pub(crate) mod sample;
 pub mod sequence;
 pub(crate) mod stream;
 pub(crate) mod supervisor;

@@ -42,8 +42,7 @@ impl SequenceTracker {
     /// Classifies a delivery and enters everything but its fate if it is new into the ledger.
     pub(crate) fn register(&mut self, sequence: u32, ledger: &mut StreamLedger) -> Arrival {
         let Some(newest) = self.newest else {
-            *self = Self { newest: Some(sequence), arrived: 1, known: 1 };
-            ledger.published += 1;
+            self.restart(sequence, ledger);
             return Arrival::New;
         };
         let ahead = sequence.wrapping_sub(newest);
@@ -56,20 +55,62 @@ impl SequenceTracker {
             ledger.lost += u64::from(ahead - 1);
             return Arrival::New;
         }
-        let behind = newest.wrapping_sub(sequence);
+        self.enter_old(sequence, ledger)
+    }
+
+    /// A delivery `behind` the newest: late if it fills a gap, which it then does.
+    fn fill(&mut self, behind: u32, ledger: &mut StreamLedger) -> Arrival {
         if behind >= self.known {
-            ledger.strays += 1;
             return Arrival::Stray;
         }
         let bit = 1u64 << behind;
         if self.arrived & bit != 0 || ledger.lost == 0 {
-            ledger.duplicates += 1;
             return Arrival::Duplicate;
         }
         self.arrived |= bit;
         ledger.lost -= 1;
-        ledger.discard(Discard::Late);
         Arrival::Late
+    }
+
+    /// Enters the number of a sample that follows the accepted ones, which it may do in a gap that a refused one has
+    /// left; `false` for one that has arrived before.
+    pub(crate) fn enter(&mut self, sequence: u32, ledger: &mut StreamLedger) -> bool {
+        let behind = self.newest.map_or(-1, |newest| newest.wrapping_sub(sequence).cast_signed());
+        if behind < 0 {
+            self.register(sequence, ledger);
+            return true;
+        }
+        if behind.cast_unsigned() < WINDOW {
+            let arrival = self.fill(behind.cast_unsigned(), ledger);
+            ledger.duplicates += u64::from(arrival == Arrival::Duplicate);
+            // Before the first number of all.
+            ledger.published += u64::from(arrival == Arrival::Stray);
+            return arrival != Arrival::Duplicate;
+        }
+        // A refused sample with a number from nowhere: what it made seem lost never was.
+        let never = u64::from(behind.cast_unsigned()).min(ledger.lost);
+        ledger.lost -= never;
+        ledger.published -= never.min(ledger.published);
+        self.restart(sequence, ledger);
+        true
+    }
+
+    /// Enters the number of a sample that does not follow the accepted ones.
+    pub(crate) fn enter_old(&mut self, sequence: u32, ledger: &mut StreamLedger) -> Arrival {
+        let behind = self.newest.map_or(u32::MAX, |newest| newest.wrapping_sub(sequence));
+        let arrival = self.fill(behind, ledger);
+        match arrival {
+            Arrival::Late => ledger.discard(Discard::Late),
+            Arrival::Duplicate => ledger.duplicates += 1,
+            Arrival::New | Arrival::Stray => ledger.strays += 1,
+        }
+        arrival
+    }
+
+    /// The first sample of a sender, or of one that counts anew.
+    pub(crate) fn restart(&mut self, sequence: u32, ledger: &mut StreamLedger) {
+        *self = Self { newest: Some(sequence), arrived: 1, known: 1 };
+        ledger.published += 1;
     }
 }
 
@@ -81,6 +122,7 @@ mod tests {
     fn deliver(sequences: &[u32]) -> StreamLedger {
         let (mut tracker, mut ledger) = (SequenceTracker::default(), StreamLedger::default());
         for &sequence in sequences {
+            ledger.delivered += 1;
             if tracker.register(sequence, &mut ledger) == Arrival::New {
                 ledger.consumed += 1;
             }

@@ -1,66 +1,101 @@
-//! Input streams: every sample is checked before anything that the law depends on changes.
+//! Input streams: number and content of a sample are checked before anything changes.
+//!
+//! Two heads follow the sequence numbers. The ledger's goes with every number that is plausible, so that gaps are
+//! counted whatever the samples say. The stream's own goes with accepted samples only, so that no refused one can make
+//! the samples after it look old. Numbers that contradict a sample's time (older number, newer time, or a jump past
+//! [`SEQUENCE_JUMP`]) are those of a sender that counts anew, or damaged: [`RESTART_SAMPLES`] of them that follow each
+//! other take the stream up again.
 
 use super::ledger::{Discard, StreamLedger};
+use super::sample::Measurement;
 use super::sequence::{Arrival, SequenceTracker};
 use crate::contract::Faults;
+use crate::detection::{RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
 
 /// One stream: sequence numbers and the last accepted sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Stream<S> {
-    pub(crate) sequence: SequenceTracker,
-    pub(crate) accepted: Option<S>,
+pub(crate) struct Stream {
+    /// What has arrived, for the accounts.
+    arrivals: SequenceTracker,
+    /// Sequence number of the last accepted sample; unlike `accepted` it does not expire.
+    head: Option<u32>,
+    pub(crate) accepted: Option<Measurement>,
+    /// Last number that contradicted its time, and how many before it led there.
+    contradiction: Option<(u32, u32)>,
 }
 
-impl<S: Copy> Stream<S> {
-    /// Registers the delivery, checks it, and accepts it or enters why not. Returns the sample if accepted.
+impl Stream {
+    /// Enters a delivery whose content has been checked. Returns whether it is accepted.
+    #[inline(never)]
     pub(crate) fn offer(
         &mut self,
-        sample: S,
-        sequence: u32,
+        sample: &Measurement,
+        content: Result<(), Discard>,
         ledger: &mut StreamLedger,
         faults: &mut Faults,
-        check: impl FnOnce(Option<&S>) -> Result<(), Discard>,
-    ) -> Option<S> {
-        if !is_new(&mut self.sequence, sequence, ledger, faults) {
-            return None;
+    ) -> bool {
+        ledger.delivered += 1;
+        let ahead = |of: Option<u32>| of.map_or(1, |newest| sample.sequence.wrapping_sub(newest).cast_signed());
+        let accepted = if ahead(self.head) > 0 && ahead(self.arrivals.newest()) <= SEQUENCE_JUMP {
+            self.offer_next(sample.sequence, content, ledger, faults)
+        } else {
+            self.offer_contradiction(sample.sequence, content, ledger, faults)
+        };
+        if accepted {
+            ledger.consumed += 1;
+            self.head = Some(sample.sequence);
+            self.accepted = Some(*sample);
+            self.contradiction = None;
         }
-        match check(self.accepted.as_ref()) {
-            Ok(()) => {
-                ledger.consumed += 1;
-                self.accepted = Some(sample);
-                Some(sample)
-            }
-            Err(reason) => {
-                refuse(reason, ledger, faults);
-                None
-            }
-        }
+        accepted
     }
-}
 
-// What does not depend on the kind of sample is there once for all streams.
-
-/// Registers a delivery; enters why it is not a new sample.
-#[inline(never)]
-fn is_new(tracker: &mut SequenceTracker, sequence: u32, ledger: &mut StreamLedger, faults: &mut Faults) -> bool {
-    let lost = ledger.lost;
-    let fault = match tracker.register(sequence, ledger) {
-        Arrival::New => {
-            faults.set_if(Faults::SAMPLE_GAP, ledger.lost > lost);
-            return true;
+    /// A number that follows those of the accepted samples.
+    fn offer_next(
+        &mut self,
+        sequence: u32,
+        content: Result<(), Discard>,
+        ledger: &mut StreamLedger,
+        faults: &mut Faults,
+    ) -> bool {
+        let lost = ledger.lost;
+        if !self.arrivals.enter(sequence, ledger) {
+            *faults |= Faults::DUPLICATE;
+            return false;
         }
-        Arrival::Late | Arrival::Stray => Faults::OUT_OF_ORDER,
-        Arrival::Duplicate => Faults::DUPLICATE,
-    };
-    *faults |= fault;
-    false
-}
+        faults.set_if(Faults::SAMPLE_GAP, ledger.lost > lost);
+        if let Err(reason) = content {
+            ledger.discard(reason);
+            *faults |= fault_of(reason);
+        }
+        content.is_ok()
+    }
 
-/// Enters a refusal.
-#[inline(never)]
-fn refuse(reason: Discard, ledger: &mut StreamLedger, faults: &mut Faults) {
-    ledger.discard(reason);
-    *faults |= fault_of(reason);
+    /// A number from before, or from far ahead.
+    fn offer_contradiction(
+        &mut self,
+        sequence: u32,
+        content: Result<(), Discard>,
+        ledger: &mut StreamLedger,
+        faults: &mut Faults,
+    ) -> bool {
+        // Whoever sends old samples again, in whatever order, is refused by their times.
+        if content.is_ok() {
+            let led =
+                self.contradiction.filter(|(last, _)| (1..=RESTART_SPACING).contains(&sequence.wrapping_sub(*last)));
+            let led = led.map_or(1, |(_, led)| led.saturating_add(1));
+            if led >= RESTART_SAMPLES {
+                self.arrivals.restart(sequence, ledger);
+                return true;
+            }
+            self.contradiction = Some((sequence, led));
+        }
+        *faults |= match self.arrivals.enter_old(sequence, ledger) {
+            Arrival::Duplicate => Faults::DUPLICATE,
+            Arrival::New | Arrival::Late | Arrival::Stray => Faults::OUT_OF_ORDER,
+        };
+        false
+    }
 }
 
 /// Fault code that goes with a refusal.

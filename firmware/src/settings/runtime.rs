@@ -1,10 +1,10 @@
 //! Settings and table, built once into the numbers that a step uses.
 
 use super::{Settings, SettingsError, check, check_periods};
-use crate::contract::Table;
+use crate::contract::{Table, TableBounds};
 use crate::detection::{
-    DEPTH_MARGIN, FOLLOWING_FRACTION, PADDLE_MARGIN, SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD,
-    TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
+    DEPTH_MARGIN, FOLLOWING_FRACTION, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN, RESOLUTION_PER_FOLLOWING_ERROR,
+    SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
 };
 use crate::law::Direction;
 use crate::limits::Limits;
@@ -41,6 +41,8 @@ pub(crate) struct Runtime<T: Scalar> {
     /// Depths that are plausible.
     pub(crate) plausible_depth: (f64, f64),
     pub(crate) needle_speed: f64,
+    /// Fastest needle that is plausible.
+    pub(crate) plausible_speed: f64,
     /// Largest plausible target displacement, length.
     pub(crate) target_range: f64,
     /// Largest plausible measured paddle displacement, length.
@@ -50,6 +52,8 @@ pub(crate) struct Runtime<T: Scalar> {
     /// Largest ‖J‖.
     pub(crate) jacobian_norm: f64,
     pub(crate) following_error: f64,
+    /// What the paddle's sensor resolves, length.
+    pub(crate) paddle_resolution: f64,
     /// Rate limit of the paddle, length/s.
     pub(crate) paddle_rate: f64,
     /// Until a command shows in a measured position, s.
@@ -108,11 +112,13 @@ impl<T: Scalar> Runtime<T> {
             table_depth: (start, end),
             plausible_depth: (start - margin, end + margin),
             needle_speed: table.validity.needle_speed.to_f64(),
+            plausible_speed: NEEDLE_SPEED_MARGIN * table.validity.needle_speed.to_f64(),
             target_range: TARGET_MARGIN * bounds.target_displacement + bounds.jacobian_norm * max_displacement,
             paddle_range: PADDLE_MARGIN * max_displacement,
             target_slope: bounds.target_slope,
             jacobian_norm: bounds.jacobian_norm,
             following_error,
+            paddle_resolution: RESOLUTION_PER_FOLLOWING_ERROR * following_error,
             paddle_rate: table.paddle.max_rate.to_f64(),
             unseen_delay: seconds(settings.actuator_delay_ns.saturating_add(settings.loop_period_ns)),
         })
@@ -120,37 +126,14 @@ impl<T: Scalar> Runtime<T> {
 }
 
 impl<T: Scalar> Runtime<T> {
+    /// Extent of the table in depth, length.
+    pub(crate) fn depth_range(&self) -> f64 {
+        self.table_depth.1 - self.table_depth.0
+    }
+
     /// What the command may have moved since a measured position of this age (s) was asked for, length.
     pub(crate) fn unseen_motion(&self, age: f64) -> f64 {
         self.paddle_rate * (age + self.unseen_delay)
-    }
-}
-
-/// Largest values over a table.
-struct TableBounds {
-    target_displacement: f64,
-    target_slope: f64,
-    jacobian_norm: f64,
-}
-
-impl TableBounds {
-    fn of<T: Scalar, const D: usize>(table: &Table<T, D>) -> Self {
-        let mut bounds = Self { target_displacement: 0.0, target_slope: 0.0, jacobian_norm: 0.0 };
-        for knot in &table.knots {
-            let moved = knot.target_displacement.norm().max(knot.static_target_displacement.norm());
-            bounds.target_displacement = bounds.target_displacement.max(moved.to_f64());
-            let slope = knot.target_displacement_slope.norm().to_f64();
-            bounds.target_slope = bounds.target_slope.max(slope);
-            bounds.jacobian_norm = bounds.jacobian_norm.max(knot.jacobian.norm().to_f64());
-        }
-        for pair in table.knots.windows(2) {
-            if let [shallow, deep] = pair {
-                let rise = deep.static_target_displacement - shallow.static_target_displacement;
-                let slope = rise.norm() / (deep.depth - shallow.depth);
-                bounds.target_slope = bounds.target_slope.max(slope.to_f64());
-            }
-        }
-        bounds
     }
 }
 

@@ -177,7 +177,8 @@ fn check(before: &State<f64>, after: &State<f64>, last: Option<&PaddleCommand>, 
     if let Some(last) = last {
         assert_eq!(command.sequence, last.sequence.wrapping_add(1), "one command per tick");
         assert!(last.state != Mode::Safe as u32 || mode == Mode::Safe, "SAFE is latched");
-        if last.is_valid() {
+        // A command that is not valid is none.
+        if last.is_valid() && command.is_valid() {
             let [a, b] = last.displacement;
             assert!((x - a).hypot(y - b) <= 1e-4 * (1.0 + 1e-9), "rate limit");
             let moved = command.displacement.map(f64::to_bits) != last.displacement.map(f64::to_bits);

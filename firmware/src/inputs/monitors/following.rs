@@ -1,28 +1,30 @@
 //! A paddle that does not go where it is told.
 
+use super::LeakyBucket;
 use crate::detection::FOLLOWING_SAMPLES;
+use crate::inputs::sample::are_within;
 use crate::scalar::Scalar;
 use crate::settings::Runtime;
 
-/// Trips when the paddle stays away from its command.
+/// Trips when the paddle is away from its command too often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FollowingMonitor {
-    successive: u32,
+    off: LeakyBucket,
 }
 
 impl FollowingMonitor {
-    /// Enters a fresh paddle sample `age` seconds old; returns whether the fault is certain.
-    pub(crate) fn update<T: Scalar>(
-        &mut self,
+    /// Whether a position measured `age` seconds ago is where `commanded` explains it.
+    pub(crate) fn follows<T: Scalar>(
         runtime: &Runtime<T>,
         measured: &[f64; 2],
         commanded: &[f64; 2],
         age: f64,
     ) -> bool {
-        let admitted = runtime.following_error + runtime.unseen_motion(age);
-        let (dx, dy) = (measured[0] - commanded[0], measured[1] - commanded[1]);
-        let off = dx * dx + dy * dy > admitted * admitted;
-        self.successive = if off { self.successive.saturating_add(1) } else { 0 };
-        self.successive >= FOLLOWING_SAMPLES
+        are_within(measured, commanded, runtime.following_error + runtime.unseen_motion(age))
+    }
+
+    /// Enters whether a fresh sample follows; returns whether the fault is certain.
+    pub(crate) fn enter(&mut self, follows: bool) -> bool {
+        self.off.enter(!follows, FOLLOWING_SAMPLES)
     }
 }

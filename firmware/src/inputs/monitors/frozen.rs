@@ -1,61 +1,72 @@
-//! Values that no longer change although something moves.
+//! Values that no longer change although they must.
 
-use crate::detection::{FROZEN_SAMPLES, FROZEN_TRAVEL};
+use crate::detection::{FROZEN_RESOLUTION, FROZEN_SAMPLES, FROZEN_STEPS, FROZEN_UNSEEN_RESOLUTION};
 use crate::inputs::ledger::Discard;
-use crate::scalar::Scalar;
-use crate::settings::Runtime;
+use crate::inputs::sample::{Measurement, are_within};
 
-/// Detects a value that stays bit-identical while the sequence advances and the needle moves.
+/// Detects a value that stays bit-identical while what it follows goes away from where it was when it last changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FrozenMonitor {
+    /// Samples like the one before them, in a row.
     identical: u32,
-    travel: f64,
+    /// Where the followed thing was at the first of them, length.
+    reference: [f64; 2],
 }
 
 impl FrozenMonitor {
-    /// Enters whether the value is bit-identical and how far the needle went since the sample before it, length.
-    pub(crate) fn check(&mut self, identical: bool, travel: f64, depth_range: f64) -> Result<(), Discard> {
-        if !identical {
-            *self = Self::default();
-            return Ok(());
-        }
-        self.identical = self.identical.saturating_add(1);
-        self.travel += travel;
-        if self.identical >= FROZEN_SAMPLES && self.travel > FROZEN_TRAVEL * depth_range {
-            Err(Discard::Frozen)
+    /// Refuses `sample` if it is one of many like `previous` although what it follows has moved further than
+    /// `admitted` without it.
+    pub(crate) fn check(
+        &self,
+        sample: &Measurement,
+        previous: Option<&Measurement>,
+        followed: &[f64; 2],
+        admitted: f64,
+    ) -> Result<(), Discard> {
+        let identical = previous.is_some_and(|previous| previous.values == sample.values);
+        let frozen =
+            identical && self.identical + 1 >= FROZEN_SAMPLES && !are_within(followed, &self.reference, admitted);
+        if frozen { Err(Discard::Frozen) } else { Ok(()) }
+    }
+
+    /// Enters an accepted sample.
+    pub(crate) fn accept(&mut self, sample: &Measurement, previous: Option<&Measurement>, followed: &[f64; 2]) {
+        let identical = previous.is_some_and(|previous| previous.values == sample.values);
+        if identical && self.identical > 0 {
+            self.identical = self.identical.saturating_add(1);
         } else {
-            Ok(())
+            *self = Self { identical: u32::from(identical), reference: *followed };
         }
     }
 }
 
-/// Detects a measured paddle position that stays bit-identical while the command goes away from where it was.
+/// What a sensor resolves, learned from its samples: the smallest change that it has ever shown.
+///
+/// A value rounded to steps stays bit-identical until the target has moved by one. How far it must move for that is
+/// what the table says, so that the test asks for the table's own motion in units of the resolution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct FrozenPaddle {
-    identical: u32,
-    /// Command when the position was last seen to change, length.
-    commanded: [f64; 2],
+pub(crate) struct Resolution {
+    /// Squared; `None` before the first change.
+    smallest_step_squared: Option<f64>,
 }
 
-impl FrozenPaddle {
-    /// Enters whether the position is bit-identical, the last command, and the sample's age, s.
-    pub(crate) fn check<T: Scalar>(
-        &mut self,
-        runtime: &Runtime<T>,
-        identical: bool,
-        commanded: &[f64; 2],
-        age: f64,
-    ) -> Result<(), Discard> {
-        if !identical || self.identical == 0 {
-            *self = Self { identical: u32::from(identical), commanded: *commanded };
-            return Ok(());
+impl Resolution {
+    /// Motion without which an unchanged value says nothing, for a sensor of this range, length.
+    pub(crate) fn unseen_motion(&self, range: f64) -> f64 {
+        let coarsest = FROZEN_UNSEEN_RESOLUTION * range;
+        let step = self.smallest_step_squared.map_or(coarsest, |squared| libm::sqrt(squared).min(coarsest));
+        FROZEN_STEPS * step.max(FROZEN_RESOLUTION * range)
+    }
+
+    /// Enters an accepted sample.
+    pub(crate) fn accept(&mut self, sample: &Measurement, previous: Option<&Measurement>) {
+        let Some(previous) = previous else { return };
+        let [x, y] = sample.values;
+        let (dx, dy) = (x - previous.values[0], y - previous.values[1]);
+        let squared = dx * dx + dy * dy;
+        if squared > 0.0 {
+            let smallest = self.smallest_step_squared.map_or(squared, |smallest| smallest.min(squared));
+            self.smallest_step_squared = Some(smallest);
         }
-        self.identical = self.identical.saturating_add(1);
-        // What is on its way through the actuator cannot show yet.
-        let range = runtime.limits.max_displacement.to_f64();
-        let admitted = FROZEN_TRAVEL * range + runtime.unseen_motion(age);
-        let (dx, dy) = (commanded[0] - self.commanded[0], commanded[1] - self.commanded[1]);
-        let moved = dx * dx + dy * dy > admitted * admitted;
-        if self.identical >= FROZEN_SAMPLES && moved { Err(Discard::Frozen) } else { Ok(()) }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::detection::{GATE_FLOOR, GATE_FLOOR_STATED, GATE_MOTION, GATE_SIGMAS};
 use crate::inputs::ledger::Discard;
+use crate::inputs::sample::are_within;
 use crate::scalar::Scalar;
 use crate::settings::Runtime;
 
@@ -41,11 +42,6 @@ impl InnovationGate {
         self.at_arrival.get(self.newest.wrapping_add(samples_ago) % GATE_HISTORY).copied().unwrap_or_default()
     }
 
-    /// Needle travel since the last accepted sample, length.
-    pub(crate) fn needle_travel(&self) -> f64 {
-        self.travel.needle - self.at_arrival(0).needle
-    }
-
     /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + ‖J‖·paddle travel) + floor, where the travel reaches back
     /// to everything that can lie between the two measurements.
     pub(crate) fn check<T: Scalar>(
@@ -61,7 +57,6 @@ impl InnovationGate {
         let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;
         let floor = if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR };
         let gate = noise + GATE_MOTION * motion + floor * runtime.target_range;
-        let (dx, dy) = (current[0] - previous[0], current[1] - previous[1]);
-        if dx * dx + dy * dy > gate * gate { Err(Discard::Innovation) } else { Ok(()) }
+        if are_within(current, previous, gate) { Ok(()) } else { Err(Discard::Innovation) }
     }
 }

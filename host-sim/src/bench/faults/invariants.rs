@@ -56,7 +56,7 @@ impl Invariants {
 
     /// Whether the tick's number or time does not go on from the last one that did.
     pub fn is_backwards(&self, inputs: &Inputs) -> bool {
-        self.forward.is_some_and(|(tick, time_ns)| inputs.tick <= tick || inputs.time_ns < time_ns)
+        self.forward.is_some_and(|(tick, time_ns)| inputs.tick <= tick || inputs.time_ns <= time_ns)
     }
 
     /// The schedule agrees with arithmetic of its own: next whole period after the end of the step.
@@ -126,9 +126,15 @@ impl Invariants {
         if !last.is_valid() {
             return;
         }
+        if !command.is_valid() {
+            // The position is no longer known: not adopted yet, moved by somebody else, or not following.
+            let reasons = Faults::WAITING | Faults::PADDLE_MOVING | Faults::FOLLOWING_ERROR;
+            let known = Faults::from_bits(command.faults).intersection(reasons).is_empty();
+            self.require(!known, inputs, "a valid command was followed by an invalid one without a reason");
+            return;
+        }
         let step = (displacement - Vector2::from(last.displacement)).norm();
         self.require(step <= self.max_step * (1.0 + ROUNDING), inputs, "command beyond the rate limit");
-        self.require(command.is_valid(), inputs, "a valid command was followed by an invalid one");
         // The tick that finds a reason in the law itself has moved already.
         let law = Faults::from_bits(command.faults).intersection(Faults::DIVERGENCE);
         if command.state != Mode::Run as u32 && law.is_empty() {

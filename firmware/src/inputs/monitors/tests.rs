@@ -1,0 +1,1 @@
+//! Detection limits of the monitors.
