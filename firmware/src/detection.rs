@@ -52,10 +52,13 @@ pub const NEEDLE_CONTRADICTION: f64 = 0.005;
 /// The same as a part of the motion: calibration of the velocity.
 pub const NEEDLE_CONTRADICTION_RATIO: f64 = 0.25;
 
-/// Motion over which depth and velocity are compared, part of the depth range. A depth that freezes, or a velocity
-/// that sticks, is seen within 2 % of the depth range (there is a test); an encoder that says in both numbers that the
-/// needle rests cannot be told from a needle that rests.
+/// Motion over which depth and velocity are compared, part of the depth range.
 pub const NEEDLE_WINDOW: f64 = 0.02;
+
+/// Travel within which a depth that freezes, or a velocity that sticks or is more than twice too large, is found, part
+/// of the depth range (there is a test). An encoder that says in both numbers that the needle rests cannot be told from a
+/// needle that rests.
+pub const NEEDLE_CONTRADICTION_TRAVEL: f64 = 0.02;
 
 /// Longest time over which they are compared, ns: a velocity that is off by less than 0.05 % of the depth range per
 /// second at rest is no fault.

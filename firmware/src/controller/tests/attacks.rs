@@ -368,6 +368,7 @@ mod too_often {
 
 mod frozen {
     use super::*;
+    use crate::detection::NEEDLE_CONTRADICTION_TRAVEL;
 
     /// Rounded to steps of `step`.
     fn rounded(value: f64, step: f64) -> f64 {
@@ -434,7 +435,7 @@ mod frozen {
                     }
                     needle.velocity *= factor;
                 });
-                assert!(travel(&closed.plant) <= 0.02 * DEPTH, "velocity × {factor}");
+                assert!(travel(&closed.plant) <= NEEDLE_CONTRADICTION_TRAVEL * DEPTH, "velocity × {factor}");
             }
         }
     }

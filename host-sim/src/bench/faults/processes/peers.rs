@@ -237,7 +237,8 @@ fn garbage_on(
         evidence.require(command.tick == tick && displacement.norm() <= limits.0 * (1.0 + 1e-9), || {
             format!("tick {tick}: {command:?}")
         });
-        if let Some(last) = last.filter(PaddleCommand::is_valid) {
+        // A command that is not valid is none.
+        if let Some(last) = last.filter(|last| last.is_valid() && command.is_valid()) {
             let step = (displacement - Vector2::from(last.displacement)).norm();
             evidence.require(step <= limits.1 * (1.0 + 1e-9), || format!("tick {tick}: step of {step}"));
         }

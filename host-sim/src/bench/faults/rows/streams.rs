@@ -1,7 +1,8 @@
 //! Rows 7 to 12 and 16: samples that are old, lost, doubled, in the wrong order, frozen, or rare.
 
 use firmware::detection::{
-    FROZEN_SAMPLES, FROZEN_TRAVEL, SAFE_AGE_FLOOR_NS, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
+    FROZEN_SAMPLES, FROZEN_TRAVEL, NEEDLE_CONTRADICTION_TRAVEL, SAFE_AGE_FLOOR_NS, TARGET_SAMPLES_TO_HOLD,
+    TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
 };
 use firmware::inputs::{Discard, StreamLedger};
 use firmware::{Faults, Mode, Settings};
@@ -164,11 +165,12 @@ pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), S
     let setup = trial.setup();
     let period_s = setup.settings.loop_period_ns as f64 * 1e-9;
     let range = trial.table.validity.depth_end - trial.table.validity.depth_start;
-    let travel_ticks = (FROZEN_TRAVEL * range / setup.speed / period_s).ceil() as u64;
+    let ticks_of = |travel: f64| (travel * range / setup.speed / period_s).ceil() as u64;
+    let travel_ticks = ticks_of(FROZEN_TRAVEL);
     let samples = u64::from(FROZEN_SAMPLES) + 1;
     let per_target = setup.settings.target_period_ns / setup.settings.loop_period_ns;
     for (stream, code, limit) in [
-        (Stream::Needle, Faults::FROZEN, travel_ticks + samples),
+        (Stream::Needle, Faults::FROZEN, ticks_of(NEEDLE_CONTRADICTION_TRAVEL)),
         // The first frozen sample is a new value; the travel counts from sample to sample.
         (Stream::Target, Faults::FROZEN, (samples + 1) * per_target + travel_ticks),
         // The command has to go away from where it was.

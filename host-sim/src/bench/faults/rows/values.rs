@@ -1,5 +1,6 @@
 //! Rows 13 to 15, 17 and 18: numbers that are no measurement, wrong units, jumps, noise.
 
+use firmware::detection::NEEDLE_SPEED_MARGIN;
 use firmware::inputs::Discard;
 use firmware::{Faults, Mode};
 
@@ -91,7 +92,7 @@ pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
 pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(14);
     let reasons = [Discard::OutOfRange, Discard::Innovation];
-    for value in [1e3, -1e3, f64::MAX, f64::MIN, 1.0, -1.0] {
+    for value in [1e3, -1e3, 1e300, f64::MAX, f64::MIN, 1.0, -1.0] {
         for stream in Stream::ALL {
             let fault = Fault::Field(stream, 0, value);
             refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
@@ -100,7 +101,11 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
                 refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
             }
         }
-        // A speed has no range of its own: the needle is too fast, the paddle stays.
+        if f64::abs(value) > NEEDLE_SPEED_MARGIN * trial.table.validity.needle_speed {
+            refused(trial, evidence, &mut random, Stream::Needle, Fault::Field(Stream::Needle, 1, value), &reasons)?;
+            continue;
+        }
+        // A speed that can be: the needle is too fast, the paddle stays.
         let mut bench = trial.running(&mut random)?;
         bench.inject(Fault::Field(Stream::Needle, 1, value), 1);
         let found = bench.until(1, |command| command.state == Mode::Hold as u32);
