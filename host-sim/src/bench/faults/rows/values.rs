@@ -102,7 +102,8 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
             }
         }
         if f64::abs(value) > NEEDLE_SPEED_MARGIN * trial.table.validity.needle_speed {
-            refused(trial, evidence, &mut random, Stream::Needle, Fault::Field(Stream::Needle, 1, value), &reasons)?;
+            let (stream, fault) = (Stream::Needle, Fault::Field(Stream::Needle, 1, value));
+            refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
             continue;
         }
         // A speed that can be: the needle is too fast, the paddle stays.
