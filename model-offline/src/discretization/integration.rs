@@ -14,6 +14,9 @@ pub struct Quadrature<const D: usize> {
     offsets: Vec<u32>,
     nodes: Vec<u32>,
     gradients: Vec<Point<D>>,
+    /// Packed lower triangles of the points' stabilisation matrices, point by point; empty when the rule has none.
+    stabilisation: Vec<f64>,
+    stabilisation_offsets: Vec<u32>,
 }
 
 /// One integration point.
@@ -27,9 +30,43 @@ pub struct QuadraturePoint<'a, const D: usize> {
     pub nodes: &'a [u32],
     /// Gradients g_I, per length unit.
     pub gradients: &'a [Point<D>],
+    /// Stabilisation matrix B, whose energy is `½ μ₀ Σ_IJ B_IJ d_I·d_J` with the cell's shear modulus at rest: lower
+    /// triangle, column by column over `nodes`; empty when the rule needs none.
+    pub stabilisation: &'a [f64],
+}
+
+impl<const D: usize> QuadraturePoint<'_, D> {
+    /// B_IJ of the nodes at places `i` and `j` of the point's list; 0 when the rule needs no stabilisation.
+    pub fn stabilisation_entry(&self, i: usize, j: usize) -> f64 {
+        let (row, column) = (i.max(j), i.min(j));
+        // Columns before this one hold n, n − 1, … entries.
+        let start = column * self.nodes.len() - column * column.saturating_sub(1) / 2;
+        self.stabilisation.get(start + row - column).copied().unwrap_or(0.0)
+    }
 }
 
 impl<const D: usize> Quadrature<D> {
+    /// Appends a point with a stabilisation matrix (packed lower triangle, column by column over `nodes`).
+    ///
+    /// # Panics
+    /// When the matrix has not the size that `nodes` say, or points without one came before.
+    pub fn push_stabilised(
+        &mut self,
+        (weight, cell): (f64, usize),
+        nodes: &[u32],
+        gradients: &[Point<D>],
+        matrix: &[f64],
+    ) {
+        assert_eq!(matrix.len(), nodes.len() * (nodes.len() + 1) / 2, "a packed lower triangle");
+        if self.stabilisation_offsets.is_empty() {
+            self.stabilisation_offsets.push(0);
+        }
+        assert_eq!(self.stabilisation_offsets.len(), self.weights.len() + 1, "all points have a matrix, or none");
+        self.push(weight, cell, nodes, gradients);
+        self.stabilisation.extend_from_slice(matrix);
+        self.stabilisation_offsets.push(self.stabilisation.len() as u32);
+    }
+
     /// Appends a point.
     ///
     /// # Panics
@@ -60,11 +97,16 @@ impl<const D: usize> Quadrature<D> {
     #[inline]
     pub fn point(&self, q: usize) -> QuadraturePoint<'_, D> {
         let row = self.offsets[q] as usize..self.offsets[q + 1] as usize;
+        let matrix = match self.stabilisation_offsets.get(q..q + 2) {
+            Some(&[from, to]) => from as usize..to as usize,
+            _ => 0..0,
+        };
         QuadraturePoint {
             weight: self.weights[q],
             cell: self.cells[q],
             nodes: &self.nodes[row.clone()],
             gradients: &self.gradients[row],
+            stabilisation: &self.stabilisation[matrix],
         }
     }
 

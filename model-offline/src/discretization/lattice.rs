@@ -1,7 +1,7 @@
 //! Nodes on a lattice, fitted to the outline and to every feature.
 
 use super::features::Features;
-use crate::geometry::{Location, Point2, distance_to_segment};
+use crate::geometry::{Location, Point2, Polygon, distance_to_segment};
 
 /// Lattice nodes nearer to a feature point than this fraction of the spacing give way to it: two kernels almost on
 /// top of each other add cost and ill-conditioning, and nothing else.
@@ -13,7 +13,31 @@ const MAX_GAP: f64 = 1.5;
 /// Nodes of the given spacing: lattice points inside or on the outline (the lattice starts at the lower left corner of
 /// the bounding box), feature points that the lattice misses, and nodes along outline edges that it does not follow.
 pub fn lattice_nodes(features: &Features, spacing: f64) -> Vec<Point2> {
-    let outline = &features.outline;
+    fitted(&features.outline, spacing, &features.points(), &features.segments())
+}
+
+/// The same with nodes on the outlines of inclusions too, so that edges of triangles can follow them; lattice nodes too
+/// near to give triangles of any height give way.
+pub fn lattice_nodes_on_interfaces(features: &Features, spacing: f64) -> Vec<Point2> {
+    let tolerance = 1e-9 * features.outline.size();
+    let inside = |p: &Point2| features.outline.locate(*p, tolerance) != Location::Outside;
+    let interfaces: Vec<(Point2, Point2)> =
+        features.inclusions.iter().flat_map(Polygon::edges).filter(|(a, b)| inside(a) && inside(b)).collect();
+    let mut points = features.points();
+    points.extend(interfaces.iter().map(|edge| edge.0));
+    let own = features.segments();
+    let mut nodes = fitted(&features.outline, spacing, &points, &[own.clone(), interfaces.clone()].concat());
+    nodes.retain(|x| {
+        let to = |(a, b): &(Point2, Point2)| distance_to_segment(*x, *a, *b);
+        let to_interface = interfaces.iter().map(to).fold(f64::INFINITY, f64::min);
+        let clear = to_interface <= tolerance || to_interface >= CLEARANCE * spacing;
+        clear || points.iter().any(|p| (p - x).norm() <= tolerance) || own.iter().any(|edge| to(edge) <= tolerance)
+    });
+    nodes
+}
+
+/// Lattice nodes that give way to `points`, with nodes along `segments` where the lattice leaves gaps.
+fn fitted(outline: &Polygon, spacing: f64, points: &[Point2], segments: &[(Point2, Point2)]) -> Vec<Point2> {
     let tolerance = 1e-9 * outline.size();
     let (low, high) = outline.bounds();
     let count = |extent: f64| (extent / spacing + 1e-9).floor() as usize + 1;
@@ -24,8 +48,7 @@ pub fn lattice_nodes(features: &Features, spacing: f64) -> Vec<Point2> {
         .collect();
 
     let mut fixed: Vec<Point2> = Vec::new();
-    let points = features.points();
-    for &p in &points {
+    for &p in points {
         let snap = |nodes: &mut [Point2]| match nodes.iter_mut().find(|x| (**x - p).norm() <= tolerance) {
             // The feature's own digits, not the lattice's: 3 × 0.1 is not 0.3.
             Some(x) => {
@@ -38,7 +61,7 @@ pub fn lattice_nodes(features: &Features, spacing: f64) -> Vec<Point2> {
             fixed.push(p);
         }
     }
-    for (a, b) in features.segments() {
+    for &(a, b) in segments {
         fill_gaps(a, b, spacing, tolerance, &nodes, &mut fixed);
     }
     nodes.retain(|x| {

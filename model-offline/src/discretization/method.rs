@@ -42,6 +42,11 @@ pub enum Integration {
     Dni,
     /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell.
     Scni,
+    /// SCNI with the variation of the gradient inside the nodal cell given energy by a constant matrix: as cheap, and
+    /// without modes that no interior cell feels.
+    ScniStabilised,
+    /// Modified SCNI: the law in every node–edge triangle of the nodal cells.
+    Mscni,
     /// Naturally stabilised nodal integration: direct, plus the gradient's own variation over the cell.
     Nsni,
     /// Gauss points in the triangles of the nodal cells.

@@ -17,6 +17,7 @@ pub mod nodal_cells;
 pub mod node_cloud;
 pub mod planar;
 pub mod shape_functions;
+pub mod subcells;
 pub mod triangulation;
 
 pub use features::Features;

@@ -2,9 +2,9 @@
 
 use super::finite_element::Elements;
 use super::method::{Basis, Integration, Method};
-use super::nodal_cells::clipped_voronoi;
+use super::nodal_cells::{Across, clipped_voronoi};
 use super::triangulation::{TriangulationError, triangulate};
-use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, integration};
+use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, integration, subcells};
 use crate::geometry::{Point, Point2, Polygon};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -69,6 +69,9 @@ impl Planar {
         }
         let half_widths = match spacing {
             Some(h) => vec![h * method.support; nodes.len()],
+            None if by_natural_neighbours(method.integration) => {
+                natural_neighbour_distance(&nodes, &cells).into_iter().map(|h| h * method.support).collect()
+            }
             None => local_spacing(&nodes, &cells).into_iter().map(|h| h * method.support).collect(),
         };
         let mut triangles = Vec::new();
@@ -85,6 +88,8 @@ impl Planar {
                 let quadratic = method.basis == Basis::Quadratic;
                 integration::gauss(&shape, &triangles, &cells, quadratic, method.consistent)?
             }
+            Integration::ScniStabilised => subcells::scni_stabilised(&shape, &cells, subcells::STABILISATION)?,
+            Integration::Mscni => subcells::modified_scni(&shape, &cells)?,
             Integration::Scni | Integration::FemT3 | Integration::FemT6 => {
                 integration::stabilised_conforming_nodal(&shape, &cells)?
             }
@@ -118,7 +123,11 @@ impl Planar {
     /// Gauss points per boundary edge: those that cell gradients are averaged with.
     pub(super) fn edge_rule(&self) -> &'static [(f64, f64)] {
         match self.method.integration {
-            Integration::Dni | Integration::Scni | Integration::Nsni => &integration::GAUSS_2,
+            Integration::Dni
+            | Integration::Scni
+            | Integration::ScniStabilised
+            | Integration::Mscni
+            | Integration::Nsni => &integration::GAUSS_2,
             Integration::Gauss | Integration::FemT3 | Integration::FemT6 => &integration::GAUSS_3,
         }
     }
@@ -145,6 +154,28 @@ impl Planar {
             Approximation::Elements(elements) => Ok(elements.value_stencil(x)),
         }
     }
+}
+
+/// Rules whose supports are relative to the distance of the farthest natural neighbour.
+fn by_natural_neighbours(integration: Integration) -> bool {
+    matches!(integration, Integration::ScniStabilised | Integration::Mscni)
+}
+
+/// Distance of every node to the farthest of its natural neighbours, those that its cell shares an edge with; on a square
+/// lattice the spacing.
+fn natural_neighbour_distance(nodes: &[Point2], cells: &[NodalCell]) -> Vec<f64> {
+    /// Cells that share less than this, over their own size, share a corner and no edge.
+    const CORNER: f64 = 1e-6;
+    let farthest = |(x, cell): (&Point2, &NodalCell)| {
+        let shortest = CORNER * cell.area.sqrt();
+        cell.edges()
+            .filter_map(|(a, b, across)| match across {
+                Across::Cell(j) if (b - a).norm() > shortest => Some((nodes[j as usize] - x).norm()),
+                _ => None,
+            })
+            .fold(0.0, f64::max)
+    };
+    nodes.iter().zip(cells).map(farthest).collect()
 }
 
 /// Local spacing of scattered nodes: √2 times the distance to the farthest corner of the nodal cell, which on a square

@@ -6,5 +6,5 @@ pub mod polygon;
 pub use point::{Point, Point2, cross};
 pub use polygon::{
     Location, Polygon, PolygonError, bounds, clip_half_plane, distance_to_polyline, distance_to_segment, overlap_area,
-    segments_meet, signed_area,
+    segments_meet, shared_area, signed_area,
 };

@@ -263,6 +263,11 @@ pub fn clip_half_plane<L: Copy>(
 
 /// Area of a polygon that lies inside a convex loop (counter-clockwise).
 pub fn overlap_area(polygon: &Polygon, convex: &[Point2]) -> f64 {
+    signed_area(&clipped(polygon, convex)).max(0.0)
+}
+
+/// The part of a polygon inside a convex loop (counter-clockwise): a loop, empty when there is none.
+fn clipped(polygon: &Polygon, convex: &[Point2]) -> Vec<Point2> {
     let mut current: Vec<(Point2, ())> = polygon.vertices.iter().map(|&v| (v, ())).collect();
     let mut next = Vec::with_capacity(current.len() + 4);
     for i in 0..convex.len() {
@@ -270,12 +275,49 @@ pub fn overlap_area(polygon: &Polygon, convex: &[Point2]) -> f64 {
         let d = b - a;
         clip_half_plane(&current, a, Point2::new(d.y, -d.x), (), &mut next);
         std::mem::swap(&mut current, &mut next);
-        if current.is_empty() {
-            return 0.0;
-        }
     }
-    let corners: Vec<Point2> = current.iter().map(|c| c.0).collect();
-    signed_area(&corners).max(0.0)
+    current.iter().map(|c| c.0).collect()
+}
+
+/// Area of a closed loop (counter-clockwise, convex or not) that lies inside all of some polygons.
+pub fn shared_area(polygons: &[&Polygon], corners: &[Point2]) -> f64 {
+    let Some((last, others)) = polygons.split_last() else { return signed_area(corners) };
+    if others.is_empty() && is_convex(corners) {
+        return overlap_area(last, corners);
+    }
+    // A fan of signed triangles stands for any loop: what they count twice they also count back.
+    let mut triangles = signed_fan(corners);
+    for polygon in others {
+        triangles = triangles
+            .iter()
+            .flat_map(|(sign, triangle)| {
+                signed_fan(&clipped(polygon, triangle)).into_iter().map(move |(inner, t)| (sign * inner, t))
+            })
+            .collect();
+    }
+    triangles.iter().map(|(sign, triangle)| sign * overlap_area(last, triangle)).sum::<f64>().max(0.0)
+}
+
+fn is_convex(corners: &[Point2]) -> bool {
+    let n = corners.len();
+    (0..n).all(|i| {
+        let (a, b) = (corners[(i + 1) % n] - corners[i], corners[(i + 2) % n] - corners[(i + 1) % n]);
+        cross(a, b) >= -1e-12 * a.norm() * b.norm()
+    })
+}
+
+/// Triangles from the first corner, counter-clockwise, with the sign that they count with.
+fn signed_fan(corners: &[Point2]) -> Vec<(f64, [Point2; 3])> {
+    (1..corners.len().saturating_sub(1))
+        .filter_map(|i| {
+            let (a, b, c) = (corners[0], corners[i], corners[i + 1]);
+            match cross(b - a, c - a) {
+                twice if twice > 0.0 => Some((1.0, [a, b, c])),
+                twice if twice < 0.0 => Some((-1.0, [a, c, b])),
+                _ => None,
+            }
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -323,5 +365,12 @@ mod tests {
         let window: Vec<Point2> =
             [[0.5, 0.5], [2.5, 0.5], [2.5, 1.5], [0.5, 1.5]].iter().map(|p| Point2::new(p[0], p[1])).collect();
         assert!((overlap_area(&u, &window) - 1.5).abs() < 1e-14);
+        assert_eq!(shared_area(&[&u], &window), overlap_area(&u, &window));
+        // The other way round the loop is not convex, and together with a third region there are two polygons.
+        let square = Polygon::new(window).unwrap();
+        assert!((shared_area(&[&square], u.vertices()) - 1.5).abs() < 1e-14);
+        let left = polygon(&[[0.0, 0.0], [1.5, 0.0], [1.5, 3.0], [0.0, 3.0]]).unwrap();
+        assert!((shared_area(&[&square, &left], u.vertices()) - 0.75).abs() < 1e-14);
+        assert!((shared_area(&[&left, &u], square.vertices()) - 0.75).abs() < 1e-14);
     }
 }

@@ -54,6 +54,14 @@ pub trait Material<const D: usize>: std::fmt::Debug {
         (0..D).flat_map(|i| (0..D).map(move |j| (i, j))).map(|(i, j)| a[i][j][i][j]).fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// Shear modulus at rest, stress units; for a law that is not isotropic, that of the shear 12.
+    fn rest_shear_modulus(&self) -> f64 {
+        match D {
+            1 => self.rest_stiffness(),
+            _ => self.tangent(&Matrix::zeros())[0][1][0][1],
+        }
+    }
+
     /// Whether every small strain costs energy: the tangent at rest, as a matrix on symmetric strains, is positive
     /// definite. For isotropic laws that is μ > 0 with λ + μ > 0 in the plane, λ + 2μ/3 > 0 in space.
     ///

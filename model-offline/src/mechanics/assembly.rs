@@ -5,12 +5,14 @@
 
 use crate::discretization::Quadrature;
 use crate::linalg::Pattern;
-use crate::material::{Law, Material as _, Matrix, determinant};
+use crate::material::{Law, Material, Matrix, determinant};
 
 /// The materials of a tissue, and how much of each every cell contains.
 #[derive(Debug, Clone)]
 pub struct Tissue {
     materials: Vec<Law>,
+    /// Shear moduli of the materials at rest.
+    shear_moduli: Vec<f64>,
     /// Per cell: range into `parts`.
     offsets: Vec<u32>,
     /// (material, factor on its energy).
@@ -20,7 +22,7 @@ pub struct Tissue {
 impl Tissue {
     /// A tissue of one material in every cell.
     pub fn uniform(material: Law, cells: usize) -> Self {
-        Self { materials: vec![material], offsets: (0..=cells as u32).collect(), parts: vec![(0, 1.0); cells] }
+        Self::new(vec![material], (0..cells).map(|_| vec![(0, 1.0)]))
     }
 
     /// A tissue from the parts of every cell: (index into `materials`, factor on the energy).
@@ -30,7 +32,15 @@ impl Tissue {
             parts.extend(cell);
             offsets.push(parts.len() as u32);
         }
-        Self { materials, offsets, parts }
+        let shear_moduli = materials.iter().map(<Law as Material<2>>::rest_shear_modulus).collect();
+        Self { materials, shear_moduli, offsets, parts }
+    }
+
+    /// Shear modulus μ₀ of a cell at rest, stress units.
+    #[inline]
+    pub fn rest_shear_modulus(&self, cell: u32) -> f64 {
+        let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
+        self.parts[range].iter().map(|&(m, factor)| self.shear_moduli[m as usize] * factor).sum()
     }
 
     /// The materials and energy factors of a cell.
@@ -129,8 +139,40 @@ pub fn internal_force<const D: usize>(
                 }
             }
         }
+        if !point.stabilisation.is_empty() {
+            let shear = tissue.rest_shear_modulus(point.cell);
+            energy += stabilisation_force::<D>(point.nodes, point.stabilisation, shear, coefficients, force);
+        }
     }
     Ok(energy)
+}
+
+/// Adds the force `μ₀ B d` of a point's stabilisation, component by component; returns its energy `½ μ₀ dᵀ B d`.
+fn stabilisation_force<const D: usize>(
+    nodes: &[u32],
+    matrix: &[f64],
+    shear: f64,
+    coefficients: &[f64],
+    force: &mut [f64],
+) -> f64 {
+    let (mut energy, mut next) = (0.0, 0);
+    for (column, &j) in nodes.iter().enumerate() {
+        for &i in &nodes[column..] {
+            let (i, j, b) = (i as usize * D, j as usize * D, shear * matrix[next]);
+            next += 1;
+            for k in 0..D {
+                let (di, dj) = (coefficients[i + k], coefficients[j + k]);
+                force[i + k] += b * dj;
+                if i == j {
+                    energy += 0.5 * b * di * dj;
+                } else {
+                    force[j + k] += b * di;
+                    energy += b * di * dj;
+                }
+            }
+        }
+    }
+    energy
 }
 
 /// Where every (point, node, node) block of the tangent goes: computed once per pattern, so that assembly is a plain
@@ -180,6 +222,8 @@ pub fn tangent<const D: usize>(
                 *sum += scale * row;
             }
         }
+        let shear = if point.stabilisation.is_empty() { 0.0 } else { tissue.rest_shear_modulus(point.cell) };
+        let mut packed = 0;
         for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {
             // t[k][i][m] = A_imkl g_J,l: shared by all rows of this column.
             let t: [[[f64; D]; D]; D] = std::array::from_fn(|k| {
@@ -187,6 +231,14 @@ pub fn tangent<const D: usize>(
             });
             let stride = pattern.column_length(j);
             let rows = &point.gradients[column..];
+            if let Some(stabilisation) = point.stabilisation.get(packed..packed + rows.len()) {
+                for (b, &at) in stabilisation.iter().zip(&blocks.positions[next..next + rows.len()]) {
+                    for k in 0..D {
+                        values[at as usize + k * stride + k] += shear * b;
+                    }
+                }
+                packed += rows.len();
+            }
             for (gi, &at) in rows.iter().zip(&blocks.positions[next..next + rows.len()]) {
                 for (k, t) in t.iter().enumerate() {
                     let start = at as usize + k * stride;

@@ -1,16 +1,17 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
 mod graded;
+mod tissue;
 
 pub use graded::graded_model;
 
+use self::tissue::{Mixing, tissue_of};
 use crate::discretization::boundary::BoundaryPoint;
-use crate::discretization::lattice::lattice_nodes;
+use crate::discretization::lattice::{lattice_nodes, lattice_nodes_on_interfaces};
 use crate::discretization::{
-    DiscretizationError, Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
+    DiscretizationError, Essential, Integration, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
 };
-use crate::geometry::{Point2, Polygon, distance_to_polyline, overlap_area};
-use crate::material::Law;
+use crate::geometry::{Point2, distance_to_polyline};
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
 use crate::scene::Scene;
@@ -154,8 +155,12 @@ impl TissueModel {
                 ));
             }
         };
-        let nodes = lattice_nodes(&scene.features(), spacing);
         let method = scene.discretization.method;
+        let features = scene.features();
+        let nodes = match method.integration {
+            Integration::FemT3 | Integration::FemT6 => lattice_nodes_on_interfaces(&features, spacing),
+            _ => lattice_nodes(&features, spacing),
+        };
         let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)
     }
@@ -188,7 +193,7 @@ impl TissueModel {
             }
         };
         Ok(Self {
-            tissue: tissue_of(scene, planar.cells()),
+            tissue: tissue_of(scene, planar.cells(), Mixing::of(planar.method().integration)),
             scene: scene.clone(),
             spacing,
             essential,
@@ -200,7 +205,8 @@ impl TissueModel {
     /// The same nodes and shape functions with the tissue of another scene that differs in its materials only.
     #[must_use]
     pub fn with_tissue_of(&self, scene: &Scene) -> Self {
-        Self { tissue: tissue_of(scene, self.planar.cells()), scene: scene.clone(), ..self.clone() }
+        let mixing = Mixing::of(self.planar.method().integration);
+        Self { tissue: tissue_of(scene, self.planar.cells(), mixing), scene: scene.clone(), ..self.clone() }
     }
 
     /// The scene.
@@ -327,59 +333,6 @@ impl TissueModel {
             Constraints { rows: self.constrained_rows(paddle).unwrap_or_default(), weak: self.weakly_imposed(paddle) };
         let equilibrium = Equilibrium::at_rest(self.discrete_body(), constraints, settings)?;
         Ok(Body { model: self, equilibrium, attached: paddle, depth: 0.0, paddle: Vector2::zeros() })
-    }
-}
-
-/// Materials of the cells: an inclusion that covers part of a cell counts with the area it covers.
-fn tissue_of(scene: &Scene, cells: &[NodalCell]) -> Tissue {
-    let mut materials: Vec<Law> = vec![scene.material.clone()];
-    let of_inclusion: Vec<u32> = scene
-        .inclusions
-        .iter()
-        .map(|inclusion| match &inclusion.material {
-            Some(material) => {
-                materials.push(material.clone());
-                materials.len() as u32 - 1
-            }
-            None => 0,
-        })
-        .collect();
-    let parts = cells.iter().map(|cell| {
-        let corners = cell.corners();
-        let mut parts = vec![(0, 1.0)];
-        for (inclusion, &material) in scene.inclusions.iter().zip(&of_inclusion) {
-            let fraction = covered_fraction(&inclusion.outline, &corners, cell.area);
-            if fraction > 0.0 {
-                parts[0].1 -= fraction;
-                parts.push((material, fraction * inclusion.stiffness));
-            }
-        }
-        // One evaluation per law: shares of the same material add up. Where inclusions overlap, the body's share
-        // cannot fall below nothing.
-        parts[0].1 = f64::max(parts[0].1, 0.0);
-        let mut merged: Vec<(u32, f64)> = Vec::with_capacity(parts.len());
-        for (material, factor) in parts {
-            match merged.iter_mut().find(|m| m.0 == material) {
-                Some(m) => m.1 += factor,
-                None => merged.push((material, factor)),
-            }
-        }
-        merged.retain(|m| m.1 > 0.0);
-        merged
-    });
-    Tissue::new(materials, parts)
-}
-
-/// Share of a cell that a region covers. Within rounding of nothing or all it is exactly that, so that a lattice cell
-/// inside an inclusion has the inclusion's stiffness and no other.
-fn covered_fraction(region: &Polygon, corners: &[Point2], area: f64) -> f64 {
-    let fraction = overlap_area(region, corners) / area;
-    if fraction < 1e-9 {
-        0.0
-    } else if fraction > 1.0 - 1e-9 {
-        1.0
-    } else {
-        fraction
     }
 }
 

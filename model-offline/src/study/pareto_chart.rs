@@ -10,6 +10,8 @@ fn marker(integration: Integration) -> Marker {
     match integration {
         Integration::Dni => Marker::Diamond,
         Integration::Scni => Marker::Circle,
+        Integration::ScniStabilised => Marker::Square,
+        Integration::Mscni => Marker::Dot,
         Integration::Nsni => Marker::Square,
         Integration::Gauss => Marker::Plus,
         Integration::FemT3 => Marker::Triangle,

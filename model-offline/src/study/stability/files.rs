@@ -75,6 +75,8 @@ fn look(integration: Integration) -> Series {
     let (marker, filled, dash) = match integration {
         Integration::Dni => (Marker::Circle, false, Dash::Dotted),
         Integration::Scni => (Marker::Circle, true, Dash::Solid),
+        Integration::ScniStabilised => (Marker::Square, true, Dash::Solid),
+        Integration::Mscni => (Marker::Square, false, Dash::Dashed),
         Integration::Nsni => (Marker::Diamond, false, Dash::Dashed),
         Integration::Gauss => (Marker::Diamond, true, Dash::DashDot),
         Integration::FemT3 => (Marker::Triangle, false, Dash::Dashed),

@@ -5,6 +5,7 @@
 //! resists compression; every run reports the smallest principal stretch of its last converged state beside it, and whether
 //! strong ellipticity was lost anywhere: past that no continuum would stay whole, whatever the method.
 
+pub mod bloch;
 pub mod law_limit;
 pub mod plan;
 pub mod probe;
