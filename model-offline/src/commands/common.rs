@@ -66,8 +66,12 @@ impl Common {
         if let Some(t) = self.tolerance {
             spec.resolution = Resolution::Tolerance(t);
         }
+        if let Some(integration) = self.integration.filter(|i| *i != spec.method.integration) {
+            // The scene's support belongs to the scene's rule.
+            spec.method.integration = integration;
+            spec.method.support = integration.default_support();
+        }
         spec.method.support = self.support.unwrap_or(spec.method.support);
-        spec.method.integration = self.integration.unwrap_or(spec.method.integration);
         spec.method.basis = self.basis.unwrap_or(spec.method.basis);
         spec.essential = self.essential.unwrap_or(spec.essential);
         limits::check(&scene.discretization, &scene.outline)?;

@@ -25,6 +25,7 @@ use strum::{Display, EnumString, IntoStaticStr, VariantArray};
     PartialEq,
     Eq,
     Hash,
+    Default,
     Deserialize,
     Serialize,
     JsonSchema,
@@ -43,7 +44,8 @@ pub enum Integration {
     /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell.
     Scni,
     /// SCNI with the variation of the gradient inside the nodal cell given energy by a constant matrix: as cheap, and
-    /// without modes that no interior cell feels.
+    /// without modes that no interior cell feels. The default.
+    #[default]
     ScniStabilised,
     /// Modified SCNI: the law in every node–edge triangle of the nodal cells.
     Mscni,
@@ -70,7 +72,16 @@ impl Integration {
 
     /// Whether it integrates over nodal cells.
     pub fn is_nodal(self) -> bool {
-        matches!(self, Self::Dni | Self::Scni | Self::Nsni)
+        matches!(self, Self::Dni | Self::Scni | Self::ScniStabilised | Self::Mscni | Self::Nsni)
+    }
+
+    /// Kernel support over local spacing where none is given: the smallest that is safe for the stabilised rules (stencils
+    /// of 5 × 5 nodes on a lattice), the paper's for the others.
+    pub fn default_support(self) -> f64 {
+        match self {
+            Self::ScniStabilised | Self::Mscni => 1.49,
+            _ => 2.0,
+        }
     }
 }
 
@@ -159,9 +170,9 @@ pub struct Method {
 }
 
 impl Method {
-    /// A rule with a linear basis and a support of two spacings.
+    /// A rule with a linear basis and its default support.
     pub fn new(integration: Integration) -> Self {
-        Self { integration, basis: Basis::Linear, support: 2.0, consistent: true }
+        Self { integration, basis: Basis::Linear, support: integration.default_support(), consistent: true }
     }
 
     /// Basis of the displacement itself: that of quadratic triangles is quadratic whatever the shape functions' is.

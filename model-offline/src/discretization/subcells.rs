@@ -66,10 +66,11 @@ pub fn modified_scni(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resu
     for (node, cell) in cells.iter().enumerate() {
         subcells.compute(node, cell)?;
         // A cell that its node does not see all of (at a notch) has triangles that overlap; its mean serves there.
-        if subcells.areas.iter().any(|a| *a < 0.0) {
+        if subcells.areas.iter().any(|a| *a < -DEGENERATE * cell.area) {
             rule.push(cell.area, node, &subcells.nodes, &subcells.mean);
             continue;
         }
+        subcells.make_consistent();
         for (area, gradients) in subcells.triangles() {
             rule.push(area, node, &subcells.nodes, gradients);
         }
@@ -148,6 +149,24 @@ impl<'a, 'c> Subcells<'a, 'c> {
             }
         }
         Ok(())
+    }
+
+    /// Shifts the triangles' gradients so that they average to the cell's: on an edge through the node, which has no
+    /// triangle, the Gauss points of the whole edge and of the two spokes along it differ.
+    fn make_consistent(&mut self) {
+        let n = self.nodes.len();
+        let mut missing = self.mean.clone();
+        let total: f64 = self.triangles().map(|(area, _)| area).sum();
+        for (area, gradients) in self.triangles() {
+            for (m, g) in missing.iter_mut().zip(gradients) {
+                *m -= g * (area / total);
+            }
+        }
+        for row in self.gradients.chunks_exact_mut(n) {
+            for (g, m) in row.iter_mut().zip(&missing) {
+                *g += m;
+            }
+        }
     }
 
     /// Means of the candidates' shape functions along a segment; `node` is the one that an error names.

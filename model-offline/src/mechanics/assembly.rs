@@ -1,8 +1,10 @@
 //! Assembly of internal force and tangent stiffness in coefficient space, where the tangent is sparse.
 //!
 //! With F_q = I + Σ_I d_I ⊗ g_I(q): internal force `f_I = Σ_q w_q P(F_q) g_I` and tangent stiffness
-//! `(K_IJ)_ik = Σ_q w_q g_I,j A_ijkl(F_q) g_J,l`, total Lagrangian throughout.
+//! `(K_IJ)_ik = Σ_q w_q g_I,j A_ijkl(F_q) g_J,l`, total Lagrangian throughout; rules with a constant
+//! [stabilisation](super::stabilisation) add theirs.
 
+use super::stabilisation;
 use crate::discretization::Quadrature;
 use crate::linalg::Pattern;
 use crate::material::{Law, Material, Matrix, determinant};
@@ -141,38 +143,10 @@ pub fn internal_force<const D: usize>(
         }
         if !point.stabilisation.is_empty() {
             let shear = tissue.rest_shear_modulus(point.cell);
-            energy += stabilisation_force::<D>(point.nodes, point.stabilisation, shear, coefficients, force);
+            energy += stabilisation::add_force::<D>(point.nodes, point.stabilisation, shear, coefficients, force);
         }
     }
     Ok(energy)
-}
-
-/// Adds the force `μ₀ B d` of a point's stabilisation, component by component; returns its energy `½ μ₀ dᵀ B d`.
-fn stabilisation_force<const D: usize>(
-    nodes: &[u32],
-    matrix: &[f64],
-    shear: f64,
-    coefficients: &[f64],
-    force: &mut [f64],
-) -> f64 {
-    let (mut energy, mut next) = (0.0, 0);
-    for (column, &j) in nodes.iter().enumerate() {
-        for &i in &nodes[column..] {
-            let (i, j, b) = (i as usize * D, j as usize * D, shear * matrix[next]);
-            next += 1;
-            for k in 0..D {
-                let (di, dj) = (coefficients[i + k], coefficients[j + k]);
-                force[i + k] += b * dj;
-                if i == j {
-                    energy += 0.5 * b * di * dj;
-                } else {
-                    force[j + k] += b * di;
-                    energy += b * di * dj;
-                }
-            }
-        }
-    }
-    energy
 }
 
 /// Where every (point, node, node) block of the tangent goes: computed once per pattern, so that assembly is a plain

@@ -3,6 +3,7 @@
 pub mod assembly;
 pub mod constraints;
 pub mod nitsche;
+pub mod stabilisation;
 
 pub use assembly::Tissue;
 pub use constraints::{ConstrainedRows, Constraints, WeaklyImposed};

@@ -9,7 +9,7 @@ use self::tissue::{Mixing, tissue_of};
 use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::lattice::{lattice_nodes, lattice_nodes_on_interfaces};
 use crate::discretization::{
-    DiscretizationError, Essential, Integration, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
+    DiscretizationError, Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
 };
 use crate::geometry::{Point2, distance_to_polyline};
 use crate::mechanics::nitsche::Nitsche;
@@ -157,9 +157,9 @@ impl TissueModel {
         };
         let method = scene.discretization.method;
         let features = scene.features();
-        let nodes = match method.integration {
-            Integration::FemT3 | Integration::FemT6 => lattice_nodes_on_interfaces(&features, spacing),
-            _ => lattice_nodes(&features, spacing),
+        let nodes = match method.integration.is_element() {
+            true => lattice_nodes_on_interfaces(&features, spacing),
+            false => lattice_nodes(&features, spacing),
         };
         let planar = Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(spacing), method)?;
         Self::on(scene, planar, spacing)

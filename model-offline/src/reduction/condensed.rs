@@ -4,6 +4,7 @@
 use super::lifting::{control_values, controls, flat, imposed_weakly, tangent_at_rest};
 use crate::mechanics::ConstrainedRows;
 use crate::mechanics::assembly::displacement_gradient;
+use crate::mechanics::stabilisation;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::{DMatrix, Matrix2, Vector2};
@@ -28,8 +29,8 @@ impl Condensed {
         // The target is constrained too while the others are condensed out.
         let rows = model.constrained_rows_with_target(paddle).ok_or_else(imposed_weakly)?;
         let shapes = retained_responses(model, paddle, rows)?;
-        let n = shapes.len();
-        let mut stiffness = DMatrix::zeros(n, n);
+        let columns: Vec<&[f64]> = shapes.iter().map(Vec::as_slice).collect();
+        let mut stiffness = stabilisation::project(model.rule(), model.tissue(), &columns);
         for (q, point) in model.rule().points().enumerate() {
             let a = tangent_at_rest(model.tissue(), point.cell, point.weight);
             let strains: Vec<_> = shapes.iter().map(|d| flat(&displacement_gradient(model.rule(), q, d))).collect();

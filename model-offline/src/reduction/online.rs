@@ -84,6 +84,8 @@ pub struct ReducedModel {
     pub(super) points: Vec<SampledPoint>,
     /// Displacement gradients: point by point, component by component (row-major), column by column.
     pub(super) gradients: Vec<f64>,
+    /// Constant stabilisation between all columns.
+    pub(super) stabilisation: DMatrix<f64>,
     /// Target displacement of every column.
     pub(super) target: Vec<Vector2<f64>>,
     /// Target displacement per residual on the guard modes (2 × guards).
@@ -147,9 +149,12 @@ impl ReducedModel {
     /// False when the configuration is not admissible.
     fn evaluate(&self, amplitudes: &[f64], residual: &mut [f64], mut tangent: Option<&mut DMatrix<f64>>) -> bool {
         let (width, used) = (self.width(), self.controls + self.modes);
-        residual.fill(0.0);
+        for (row, r) in residual.iter_mut().enumerate() {
+            let along = self.stabilisation.row(self.controls + row);
+            *r = along.iter().zip(&amplitudes[..used]).map(|(s, a)| s * a).sum();
+        }
         if let Some(k) = tangent.as_deref_mut() {
-            k.fill(0.0);
+            k.copy_from(&self.stabilisation.view((self.controls, self.controls), (self.modes, self.modes)));
         }
         let mut response = vec![0.0; 4 * self.modes];
         for (point, gradients) in self.points.iter().zip(self.gradients.chunks_exact(4 * width)) {

@@ -6,6 +6,7 @@ use super::nnls::non_negative_fit;
 use super::online::{Domain, Invalid, ReducedModel, SampledPoint};
 use crate::material::Material as _;
 use crate::mechanics::assembly::displacement_gradient;
+use crate::mechanics::stabilisation;
 use crate::model::{ModelError, TissueModel};
 use crate::parallel;
 use crate::placement::controllability::best_direction;
@@ -344,7 +345,10 @@ impl Space {
         let Size { modes, guards, .. } = size;
         let controls = self.lifts.len();
         let width = controls + modes + guards;
-        let tangent_at_rest = self.tangent_at_rest(model, modes + guards);
+        let stabilisation = self.stabilisation(model, modes + guards);
+        let seen = modes + guards;
+        let tangent_at_rest =
+            self.tangent_at_rest(model, seen) + stabilisation.view((controls, controls), (seen, seen));
         let sample = self.sample(model, size);
         let rule = model.rule();
         let points: Vec<SampledPoint> = sample
@@ -366,6 +370,7 @@ impl Space {
             tissue: model.tissue().clone(),
             points,
             gradients,
+            stabilisation,
             target: self.target[..controls + modes].to_vec(),
             guard_response,
             underestimate: 0.0,
@@ -374,6 +379,12 @@ impl Space {
             domain,
             columns: self.lifts.iter().chain(&self.modes[..modes]).cloned().collect(),
         }
+    }
+
+    /// The constant stabilisation between lifts and modes; it is projected once, and not part of the sample.
+    fn stabilisation(&self, model: &TissueModel, modes: usize) -> DMatrix<f64> {
+        let columns: Vec<&[f64]> = self.lifts.iter().chain(&self.modes[..modes]).map(Vec::as_slice).collect();
+        stabilisation::project(model.rule(), model.tissue(), &columns)
     }
 
     /// `K_mn = Σ_q w_q H_m · A(0) · H_n` over all points.

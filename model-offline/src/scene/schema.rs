@@ -206,9 +206,9 @@ pub struct DiscretizationSection {
     pub tolerance: Option<Located<f64>>,
     /// Refinement level of graded nodes, in place of both: what a fit to a tolerance has found.
     pub level: Option<Located<i32>>,
-    /// Kernel support over local spacing (default 2).
+    /// Kernel support over local spacing (default: 1.49 for scni-stabilised and mscni, 2 for the others).
     pub support: Option<Located<f64>>,
-    /// Integration rule (default scni).
+    /// Integration rule (default scni-stabilised).
     pub integration: Option<Integration>,
     /// Basis of the shape functions (default linear).
     #[serde(default)]

@@ -4,7 +4,7 @@ use super::error::{SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
 use super::{Actuator, Inclusion, Needle, Paddle, Scene};
-use crate::discretization::{Discretization, Integration, Method, Resolution};
+use crate::discretization::{Discretization, Method, Resolution};
 use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
 use std::ops::Range;
@@ -347,15 +347,15 @@ impl Validator<'_> {
             }
             (None, None, Some(level)) => self.resolution(Resolution::Level(*level.get()), level.span(), outline)?,
         };
+        let integration = section.integration.unwrap_or_default();
         let support = match &section.support {
             Some(located) => {
                 let support = self.positive(located, "support")?;
                 limits::check_support(support).map_err(|error| self.limit(located.span(), error))?;
                 support
             }
-            None => 2.0,
+            None => integration.default_support(),
         };
-        let integration = section.integration.unwrap_or(Integration::Scni);
         Ok(Discretization {
             resolution,
             method: Method { support, basis: section.basis, ..Method::new(integration) },

@@ -140,18 +140,20 @@ fn accurate_rule(
     Ok((integration::gauss(&shape, &triangles, &cells, true, false)?, cells))
 }
 
-/// K_IJ = Σ_q w_q g_I · A · g_J over the points of the cells that are wanted, 2 × 2 blocks.
+/// K_IJ = Σ_q w_q g_I · A · g_J, and the rule's stabilisation, over the points of the cells that are wanted, 2 × 2 blocks.
 fn dense_tangent(rule: &Quadrature<2>, a: &Tensor4<2>, nodes: usize, wanted: &dyn Fn(u32) -> bool) -> DMatrix<f64> {
     let mut k = DMatrix::zeros(2 * nodes, 2 * nodes);
     for point in rule.points().filter(|p| wanted(p.cell)) {
-        for (&i, gi) in point.nodes.iter().zip(point.gradients) {
-            for (&j, gj) in point.nodes.iter().zip(point.gradients) {
+        for (row, (&i, gi)) in point.nodes.iter().zip(point.gradients).enumerate() {
+            for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {
+                let stabilisation = a[0][1][0][1] * point.stabilisation_entry(row, column);
                 for (r, c) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
                     let block: f64 = (0..2)
                         .flat_map(|m| (0..2).map(move |n| (m, n)))
                         .map(|(m, n)| gi[m] * a[r][m][c][n] * gj[n])
                         .sum();
-                    k[(2 * i as usize + r, 2 * j as usize + c)] += point.weight * block;
+                    let same = if r == c { stabilisation } else { 0.0 };
+                    k[(2 * i as usize + r, 2 * j as usize + c)] += point.weight * block + same;
                 }
             }
         }
