@@ -1,10 +1,10 @@
-//! Twenty wrong things that a newcomer does: each ends with the exit code of bad input, says what and where or what to do,
+//! Wrong things that a newcomer does: each ends with the exit code of bad input, says what and where or what to do,
 //! and writes nothing.
 
 use assert_cmd::Command;
 
 #[test]
-fn twenty_mistakes_of_a_first_day() {
+fn mistakes_of_a_first_day() {
     let folder = tempfile::tempdir().unwrap();
     let inside = |name: &str| folder.path().join(name);
     std::fs::write(inside("notes.txt"), "not a scene").unwrap();
@@ -24,7 +24,7 @@ fn twenty_mistakes_of_a_first_day() {
         (&["run", "--scene", "empty.toml"], &["empty", "start from"]),
         (&["run", "--scene", "full"], &["full", "bundled"]),
         (&["run", "--rate", "fast"], &["fast", "--rate"]),
-        (&["run", "--rate", "0"], &["--rate must be above 0"]),
+        (&["run", "--rate", "0"], &["--rate must be between 0.02 and 100000 Hz"]),
         (&["run", "--rate", "-5"], &["-5"]),
         (&["run", "--tissue", "bone"], &["bone", "homogeneous"]),
         (&["run", "--tisue", "inclusion"], &["--tissue"]),
@@ -33,14 +33,30 @@ fn twenty_mistakes_of_a_first_day() {
         (&["run", "--table", "random.table"], &["random.table"]),
         (&["run", "--table", "absent.table"], &["absent.table"]),
         (&["run", "--target-rate", "5000"], &["target sensor is faster than the loop"]),
-        (&["run", "--latency", "100000"], &["latency"]),
+        (&["run", "--latency", "100000"], &["--latency must be between 0 and 60000 ms"]),
+        (&["run", "--rate", "3e9"], &["--rate"]),
+        (&["run", "--duration", "1e12"], &["--duration"]),
+        (&["run", "--duration", "86400", "--rate", "1000"], &["86400000 ticks", "shorter"]),
+        (&["run", "--paddle-delay", "4000000000"], &["--paddle-delay"]),
+        (&["run", "--json", "full"], &["--json full", "directory"]),
+        (&["run", "--json", "absent/x.json"], &["--json absent/x.json"]),
+        (&["run", "--out", "new", "--json", "new/report.html"], &["--json new/report.html"]),
+        (&["run", "--allow-other-scene"], &["--table"]),
+        (&["plant", "--patience", "1e30"], &["--patience must be between"]),
+        (&["timing", "--cpu", "9999"], &["--cpu 9999", "processors 0 to"]),
+        (&["timing", "--rate", "1e9"], &["--rate"]),
+        (&["timing", "--json", "absent/x.json"], &["--json"]),
+        (&["faults", "--effort", "1e300"], &["--effort"]),
+        (&["export", "random.rec", "--csv", "random.rec"], &["random.rec", "input"]),
+        (&["export", "random.rec", "--csv", "same", "--mcap", "./same"], &["same file"]),
+        (&["controller", "--table", "random.table", "--record", "random.table"], &["--record", "input"]),
         (&["run", "--view-port", "8080"], &["--view"]),
         (&["replay", "random.rec"], &["random.rec", "not a recording"]),
         (&["replay"], &["RECORDING"]),
         (&["report", "full"], &["result.json"]),
         (&["export", "random.rec"], &["--mcap"]),
         (&["controller"], &["--table"]),
-        (&["timing", "--seconds", "0"], &["--seconds must be above 0"]),
+        (&["timing", "--seconds", "0"], &["--seconds must be between"]),
     ];
     for (typed, words) in mistakes {
         let assert =

@@ -36,6 +36,8 @@ pub struct ComparisonOptions {
     pub table_tissue: Option<Tissue>,
     /// Controller table to use instead of computing one.
     pub table: Option<PathBuf>,
+    /// Whether a table of another scene is used all the same.
+    pub allow_other_scene: bool,
     /// What drives time; none: lockstep, then the dynamic strategy once more in free-run.
     pub mode: Option<RunMode>,
     /// What computes the controller's steps.
@@ -57,6 +59,7 @@ impl ComparisonOptions {
             tissue: None,
             table_tissue: None,
             table: None,
+            allow_other_scene: false,
             mode: None,
             hardware: Hardware::default(),
             scalar: ScalarChoice::default(),
@@ -118,6 +121,11 @@ pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -
         return Ok(());
     }
     Err(SimError::TableUnits { path: path.to_owned(), found, expected: expected.clone() })
+}
+
+/// Whether a table was computed from this scene, with or without its inclusions.
+pub fn is_of(table: &Table<f64, 2>, scene: &Scene) -> bool {
+    Tissue::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash)
 }
 
 /// A plant, and what its controller believes.
@@ -249,6 +257,9 @@ impl<'p> Comparison<'p> {
         let given = options.table.as_deref().map(read_table).transpose()?;
         if let (Some(path), Some(given)) = (&options.table, &given) {
             check_units(&given.table, path, &[scene.length_unit.clone(), scene.stress_unit.clone()])?;
+            if !options.allow_other_scene && !is_of(&given.table, &scene) {
+                return Err(SimError::OtherScene { path: path.clone(), scene: scene.name.clone() });
+            }
         }
         let cases = cases(&options, &scene, given.as_ref().map(|given| &given.table))?;
         let mut comparison =
@@ -438,6 +449,12 @@ impl<'p> Comparison<'p> {
         self.insertion(case, &label, &|| self.progress.step()).controlled(&controller)
     }
 
+    /// What the table believes in, in words: its tissue, and that it is of another scene.
+    fn believed_tissue(&self, table: &Table<f64, 2>) -> String {
+        let tissue = table.tissue.as_str();
+        if is_of(table, &self.scene) { tissue.to_owned() } else { format!("{tissue} of another scene") }
+    }
+
     fn case_result(&self, case: &Case, encoded: &EncodedTable, strategies: Strategies) -> Result<CaseResult, SimError> {
         let EncodedTable { table, bytes } = encoded;
         let settings = self.simulation.loop_settings.settings(table.validity.depth_end);
@@ -450,7 +467,7 @@ impl<'p> Comparison<'p> {
             .map(|(fixture, dynamic)| fixture.max_orthogonal_error / dynamic.max_orthogonal_error);
         Ok(CaseResult {
             tissue: case.tissue,
-            table_tissue: table.tissue.as_str().to_owned(),
+            table_tissue: self.believed_tissue(table),
             table: TableResult {
                 hash: hex(&Sha256::digest(bytes)),
                 scene_hash: hex(&table.scene_hash),

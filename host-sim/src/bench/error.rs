@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use firmware::SettingsError;
 use firmware::contract::TableError;
 use model_offline::model::ModelError;
+use model_offline::output::OutputRefused;
 use model_offline::scene::SceneError;
 use model_offline::table::TableBuildError;
 
@@ -26,6 +27,9 @@ pub enum SimError {
     /// A number that an option does not take.
     #[error(transparent)]
     OutOfRange(#[from] OutOfRange),
+    /// An output is refused before the work begins.
+    #[error(transparent)]
+    Refused(#[from] OutputRefused),
     /// A combination of options that makes no sense.
     #[error("{0}")]
     Usage(String),
@@ -58,6 +62,17 @@ pub enum SimError {
         found: [String; 2],
         /// Those of the scene.
         expected: [String; 2],
+    },
+    /// A table was computed from another scene than the simulated one.
+    #[error("the table {} was computed from another scene than {scene}", path.display())]
+    #[diagnostic(help(
+        "compute it from this scene, with the same [discretization], or insist with --allow-other-scene"
+    ))]
+    OtherScene {
+        /// File.
+        path: PathBuf,
+        /// Name of the simulated scene.
+        scene: String,
     },
     /// A file cannot be read or written.
     #[error(transparent)]
@@ -129,6 +144,8 @@ impl SimError {
         let is_input = match self {
             Self::Scene(_)
             | Self::OutOfRange(_)
+            | Self::Refused(_)
+            | Self::OtherScene { .. }
             | Self::Usage(_)
             | Self::NoInclusion { .. }
             | Self::QemuIsLockstepOnly

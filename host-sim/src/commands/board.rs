@@ -9,6 +9,8 @@ use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
 
+use super::outputs::check_outputs;
+
 /// Options of `board`.
 #[derive(clap::Args, Clone, Debug)]
 pub(crate) struct BoardArgs {
@@ -30,6 +32,7 @@ pub(crate) struct BoardArgs {
 /// # Errors
 /// [`SimError::Measure`], [`SimError::File`], [`SimError::Record`].
 pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
+    check_outputs(&[&args.recording], &[("--write-budget", args.write_budget.as_deref())])?;
     let recording = Recording::read(&args.recording)?;
     let budget = args.budget.as_deref().map(read_budget).transpose()?;
     let scenarios = measure::scenarios(&recording)?;

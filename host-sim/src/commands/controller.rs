@@ -16,8 +16,10 @@ use host_sim::runtime::executor::{AnyTable, Hardware, on_emulated_board};
 use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::names;
 use host_sim::runtime::signals;
-use host_sim::world::error::positive;
 use host_sim::world::loop_settings::LoopSettings;
+
+use super::outputs::check_outputs;
+use super::world_args::PATIENCE;
 
 /// Options of the controller process.
 #[derive(clap::Args, Clone, Debug)]
@@ -64,7 +66,8 @@ pub(crate) struct ControllerArgs {
 pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     signals::install();
     args.loop_settings.check()?;
-    positive("--patience", args.patience)?;
+    PATIENCE.check(args.patience)?;
+    check_outputs(&[&args.table], &[("--record", args.record.as_deref()), ("--json", args.json.as_deref())])?;
     let timeout = Duration::from_secs_f64(args.patience);
     let bytes = read_bytes(&args.table)?;
     let table = AnyTable::decode(&bytes).map_err(|source| SimError::Table { path: args.table.clone(), source })?;

@@ -9,6 +9,8 @@ use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
 
+use super::outputs::check_outputs;
+
 /// Options of `export`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct ExportArgs {
@@ -27,6 +29,7 @@ pub(crate) struct ExportArgs {
 /// # Errors
 /// [`SimError::Record`], [`SimError::File`].
 pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
+    check_outputs(&[&args.recording], &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
     let recording = Recording::read(&args.recording)?;
     let table = firmware::contract::decode::<f64, 2>(&recording.header.table)
         .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;

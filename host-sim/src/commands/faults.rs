@@ -14,6 +14,9 @@ use host_sim::bench::fixture::fixture;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
 use host_sim::runtime::signals;
+use host_sim::world::error::OptionRange;
+
+use super::outputs::check_outputs;
 
 /// Options of `faults`.
 #[derive(Args, Clone, Debug)]
@@ -38,6 +41,9 @@ pub(crate) struct FaultsArgs {
     pub(crate) json: Option<PathBuf>,
 }
 
+/// Part of the repetitions; ten times as many is already an hour.
+const EFFORT: OptionRange = OptionRange::new("--effort", 0.0, 10.0, "");
+
 /// Random schedules without `--seeds`.
 const DEFAULT_SEEDS: u64 = 1000;
 
@@ -53,6 +59,10 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
     }
+    EFFORT.check(args.effort)?;
+    let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
+    let [csv, own] = files.each_ref().map(Option::as_deref);
+    check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
     let table = fixture()?;
     let mut result = FaultsResult {
         version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -4,6 +4,7 @@ mod board;
 mod controller;
 mod export;
 mod faults;
+mod outputs;
 mod plant;
 mod progress;
 mod replay;

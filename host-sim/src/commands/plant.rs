@@ -1,6 +1,6 @@
 //! `host-sim plant`: the plant in a terminal of its own; the controller is started in another one.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
@@ -13,10 +13,10 @@ use host_sim::runtime::plant::PlantLoop;
 use host_sim::runtime::plant::process::{OnDeath, Visit, serve};
 use host_sim::runtime::signals;
 use host_sim::world::World;
-use host_sim::world::error::positive;
 use model_offline::placement::{best_dynamic, discretise};
 
-use super::world_args::WorldArgs;
+use super::outputs::check_outputs;
+use super::world_args::{PATIENCE, WorldArgs};
 
 /// Options of the plant process.
 #[derive(Args, Clone, Debug)]
@@ -53,9 +53,11 @@ pub(crate) struct PlantArgs {
 /// [`SimError`].
 pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     signals::install();
-    positive("--patience", args.patience)?;
+    PATIENCE.check(args.patience)?;
     let scene = args.tissue.unwrap_or(Tissue::Inclusion).of(&args.world.scene()?);
     let simulation = args.world.simulation(&scene)?;
+    let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).collect();
+    check_outputs(&inputs, &[("--json", args.json.as_deref())])?;
     let (model, _) = discretise(&scene)?;
     let paddle = match args.paddle {
         Some(index) => index,

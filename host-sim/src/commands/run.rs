@@ -1,6 +1,6 @@
 //! `host-sim run`: the main job.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
@@ -18,8 +18,9 @@ use host_sim::runtime::signals;
 use host_sim::view::{self, Basis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
 
+use super::outputs::check_json_beside_report;
 use super::progress::Bar;
-use super::world_args::WorldArgs;
+use super::world_args::{WorldArgs, threads_within_reason};
 
 /// Options of `run`.
 #[derive(Args, Clone, Debug)]
@@ -36,6 +37,9 @@ pub(crate) struct RunArgs {
     /// Controller table to use instead of computing one
     #[arg(long, value_name = "FILE", conflicts_with = "table_tissue")]
     pub(crate) table: Option<PathBuf>,
+    /// Use a table of another scene all the same; the report says so
+    #[arg(long, requires = "table")]
+    pub(crate) allow_other_scene: bool,
     /// What drives time [default: lockstep, then the dynamic strategy once more in free-run]
     #[arg(long, value_enum)]
     pub(crate) mode: Option<RunMode>,
@@ -78,11 +82,12 @@ impl RunArgs {
         options.tissue = self.tissue;
         options.table_tissue = self.table_tissue;
         options.table.clone_from(&self.table);
+        options.allow_other_scene = self.allow_other_scene;
         options.mode = self.mode;
         options.hardware = self.hardware;
         options.scalar = self.scalar;
         options.extras = Extras { mcap: self.mcap, vtu: self.vtu };
-        options.threads = self.threads.unwrap_or(options.threads).max(1);
+        options.threads = self.threads.map_or(options.threads, threads_within_reason);
         Ok(options)
     }
 }
@@ -96,6 +101,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     let scene = args.world.scene()?;
     let simulation = args.world.simulation(&scene)?;
     check_directory(&args.out)?;
+    let inputs: Vec<&Path> = args.table.iter().chain(&args.world.scene).map(PathBuf::as_path).collect();
+    check_json_beside_report(&inputs, args.json.as_deref(), &args.out)?;
     let bar = Bar::new(args.quiet);
     let comparison = Comparison::prepare(scene, simulation, args.options()?, &bar)?;
     let view = args.view.then(|| live_view(args, &simulation.loop_settings)).transpose()?;

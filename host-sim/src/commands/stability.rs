@@ -13,6 +13,7 @@ use host_sim::report::stability::{csv, figure, summary};
 use model_offline::scene::Scene;
 
 use super::progress::Bar;
+use super::world_args::threads_within_reason;
 
 /// Parts of the simulation.
 const PARTS: u64 = 3;
@@ -46,7 +47,8 @@ pub(crate) fn stability(args: &StabilityArgs) -> Result<(), SimError> {
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
     let bar = Bar::new(args.quiet);
     bar.begin(PARTS);
-    let threads = args.threads.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, usize::from)).max(1);
+    let all = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = threads_within_reason(args.threads.unwrap_or_else(all));
     let resolution = if args.quick { Resolution::Quick } else { Resolution::Fine };
     let result = simulate(&scene, resolution, threads, &|| bar.step())?;
     bar.finish();

@@ -12,7 +12,12 @@ use host_sim::report::timing_summary::timing_summary;
 use host_sim::runtime::clock::FIFO_PRIORITY;
 use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::signals;
-use host_sim::world::error::positive;
+use host_sim::world::error::OptionRange;
+
+use super::outputs::check_outputs;
+
+const RATE: OptionRange = OptionRange::new("--rate", 0.1, 1e5, " Hz");
+const SECONDS: OptionRange = OptionRange::new("--seconds", 0.01, 86_400.0, " s");
 
 /// Options of `timing`.
 #[derive(Args, Clone, Debug)]
@@ -46,11 +51,20 @@ pub(crate) struct TimingArgs {
 /// [`SimError`].
 pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     signals::install();
-    positive("--rate", args.rate)?;
-    positive("--seconds", args.seconds)?;
+    RATE.check(args.rate)?;
+    SECONDS.check(args.seconds)?;
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    if let Some(cpu) = args.cpu
+        && cpu >= processors
+    {
+        return Err(SimError::Usage(format!("--cpu {cpu}: this machine has processors 0 to {}", processors - 1)));
+    }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
     }
+    let own = args.out.as_ref().map(|directory| directory.join("timing.json"));
+    let picture = args.out.as_ref().map(|directory| directory.join("timing.svg"));
+    check_outputs(&[], &[("--out", own.as_deref()), ("--out", picture.as_deref()), ("--json", args.json.as_deref())])?;
     let result = measure(&TimingOptions {
         rate: args.rate,
         seconds: args.seconds,

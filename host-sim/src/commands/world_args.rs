@@ -4,11 +4,22 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::world::error::{not_negative, positive};
+use host_sim::world::error::OptionRange;
 use host_sim::world::loop_settings::LoopSettings;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::tissue::PlantChoice;
 use model_offline::scene::Scene;
+
+/// How long a silent peer is waited for.
+pub(super) const PATIENCE: OptionRange = OptionRange::new("--patience", 1e-3, 86_400.0, " s");
+const INSERTION_TIME: OptionRange = OptionRange::new("--insertion-time", 1e-3, 86_400.0, " s");
+const DURATION: OptionRange = OptionRange::new("--duration", 1e-3, 86_400.0, " s");
+const PADDLE_LAG: OptionRange = OptionRange::new("--paddle-lag", 0.0, 6e4, " ms");
+const PADDLE_DELAY: OptionRange = OptionRange::new("--paddle-delay", 0.0, 1e5, " ticks");
+const PADDLE_GAIN: OptionRange = OptionRange::new("--paddle-gain", 0.0, 100.0, "");
+
+/// Ticks of one insertion at most: every one is recorded and kept until the report is written, 300 bytes each.
+const MOST_TICKS: f64 = 1e7;
 
 /// Options of the simulated world.
 #[derive(Args, Clone, Debug)]
@@ -42,6 +53,14 @@ pub(crate) struct WorldArgs {
     pub(crate) paddle_gain: f64,
 }
 
+/// More threads than this help nobody, and starting them may fail.
+const MOST_THREADS: usize = 256;
+
+/// What `--threads` asks for, at least one.
+pub(super) fn threads_within_reason(asked: usize) -> usize {
+    asked.clamp(1, MOST_THREADS)
+}
+
 impl WorldArgs {
     /// Reads the scene.
     ///
@@ -58,12 +77,21 @@ impl WorldArgs {
     /// [`SimError::Usage`] names the option.
     pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
         self.loop_settings.check()?;
-        positive("--insertion-time", self.insertion_time)?;
-        not_negative("--paddle-lag", self.paddle_lag)?;
-        not_negative("--paddle-gain", self.paddle_gain)?;
+        INSERTION_TIME.check(self.insertion_time)?;
+        PADDLE_LAG.check(self.paddle_lag)?;
+        PADDLE_DELAY.check(f64::from(self.paddle_delay))?;
+        PADDLE_GAIN.check(self.paddle_gain)?;
         let mut simulation = Simulation::new(scene).with_insertion(self.insertion_time);
         simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
-        positive("--duration", simulation.duration_s)?;
+        DURATION.check(simulation.duration_s)?;
+        let ticks = simulation.duration_s * self.loop_settings.rate;
+        if ticks > MOST_TICKS {
+            return Err(SimError::Usage(format!(
+                "--duration {} s at --rate {} Hz are {ticks:.0} ticks, at most {MOST_TICKS:.0} are kept; simulate a \
+                 shorter time or a slower loop",
+                simulation.duration_s, self.loop_settings.rate
+            )));
+        }
         simulation.loop_settings = self.loop_settings;
         simulation.actuator.lag_s = self.paddle_lag * 1e-3;
         simulation.actuator.delay_ticks = self.paddle_delay;

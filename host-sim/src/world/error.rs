@@ -34,48 +34,41 @@ pub enum WorldError {
 
 /// A number that an option does not take.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{option} must be {bound}, not {value}")]
+#[error("{option} must be between {least} and {most}{unit}, not {value}")]
 pub struct OutOfRange {
     /// The option, as on the command line.
     pub option: &'static str,
-    /// What it must be.
-    pub bound: Bound,
+    /// The smallest number that it takes.
+    pub least: f64,
+    /// The largest.
+    pub most: f64,
+    /// Unit with a space before it; empty: none.
+    pub unit: &'static str,
     /// What it was.
     pub value: f64,
 }
 
-/// What a number must be.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Bound {
-    /// Above 0.
-    Positive,
-    /// 0 or above.
-    NotNegative,
+/// The numbers that an option takes. Outside of them a number makes no sense, or overflows what it is multiplied with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OptionRange {
+    option: &'static str,
+    least: f64,
+    most: f64,
+    unit: &'static str,
 }
 
-impl std::fmt::Display for Bound {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Positive => "above 0",
-            Self::NotNegative => "0 or above",
-        })
+impl OptionRange {
+    /// Numbers from `least` to `most` in `unit` (with a space before it; empty: none).
+    pub const fn new(option: &'static str, least: f64, most: f64, unit: &'static str) -> Self {
+        Self { option, least, most, unit }
     }
-}
 
-/// Refuses numbers that are not above 0, infinity and NaN.
-///
-/// # Errors
-/// [`OutOfRange`] names the option.
-pub fn positive(option: &'static str, value: f64) -> Result<(), OutOfRange> {
-    let holds = value.is_finite() && value > 0.0;
-    if holds { Ok(()) } else { Err(OutOfRange { option, bound: Bound::Positive, value }) }
-}
-
-/// Refuses negative numbers, infinity and NaN.
-///
-/// # Errors
-/// [`OutOfRange`] names the option.
-pub fn not_negative(option: &'static str, value: f64) -> Result<(), OutOfRange> {
-    let holds = value.is_finite() && value >= 0.0;
-    if holds { Ok(()) } else { Err(OutOfRange { option, bound: Bound::NotNegative, value }) }
+    /// Refuses numbers outside of the range, infinity and NaN.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the option.
+    pub fn check(&self, value: f64) -> Result<(), OutOfRange> {
+        let Self { option, least, most, unit } = *self;
+        if (least..=most).contains(&value) { Ok(()) } else { Err(OutOfRange { option, least, most, unit, value }) }
+    }
 }

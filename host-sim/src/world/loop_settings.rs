@@ -3,10 +3,16 @@
 use clap::Args;
 use firmware::Settings;
 
-use super::error::{OutOfRange, not_negative, positive};
+use super::error::{OptionRange, OutOfRange};
 
 /// Standard deviation of the target sensor when none is given, part of the insertion depth.
 pub const DEFAULT_NOISE_PER_DEPTH: f64 = 1e-4;
+
+/// Rates of the loop: a period of 10 µs is less than a step and an exchange take, and 50 s are no loop any more.
+const RATE: OptionRange = OptionRange::new("--rate", 0.02, 1e5, " Hz");
+const TARGET_RATE: OptionRange = OptionRange::new("--target-rate", 0.02, 1e5, " Hz");
+const LATENCY: OptionRange = OptionRange::new("--latency", 0.0, 6e4, " ms");
+const NOISE: OptionRange = OptionRange::new("--noise", 0.0, 1e6, " length units");
 
 /// Rates, latency and noise of the loop, as command-line options.
 ///
@@ -46,10 +52,10 @@ impl LoopSettings {
     /// # Errors
     /// [`OutOfRange`] names the option.
     pub fn check(&self) -> Result<(), OutOfRange> {
-        positive("--rate", self.rate)?;
-        positive("--target-rate", self.target_rate)?;
-        not_negative("--latency", self.latency)?;
-        not_negative("--noise", self.noise.unwrap_or(0.0))
+        RATE.check(self.rate)?;
+        TARGET_RATE.check(self.target_rate)?;
+        LATENCY.check(self.latency)?;
+        NOISE.check(self.noise.unwrap_or(0.0))
     }
 
     /// Period of the loop, ns.

@@ -3,7 +3,7 @@
 use super::json;
 use model_offline::discretization::DiscretizationError;
 use model_offline::model::ModelError;
-use model_offline::output::OutputError;
+use model_offline::output::{OutputError, OutputRefused};
 use model_offline::scene::{LimitError, Scene, SceneError};
 use model_offline::solver::equilibrium::Failure;
 use model_offline::table::TableBuildError;
@@ -25,6 +25,9 @@ pub(crate) enum CliError {
         /// What to do.
         help: String,
     },
+    /// An output is refused before the work begins.
+    #[error(transparent)]
+    Refused(#[from] OutputRefused),
     /// The table file cannot be used.
     #[error("{}: {reason}", path.display())]
     BadTable {
@@ -69,7 +72,7 @@ impl CliError {
     /// 2 for bad input or usage, 1 for a computation that failed.
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
+            Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
             Self::Model(ModelError::Unsupported(_)) => 2,
             Self::Table(TableBuildError::NoSuchPaddle(_) | TableBuildError::Knots(_)) => 2,
             _ => 1,

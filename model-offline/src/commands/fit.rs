@@ -1,6 +1,6 @@
 //! `model-offline fit`: the smallest model that keeps a tolerance.
 
-use super::common::{SceneArgs, threads_or_all};
+use super::common::{SceneArgs, check_outputs, threads_or_all};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::discretization::Resolution;
@@ -38,6 +38,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
         _ => Resolution::Tolerance(args.tolerance),
     };
     limits::check_tolerance(args.tolerance)?;
+    check_outputs(&args.scene.scene, &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
     let outcome = fit::fit(&scene, args.tolerance, threads_or_all(args.threads))
         .map_err(CliError::from)
         .and_then(|fit| Ok((scene_with(&fit, &args.scene.scene)?, fit)));

@@ -64,6 +64,8 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
             return Err(usage(format!("{} is there already", path.display()), "name another file, or add --force"));
         }
         Some(path) => {
+            let inputs: Vec<&Path> = args.svg.iter().chain(&args.msh).map(PathBuf::as_path).collect();
+            output::check_outputs(&inputs, &[("--output", path)])?;
             output::write_whole(path, text.as_bytes())?;
             println!("{}\nnext: model-offline place {0}", path.display());
         }

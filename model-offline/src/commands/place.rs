@@ -1,6 +1,6 @@
 //! `model-offline place`: the whole placement study.
 
-use super::common::{Common, SceneArgs};
+use super::common::{Common, SceneArgs, check_outputs};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::output;
@@ -27,6 +27,7 @@ pub(super) struct PlaceArgs {
 
 pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
     let scene = args.common.over(args.scene.read()?)?;
+    check_outputs(&args.scene.scene, &[("--json", args.json.as_deref()), ("--table", args.table.as_deref())])?;
     place(&scene, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
 }
 

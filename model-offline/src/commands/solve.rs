@@ -1,6 +1,6 @@
 //! `model-offline solve`: one equilibrium.
 
-use super::common::{Common, SceneArgs, no_such_paddle};
+use super::common::{Common, SceneArgs, check_outputs, no_such_paddle};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::model::{Body, ModelError, TissueModel};
@@ -53,6 +53,8 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     if !args.depth.is_finite() || args.depth < 0.0 {
         return Err(CliError::usage(format!("--depth is {}", args.depth), "give a depth of 0 or more"));
     }
+    let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref()), ("--svg", args.svg.as_deref())];
+    check_outputs(&args.scene.scene, &outputs)?;
     solve(&scene, displacement, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
 }
 

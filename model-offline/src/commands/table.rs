@@ -1,6 +1,6 @@
 //! `model-offline table`: the controller table of one paddle.
 
-use super::common::{Common, SceneArgs};
+use super::common::{Common, SceneArgs, check_outputs};
 use super::error::CliError;
 use model_offline::output::{self, table_text};
 use model_offline::placement::{best_dynamic, discretise};
@@ -26,7 +26,9 @@ pub(super) struct TableArgs {
 }
 
 pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
-    let (model, _) = discretise(&args.common.over(args.scene.read()?)?)?;
+    let scene = args.common.over(args.scene.read()?)?;
+    check_outputs(&args.scene.scene, &[("--output", Some(&args.output))])?;
+    let (model, _) = discretise(&scene)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
     let paddle = args.paddle.map_or_else(|| best_dynamic(&model), Ok)?;
     let table = table::build(&model, paddle, &options)?;

@@ -1,10 +1,13 @@
 //! What the model writes: JSON, VTU, figures. Every file is written whole or not at all.
 
 pub mod chart;
+mod preflight;
 pub mod svg;
 pub mod table_text;
 pub mod terminal;
 pub mod vtu;
+
+pub use preflight::{OutputRefused, RefusalReason, check_outputs};
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

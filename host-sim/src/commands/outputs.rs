@@ -1,0 +1,36 @@
+//! Outputs, checked before the work begins.
+
+use std::path::Path;
+
+use host_sim::SimError;
+use model_offline::output::OutputRefused;
+
+/// Refuses outputs (the option that names each, its path) that cannot be written, that name one file twice, or that name
+/// one of `inputs`.
+///
+/// # Errors
+/// [`SimError::Refused`] names the option and the file.
+pub(super) fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, Option<&Path>)]) -> Result<(), OutputRefused> {
+    let named: Vec<(&'static str, &Path)> =
+        outputs.iter().filter_map(|&(option, path)| Some((option, path?))).collect();
+    model_offline::output::check_outputs(inputs, &named)
+}
+
+/// Refuses a `--json` that lies in the report's directory `out` under a name that the report uses itself. Another name
+/// there is fine, although the directory may not exist yet: it is written after the report.
+///
+/// # Errors
+/// [`SimError::Usage`], [`SimError::Refused`].
+pub(super) fn check_json_beside_report(inputs: &[&Path], json: Option<&Path>, out: &Path) -> Result<(), SimError> {
+    let Some(path) = json.filter(|path| path.parent() == Some(out)) else {
+        return Ok(check_outputs(inputs, &[("--json", json)])?);
+    };
+    let is_json = path.extension().is_some_and(|extension| extension == "json");
+    if is_json && path.file_name().is_some_and(|name| name != "result.json") {
+        return Ok(());
+    }
+    Err(SimError::Usage(format!(
+        "--json {}: the report has a file of that name itself; name another ending in .json",
+        path.display()
+    )))
+}
