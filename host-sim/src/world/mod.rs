@@ -22,29 +22,38 @@ use nalgebra::Vector2;
 
 use self::actuator::PaddleActuator;
 use self::error::WorldError;
-use self::needle::{NeedleMotion, NeedleTrajectory};
+use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{PlantAccount, TissuePlant};
+use self::tissue::{PlantAccount, TissuePlant, TissueResponse};
 use self::truth::Truth;
 
-/// The simulated world. A tick is [`World::advance`], then [`World::encoders`] and [`World::target_samples`], then
-/// [`World::act`].
+/// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
+/// [`World::advance`], then [`World::encoders`] and [`World::target_samples`].
 #[derive(Debug)]
-pub struct World<'m> {
-    tissue: TissuePlant<'m>,
-    actuator: PaddleActuator,
-    /// Index of the attached paddle; 0 without one.
-    paddle_index: u32,
-    trajectory: NeedleTrajectory,
-    needle: NeedleMotion,
+pub struct World<T, N = NeedleTrajectory> {
+    /// The tissue.
+    pub tissue: T,
+    /// The needle's drive.
+    pub drive: N,
+    /// The paddle and its actuator.
+    pub actuator: PaddleActuator,
     target_sensor: TargetSensor,
     encoders: Encoders,
-    duration_ns: u64,
+    needle: NeedleMotion,
     needle_started_ns: Option<u64>,
 }
 
-impl<'m> World<'m> {
+/// What the controller's samples come from.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    /// The target's camera.
+    pub target: TargetSensor,
+    /// Encoders of needle and paddle.
+    pub encoders: Encoders,
+}
+
+impl<'m> World<TissuePlant<'m>> {
     /// Tissue at rest, the needle at its surface, with the paddle of this index attached (or none).
     ///
     /// # Errors
@@ -54,22 +63,32 @@ impl<'m> World<'m> {
             paddle_index.map(|index| model.paddle_position(index).ok_or(WorldError::NoPaddle { index })).transpose()?;
         let depth = simulation.depth;
         let settings = simulation.loop_settings.settings(depth);
-        Ok(Self {
-            tissue: TissuePlant::new(model, position, simulation.plant)?,
-            actuator: PaddleActuator::new(simulation.actuator),
-            paddle_index: paddle_index.unwrap_or(0),
-            trajectory: NeedleTrajectory::new(depth, simulation.insertion_s),
-            needle: NeedleMotion::default(),
-            target_sensor: TargetSensor::new(
+        let tissue = TissuePlant::new(model, position, simulation.plant)?;
+        let drive = NeedleTrajectory::new(depth, simulation.insertion_s);
+        let sensors = Sensors {
+            target: TargetSensor::new(
                 settings.target_period_ns,
                 settings.target_latency_ns,
                 settings.target_noise,
                 simulation.seed,
             ),
-            encoders: Encoders::default(),
-            duration_ns: simulation.duration_ns(),
-            needle_started_ns: None,
-        })
+            encoders: Encoders::new(paddle_index.unwrap_or(0)),
+        };
+        Ok(Self::of(tissue, drive, PaddleActuator::new(simulation.actuator), sensors))
+    }
+
+    /// Which model answered for the tissue, and how well.
+    pub fn plant_account(&mut self) -> PlantAccount {
+        self.tissue.account()
+    }
+}
+
+impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
+    /// A world of these parts, before its first tick.
+    pub fn of(tissue: T, drive: N, actuator: PaddleActuator, sensors: Sensors) -> Self {
+        let Sensors { target, encoders } = sensors;
+        let needle = NeedleMotion::default();
+        Self { tissue, drive, actuator, target_sensor: target, encoders, needle, needle_started_ns: None }
     }
 
     /// The needle starts now. It waits for the controller's RUN, or for nobody without a controller.
@@ -87,29 +106,6 @@ impl<'m> World<'m> {
         self.needle_started_ns.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9)
     }
 
-    /// The needle moves on to this time, and the tissue answers. Returns what is true then.
-    ///
-    /// # Errors
-    /// [`WorldError::Tissue`].
-    pub fn advance(&mut self, tick: u64, time_ns: u64) -> Result<Truth, WorldError> {
-        self.needle = self.trajectory.at(self.since_start_s(time_ns));
-        let (depth, paddle) = (self.needle.depth, self.actuator.position());
-        let target = self.tissue.step(depth, paddle)?;
-        Ok(Truth { tick, time_ns, depth, target: target.into(), paddle: paddle.into() })
-    }
-
-    /// Samples of the needle's and the paddle's encoder.
-    pub fn encoders(&mut self, time_ns: u64) -> (NeedleSample, PaddleSample) {
-        self.encoders.sample(time_ns, self.needle, self.paddle_index, &self.actuator.position())
-    }
-
-    /// The target sensor measures if that is due; returns the samples that arrive at this tick, oldest first.
-    pub fn target_samples(&mut self, truth: &Truth) -> impl Iterator<Item = TargetSample> + '_ {
-        let time_ns = truth.time_ns;
-        self.target_sensor.measure(time_ns, &Vector2::from(truth.target));
-        std::iter::from_fn(move || self.target_sensor.arrived(time_ns))
-    }
-
     /// Time goes on under `command`, if there is one. The first RUN starts the needle.
     pub fn act(&mut self, command: Option<&PaddleCommand>, time_ns: u64, elapsed_ns: u64) {
         if command.is_some_and(|command| command.state == Mode::Run as u32) {
@@ -119,18 +115,26 @@ impl<'m> World<'m> {
         self.actuator.advance(goal, elapsed_ns as f64 * 1e-9);
     }
 
-    /// Whether everything has been simulated.
-    pub fn is_over(&self, time_ns: u64) -> bool {
-        self.needle_started_ns.is_some_and(|started_ns| time_ns >= started_ns + self.duration_ns)
+    /// The needle moves on to this time, and the tissue answers. Returns what is true then.
+    ///
+    /// # Errors
+    /// [`WorldError::Tissue`].
+    pub fn advance(&mut self, tick: u64, time_ns: u64) -> Result<Truth, WorldError> {
+        self.needle = self.drive.motion(self.since_start_s(time_ns));
+        let (depth, paddle) = (self.needle.depth, self.actuator.position());
+        let target = self.tissue.step(depth, paddle)?;
+        Ok(Truth { tick, time_ns, depth, target: target.into(), paddle: paddle.into() })
     }
 
-    /// The tissue.
-    pub fn tissue(&self) -> &TissuePlant<'m> {
-        &self.tissue
+    /// Samples of the needle's and the paddle's encoder.
+    pub fn encoders(&mut self, time_ns: u64) -> (NeedleSample, PaddleSample) {
+        self.encoders.sample(time_ns, self.needle, &self.actuator.position())
     }
 
-    /// Which model answered for the tissue, and how well.
-    pub fn plant_account(&mut self) -> PlantAccount {
-        self.tissue.account()
+    /// The target sensor measures if that is due; returns the samples that arrive at this tick, oldest first.
+    pub fn target_samples(&mut self, truth: &Truth) -> impl Iterator<Item = TargetSample> + '_ {
+        let time_ns = truth.time_ns;
+        self.target_sensor.measure(time_ns, &Vector2::from(truth.target));
+        std::iter::from_fn(move || self.target_sensor.arrived(time_ns))
     }
 }

@@ -12,6 +12,12 @@ pub struct NeedleMotion {
     pub velocity: f64,
 }
 
+/// What moves the needle.
+pub trait NeedleDrive {
+    /// Motion at a time since the start, s (negative: not started). Called once per tick, in order.
+    fn motion(&mut self, since_start_s: f64) -> NeedleMotion;
+}
+
 /// An insertion: constant speed between two short ramps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NeedleTrajectory {
@@ -47,6 +53,12 @@ impl NeedleTrajectory {
         } else {
             (self.depth, 0.0)
         }
+    }
+}
+
+impl NeedleDrive for NeedleTrajectory {
+    fn motion(&mut self, since_start_s: f64) -> NeedleMotion {
+        self.at(since_start_s)
     }
 }
 

@@ -74,15 +74,22 @@ impl TargetSensor {
 }
 
 /// Needle and paddle encoders: a sample per plant tick, exact and without latency.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Encoders {
     sequence: u32,
+    paddle_index: u32,
 }
 
 impl Encoders {
-    /// Encoders whose first samples carry this sequence number.
-    pub fn starting_at(sequence: u32) -> Self {
-        Self { sequence }
+    /// Encoders of the needle and of the paddle of this index.
+    pub fn new(paddle_index: u32) -> Self {
+        Self { sequence: 0, paddle_index }
+    }
+
+    /// The same, whose first samples carry this sequence number.
+    #[must_use]
+    pub fn starting_at(self, sequence: u32) -> Self {
+        Self { sequence, ..self }
     }
 
     /// Samples of one tick.
@@ -90,13 +97,13 @@ impl Encoders {
         &mut self,
         time_ns: u64,
         needle: NeedleMotion,
-        paddle_index: u32,
         paddle: &Vector2<f64>,
     ) -> (NeedleSample, PaddleSample) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         let needle = NeedleSample { sequence, reserved: 0, time_ns, depth: needle.depth, velocity: needle.velocity };
-        let paddle = PaddleSample { sequence, paddle_index, time_ns, displacement: (*paddle).into() };
+        let paddle =
+            PaddleSample { sequence, paddle_index: self.paddle_index, time_ns, displacement: (*paddle).into() };
         (needle, paddle)
     }
 }

@@ -79,7 +79,16 @@ impl Default for PlantAccount {
     }
 }
 
-/// The tissue's answer to needle and paddle.
+/// What answers for the tissue.
+pub trait TissueResponse {
+    /// Takes needle and paddle to where they are now; returns the target displacement, length.
+    ///
+    /// # Errors
+    /// [`WorldError::Tissue`] when there is no equilibrium.
+    fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError>;
+}
+
+/// The tissue of a scene, by the model that was chosen.
 #[derive(Debug)]
 pub struct TissuePlant<'m> {
     model: &'m TissueModel,
@@ -140,36 +149,6 @@ impl<'m> TissuePlant<'m> {
         Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account })
     }
 
-    /// Takes needle and paddle to where they are now; returns the target displacement.
-    ///
-    /// # Errors
-    /// [`WorldError::Tissue`] when there is no equilibrium.
-    pub fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
-        self.at = (depth, paddle);
-        match &mut self.kind {
-            Kind::Full(body) => drive(body, depth, paddle),
-            Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
-            Kind::Reduced { body, full: behind, full_answers } => match body.drive(depth, paddle) {
-                Ok(()) => {
-                    *full_answers = false;
-                    let largest = self.account.largest_estimate.get_or_insert(0.0);
-                    *largest = largest.max(body.error_estimate());
-                    Ok(body.target_displacement())
-                }
-                Err(invalid) => {
-                    self.account.fallbacks += 1;
-                    self.account.first_fallback.get_or_insert_with(|| invalid.to_string());
-                    *full_answers = true;
-                    let body = match behind {
-                        Some(body) => body,
-                        None => behind.insert(full(self.model, self.paddle)?),
-                    };
-                    drive(body, depth, paddle)
-                }
-            },
-        }
-    }
-
     /// The coefficients behind the present state, where the model has them (the condensed one has not).
     pub fn copy_coefficients(&self, into: &mut Vec<f64>) {
         into.clear();
@@ -221,6 +200,34 @@ impl<'m> TissuePlant<'m> {
         let mut body = full(self.model, self.paddle)?;
         drive(&mut body, self.at.0, self.at.1)?;
         Ok(body)
+    }
+}
+
+impl TissueResponse for TissuePlant<'_> {
+    fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+        self.at = (depth, paddle);
+        match &mut self.kind {
+            Kind::Full(body) => drive(body, depth, paddle),
+            Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
+            Kind::Reduced { body, full: behind, full_answers } => match body.drive(depth, paddle) {
+                Ok(()) => {
+                    *full_answers = false;
+                    let largest = self.account.largest_estimate.get_or_insert(0.0);
+                    *largest = largest.max(body.error_estimate());
+                    Ok(body.target_displacement())
+                }
+                Err(invalid) => {
+                    self.account.fallbacks += 1;
+                    self.account.first_fallback.get_or_insert_with(|| invalid.to_string());
+                    *full_answers = true;
+                    let body = match behind {
+                        Some(body) => body,
+                        None => behind.insert(full(self.model, self.paddle)?),
+                    };
+                    drive(body, depth, paddle)
+                }
+            },
+        }
     }
 }
 

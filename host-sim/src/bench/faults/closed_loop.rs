@@ -16,17 +16,16 @@ use super::audit::Audit;
 use super::fault::{Event, Fault, Stream};
 use super::invariants::Invariants;
 use super::seam::{Channel, see};
+use super::shuttle::ShuttleDrive;
 use super::tissue::LinearTissue;
 use crate::runtime::tick::ControllerTick;
 use crate::world::actuator::{ActuatorModel, PaddleActuator};
 use crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH;
-use crate::world::needle::NeedleMotion;
 use crate::world::sensors::{Encoders, TargetSensor};
+use crate::world::{Sensors, World};
 
 /// Part of a period that a healthy step takes.
 const HEALTHY_STEP: f64 = 0.1;
-/// Time in which the needle's drive reaches the largest speed of the table, s.
-const NEEDLE_RAMP_S: f64 = 0.1;
 /// Stream of the generator for the faults' own noise.
 const FAULT_STREAM: u128 = 7;
 
@@ -73,6 +72,23 @@ impl Setup {
     }
 }
 
+impl Setup {
+    /// Plant, needle, actuator and sensors of this set-up.
+    fn world<'t>(&self, table: &'t Table<f64, 2>) -> World<LinearTissue<'t>, ShuttleDrive> {
+        let settings = &self.settings;
+        let period_s = settings.loop_period_ns as f64 * 1e-9;
+        let drive = ShuttleDrive::new(table, self.depth_end, self.speed, period_s);
+        let drive = if self.shuttles { drive.to_and_fro() } else { drive };
+        let actuator = PaddleActuator::at(self.actuator, Vector2::from(self.paddle));
+        let (period_ns, latency_ns) = (settings.target_period_ns, settings.target_latency_ns);
+        let sensors = Sensors {
+            target: TargetSensor::new(period_ns, latency_ns, self.noise, self.seed),
+            encoders: Encoders::new(table.paddle.index).starting_at(self.sequence),
+        };
+        World::of(LinearTissue::new(table), drive, actuator, sensors)
+    }
+}
+
 /// What the controller's traits see of the bench.
 #[derive(Debug, Default)]
 struct Link {
@@ -106,7 +122,6 @@ impl CommandSink for Link {
 #[derive(Debug)]
 pub struct ClosedLoop<'t> {
     setup: Setup,
-    table: &'t Table<f64, 2>,
     controller: Controller<'t, f64>,
     /// State of the controller.
     pub state: State<f64>,
@@ -114,13 +129,7 @@ pub struct ClosedLoop<'t> {
     events: Vec<Event>,
     active: Vec<Fault>,
     tick: u64,
-    tissue: LinearTissue<'t>,
-    depth: f64,
-    velocity: f64,
-    direction: f64,
-    paddle: PaddleActuator,
-    encoders: Encoders,
-    target_sensor: TargetSensor,
+    world: World<LinearTissue<'t>, ShuttleDrive>,
     random: Pcg64,
     link: Link,
     /// Commands on their way, with the time when the step that gave them has ended, ns.
@@ -154,24 +163,12 @@ impl<'t> ClosedLoop<'t> {
         let controller = Controller::new(table, settings)?;
         Ok(Self {
             controller,
-            table,
             state: State::new(),
             schedule: Schedule::new(0, settings.loop_period_ns),
             events: Vec::new(),
             active: Vec::new(),
             tick: 0,
-            tissue: LinearTissue::new(table),
-            depth: table.validity.depth_start,
-            velocity: 0.0,
-            direction: 1.0,
-            paddle: PaddleActuator::at(setup.actuator, Vector2::from(setup.paddle)),
-            encoders: Encoders::starting_at(setup.sequence),
-            target_sensor: TargetSensor::new(
-                settings.target_period_ns,
-                settings.target_latency_ns,
-                setup.noise,
-                setup.seed,
-            ),
+            world: setup.world(table),
             random: Pcg64::new(u128::from(setup.seed), FAULT_STREAM),
             link: Link::default(),
             on_their_way: VecDeque::new(),
@@ -200,17 +197,17 @@ impl<'t> ClosedLoop<'t> {
 
     /// Depth of the needle, length.
     pub fn depth(&self) -> f64 {
-        self.depth
+        self.world.drive.depth()
     }
 
     /// Where the paddle is, length.
     pub fn paddle(&self) -> Vector2<f64> {
-        self.paddle.position()
+        self.world.actuator.position()
     }
 
     /// The tissue.
     pub fn tissue(&mut self) -> &mut LinearTissue<'t> {
-        &mut self.tissue
+        &mut self.world.tissue
     }
 
     /// Loop gain g in use.
@@ -277,13 +274,13 @@ impl<'t> ClosedLoop<'t> {
         let period_s = self.setup.settings.loop_period_ns as f64 * 1e-9;
         let mut actuator = self.setup.actuator;
         let (mut speed, mut stuck) = (1.0, false);
-        self.tissue.gain = 1.0;
+        self.world.tissue.gain = 1.0;
         for fault in &self.active {
             match *fault {
                 Fault::Stuck => stuck = true,
                 Fault::ActuatorGain(gain) => actuator.gain = gain,
-                Fault::TissueGain(gain) => self.tissue.gain = gain,
-                Fault::Push(rate) => self.tissue.push += rate * period_s,
+                Fault::TissueGain(gain) => self.world.tissue.gain = gain,
+                Fault::Push(rate) => self.world.tissue.push += rate * period_s,
                 Fault::NeedleSpeed(factor) => speed = factor,
                 Fault::WallClock(by_ns) => self.wall_offset_ns = by_ns,
                 _ => continue,
@@ -297,38 +294,23 @@ impl<'t> ClosedLoop<'t> {
             command = Some(*sent);
             self.on_their_way.pop_front();
         }
-        self.paddle.set_gain(actuator.gain);
+        self.world.actuator.set_gain(actuator.gain);
         if !stuck {
             let goal = command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(command.displacement));
-            self.paddle.advance(goal, period_s);
+            self.world.actuator.advance(goal, period_s);
         }
-        self.drive_needle(speed, period_s);
-    }
-
-    /// The needle starts with the first RUN, as in a real insertion.
-    fn drive_needle(&mut self, factor: f64, period_s: f64) {
-        let (start, end) = (self.table.validity.depth_start, self.setup.depth_end);
-        let started = self.audit.modes[Mode::Run as usize - 1] > 0;
-        let mut setpoint = if started { self.setup.speed * factor * self.direction } else { 0.0 };
-        let slowing = self.table.validity.needle_speed / NEEDLE_RAMP_S;
-        // The drive knows where it ends, and is at rest there.
-        let left = if setpoint > 0.0 { end - self.depth } else { self.depth - start }.max(0.0);
-        if left < 1e-3 * (end - start) && self.setup.shuttles && setpoint * self.direction > 0.0 {
-            self.direction = -self.direction;
+        self.world.drive.hurry = speed;
+        // The needle starts with the first RUN, as in a real insertion.
+        if self.audit.modes[Mode::Run as usize - 1] > 0 {
+            self.world.start_needle(time_ns);
         }
-        let stoppable = (1.8 * slowing * left).sqrt();
-        setpoint = setpoint.clamp(-stoppable, stoppable);
-        let change = slowing * period_s;
-        let before = self.velocity;
-        self.velocity += (setpoint - before).clamp(-change, change);
-        self.depth = (self.depth + 0.5 * (before + self.velocity) * period_s).clamp(start, end);
     }
 
     /// Measures, and lets the seam pass what arrives.
     fn sense(&mut self, time_ns: u64) {
-        let position = self.paddle.position();
-        let target = self.tissue.target(self.depth, &position);
-        self.error = self.tissue.error(&target);
+        // A linear tissue always has an answer.
+        let Ok(truth) = self.world.advance(self.tick, time_ns) else { return };
+        self.error = self.world.tissue.error(&Vector2::from(truth.target));
         self.max_error = self.max_error.max(self.error.abs());
         let stopped = self.active.contains(&Fault::PeerStopped);
         let (mut needle, mut paddle, mut seen) = (None, None, None);
@@ -340,16 +322,10 @@ impl<'t> ClosedLoop<'t> {
                 _ => None,
             });
             self.injected += u64::from(identity.is_some());
-            let index = identity.unwrap_or(self.table.paddle.index);
-            let samples = self.encoders.sample(
-                time_ns,
-                NeedleMotion { depth: self.depth, velocity: self.velocity },
-                index,
-                &position,
-            );
-            (needle, paddle) = (Some(samples.0), Some(samples.1));
-            self.target_sensor.measure(time_ns, &target);
-            seen = self.target_sensor.arrived(time_ns);
+            let (from_needle, mut from_paddle) = self.world.encoders(time_ns);
+            from_paddle.paddle_index = identity.unwrap_or(from_paddle.paddle_index);
+            (needle, paddle) = (Some(from_needle), Some(from_paddle));
+            seen = self.world.target_samples(&truth).next();
             if let Some(sample) = &mut seen {
                 self.injected += see(sample, &self.active, &mut self.random);
             }

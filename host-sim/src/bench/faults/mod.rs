@@ -18,4 +18,5 @@ pub mod random;
 pub mod report;
 pub(crate) mod rows;
 pub mod seam;
+pub mod shuttle;
 pub mod tissue;

@@ -3,6 +3,9 @@
 use firmware::contract::Table;
 use nalgebra::{Matrix2, Vector2};
 
+use crate::world::error::WorldError;
+use crate::world::tissue::TissueResponse;
+
 /// Target displacement y(z, u) = y_path(z) + J(z)·(G·R·u − u_path(z)) + n·push, exact on the path for G·R = 1.
 #[derive(Clone, Copy, Debug)]
 pub struct LinearTissue<'t> {
@@ -34,5 +37,11 @@ impl<'t> LinearTissue<'t> {
     /// What the controller is to keep at 0, length.
     pub fn error(&self, target: &Vector2<f64>) -> f64 {
         self.table.orthogonal.dot(target)
+    }
+}
+
+impl TissueResponse for LinearTissue<'_> {
+    fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+        Ok(self.target(depth, &paddle))
     }
 }

@@ -8,7 +8,7 @@ use crate::bench::result::{Frame, SeriesPoint, StrategyResult};
 use crate::record::export;
 use crate::runtime::mode::RunMode;
 use crate::runtime::plant::PlantLoop;
-use crate::world::tissue::{PlantChoice, TissuePlant};
+use crate::world::tissue::{PlantChoice, TissuePlant, TissueResponse as _};
 use crate::world::truth::Truth;
 use model_offline::output::table_text::hex;
 
@@ -28,7 +28,7 @@ pub(super) fn measure(
     seed: u64,
 ) -> StrategyResult {
     let plant_account = plant.world().plant_account();
-    let deformed_nodes = plant.world().tissue().deformed_nodes();
+    let deformed_nodes = plant.world().tissue.deformed_nodes();
     let started_ns = plant.world().needle_started_ns().unwrap_or(0);
     let needle = &model.scene().needle;
     let (normal, axis) = (needle.orthogonal(), needle.axis);

@@ -18,12 +18,14 @@ use crate::exchange::{LinkError, PlantPorts};
 use crate::world::World;
 use crate::world::error::WorldError;
 use crate::world::simulation::{LONGEST_WAIT_FOR_RUN_NS, Simulation};
+use crate::world::tissue::TissuePlant;
 use crate::world::truth::Truth;
 
 /// A world in a loop, with everything that is kept of it.
 #[derive(Debug)]
 pub struct PlantLoop<'m> {
-    world: World<'m>,
+    world: World<TissuePlant<'m>>,
+    duration_ns: u64,
     truths: Vec<Truth>,
     first_ns: Option<u64>,
     solving: Duration,
@@ -32,9 +34,10 @@ pub struct PlantLoop<'m> {
 
 impl<'m> PlantLoop<'m> {
     /// A world before its first tick.
-    pub fn new(world: World<'m>, simulation: &Simulation) -> Self {
+    pub fn new(world: World<TissuePlant<'m>>, simulation: &Simulation) -> Self {
         let truths = Vec::with_capacity(simulation.ticks() as usize);
-        Self { world, truths, first_ns: None, solving: Duration::ZERO, observer: None }
+        let duration_ns = simulation.duration_ns();
+        Self { world, duration_ns, truths, first_ns: None, solving: Duration::ZERO, observer: None }
     }
 
     /// Somebody looks on from now.
@@ -43,7 +46,7 @@ impl<'m> PlantLoop<'m> {
     }
 
     /// The world.
-    pub fn world(&mut self) -> &mut World<'m> {
+    pub fn world(&mut self) -> &mut World<TissuePlant<'m>> {
         &mut self.world
     }
 
@@ -59,7 +62,7 @@ impl<'m> PlantLoop<'m> {
         self.solving += before.elapsed();
         if let Some(observer) = &mut self.observer {
             let moment = Moment { truth, time_s: self.world.since_start_s(time_ns), began_ns };
-            observer.offer(self.world.tissue(), &moment);
+            observer.offer(&self.world.tissue, &moment);
         }
         self.truths.push(truth);
         Ok(truth)
@@ -100,7 +103,9 @@ impl<'m> PlantLoop<'m> {
 
     /// Whether everything has been simulated, or whoever looks on has seen enough.
     pub fn is_over(&self, time_ns: u64) -> bool {
-        self.world.is_over(time_ns) || self.observer.as_ref().is_some_and(|observer| observer.ends_early())
+        let started_ns = self.world.needle_started_ns();
+        started_ns.is_some_and(|started_ns| time_ns >= started_ns + self.duration_ns)
+            || self.observer.as_ref().is_some_and(|observer| observer.ends_early())
     }
 
     /// Between two ticks of lockstep: whoever looks on may hold time.
