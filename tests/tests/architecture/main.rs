@@ -1,0 +1,135 @@
+//! The rooms of the three crates, read from their sources: no file needs itself back through others, nor does any
+//! folder, and functions fit a screen.
+
+mod cycles;
+mod functions;
+mod imports;
+mod source;
+
+use source::Crate;
+use std::path::{Path, PathBuf};
+
+/// The sources of a crate of the workspace.
+fn src(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join(name).join("src")
+}
+
+fn assert_no_circles(name: &str) {
+    let read = Crate::read(&src(name));
+    assert!(read.files.len() > 10, "{name}: only {} files found", read.files.len());
+    let found = [cycles::between_files(&read), cycles::between_siblings(&read)].concat();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+fn assert_functions_fit(name: &str) {
+    let found = functions::too_large(&src(name));
+    assert!(found.is_empty(), "{name}:\n{}", found.join("\n"));
+}
+
+#[test]
+fn no_imports_of_host_sim_run_in_a_circle() {
+    assert_no_circles("host-sim");
+}
+
+#[test]
+fn functions_of_firmware_fit_a_screen() {
+    assert_functions_fit("firmware");
+}
+
+/// A crate in a directory of its own: paths and texts.
+fn planted(files: &[(&str, &str)]) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    for (path, text) in files {
+        let path = directory.path().join(path);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+    directory
+}
+
+fn found_in(files: &[(&str, &str)]) -> (Vec<String>, Vec<String>) {
+    let directory = planted(files);
+    let read = Crate::read(directory.path());
+    (cycles::between_files(&read), cycles::between_siblings(&read))
+}
+
+#[test]
+fn a_planted_circle_of_files_is_found_with_its_imports() {
+    let (files, modules) = found_in(&[
+        ("lib.rs", "mod first; mod second;"),
+        ("first.rs", "use crate::second::Second;\npub struct First(Second);"),
+        ("second.rs", "pub struct Second;\npub fn back() { super::first::forth() }"),
+    ]);
+    assert_eq!((files.len(), modules.len()), (1, 1), "{files:?} {modules:?}");
+    for name in ["first.rs:1: crate::second::Second", "second.rs:2: super::first::forth"] {
+        assert!(files[0].contains(name) && modules[0].contains(name), "{files:?} {modules:?}");
+    }
+}
+
+#[test]
+fn a_planted_circle_is_found_behind_reexports_aliases_globs_and_macros() {
+    for import in [
+        "use crate::high::Top;",
+        "use crate::high as above; pub fn f() { above::Top::new(); }",
+        "pub fn f() { println!(\"{:?}\", crate::high::Top); }",
+        "use crate::high::*;",
+        "use crate::{high::{self, Top}};",
+        "#[derive(Debug)] pub struct S { #[serde(default = \"crate::high::top\")] pub s: u8 }",
+    ] {
+        let low = format!("{import}\npub struct Bottom;");
+        let (files, modules) = found_in(&[
+            ("lib.rs", "pub mod high; pub mod low;"),
+            ("high/mod.rs", "mod inner;\npub use inner::{Top, top};"),
+            ("high/inner.rs", "use crate::low::Bottom;\npub struct Top(Bottom);\npub fn top() -> u8 { 0 }"),
+            ("low.rs", &low),
+        ]);
+        assert_eq!(modules.len(), 1, "{import}");
+        // A glob import names nothing, so that only the modules are known.
+        assert!(files.len() == 1 || import.contains('*'), "{import}: {files:?}");
+    }
+}
+
+#[test]
+fn siblings_that_reach_each_other_through_the_folder_they_are_in_are_found() {
+    let (files, _) = found_in(&[
+        ("lib.rs", "mod folder;"),
+        ("folder/mod.rs", "mod left; mod right; pub use left::Left; pub use right::Right;"),
+        ("folder/left.rs", "use super::Right; pub struct Left(Right);"),
+        ("folder/right.rs", "use super::Left; pub struct Right(Option<Box<Left>>);"),
+    ]);
+    assert_eq!(files.len(), 1, "{files:?}");
+}
+
+#[test]
+fn children_tests_and_other_crates_make_no_circle() {
+    let (files, modules) = found_in(&[
+        ("lib.rs", "mod parent; mod other;\n#[cfg(test)] mod support;"),
+        ("parent/mod.rs", "mod child; pub struct Parent(child::Child);"),
+        ("parent/child.rs", "use super::Parent; pub struct Child(Option<Box<Parent>>);"),
+        ("other.rs", "use crate::parent::Parent; use std::fmt::Debug; pub struct Other(Parent);"),
+        ("support.rs", "use crate::other::Other;"),
+    ]);
+    assert!(files.is_empty() && modules.is_empty(), "{files:?} {modules:?}");
+    let (files, _) = found_in(&[
+        ("lib.rs", "mod first; mod second;"),
+        ("first.rs", "#[cfg(test)] mod tests { use crate::second::Second; }\npub struct First;"),
+        ("second.rs", "use crate::first::First;\npub struct Second(First);"),
+    ]);
+    assert!(files.is_empty(), "{files:?}");
+}
+
+#[test]
+fn planted_functions_that_are_too_large_are_found() {
+    let long = format!("impl S {{ fn long(&self) {{\n{}}} }}", "    let _ = 0;\n".repeat(80));
+    let directory = planted(&[
+        (
+            "lib.rs",
+            "pub fn wide(a: u8, b: u8, c: u8, d: u8, e: u8, f: u8) {}\npub fn five(a: u8, b: u8, c: u8, d: u8, e: u8) {}",
+        ),
+        ("long.rs", &long),
+    ]);
+    let found = functions::too_large(directory.path());
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(found[0].contains("lib.rs:1: wide has 6 parameters"), "{found:?}");
+    assert!(found[1].contains("long.rs:1: long has 82 lines"), "{found:?}");
+}
