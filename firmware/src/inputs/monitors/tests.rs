@@ -6,6 +6,7 @@ use std::vec::Vec;
 use super::*;
 use crate::contract::example::table;
 use crate::detection::{BUCKET_EVENT, FOLLOWING_FRACTION, FOLLOWING_SAMPLES, MAX_SUCCESSIVE_OVERRUNS};
+use crate::inputs::sample::Measurement;
 use crate::settings::{Runtime, Settings};
 
 /// Uniform numbers in 0..1: the 64-bit generator of Knuth's MMIX, upper 53 bits.
@@ -114,4 +115,246 @@ fn following_error_over_noise() {
     assert!(!trips(0.0, 0.5 * tolerance, 200_000));
     assert!((0..1000).all(|_| trips(2.0 * tolerance, 0.5 * tolerance, 40)));
     assert!((0..1000).all(|_| trips(2.0 * tolerance, 2.0 * tolerance, 200)));
+}
+
+const MS: u64 = 1_000_000;
+
+/// The table of the examples: depth range 0.1, paddle range 0.05 at 0.1 per second, ‖J‖ = 0.3964, target slope 0.102.
+fn runtime(settings: &Settings) -> Runtime<f64> {
+    Runtime::new(&table(), settings).unwrap()
+}
+
+fn settings() -> Settings {
+    Settings::new(MS, 20 * MS, 20 * MS)
+}
+
+fn sample(tick: u64, values: [f64; 2]) -> Measurement {
+    Measurement { sequence: tick as u32, time_ns: tick * MS, values }
+}
+
+/// The largest value, to 1 part in 10⁹, that `passes` lets through, between 0 and `most`.
+fn threshold(most: f64, passes: impl Fn(f64) -> bool) -> f64 {
+    assert!(passes(0.0) && !passes(most));
+    let (mut low, mut high) = (0.0, most);
+    while high - low > 1e-9 * most {
+        let middle = 0.5 * (low + high);
+        *(if passes(middle) { &mut low } else { &mut high }) = middle;
+    }
+    low
+}
+
+fn close(found: f64, expected: f64) {
+    assert!((found - expected).abs() <= 1e-6 * expected.abs(), "{found} instead of {expected}");
+}
+
+#[test]
+fn the_gate_is_noise_and_three_times_the_motion_since_the_delay() {
+    let slope = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt();
+    let jacobian = (0.3f64.powi(2) + 0.05f64.powi(2) + 0.04f64.powi(2) + 0.25f64.powi(2)).sqrt();
+    // Largest target displacement: static, at the end. Plausible: three times that and what the paddle can do.
+    let range = 3.0 * 0.1 * slope + jacobian * 0.05;
+    for (noise, floor) in [(0.0, 0.01), (1e-4, 0.002)] {
+        // A delay of 1 sample: motion since the arrival of the second sample before the last one counts.
+        let runtime = runtime(&Settings { target_noise: noise, ..settings() });
+        let mut gate = InnovationGate::default();
+        for (needle, paddle) in [(0.5, 0.5), (0.01, 0.0), (0.0, 0.02), (0.003, 0.001)] {
+            gate.travel.needle += needle;
+            gate.travel.paddle += paddle;
+            gate.accept();
+        }
+        gate.travel.needle += 0.004;
+        let gate_width = threshold(1.0, |jump| gate.check(&runtime, &[0.0, 1.0], &[jump, 1.0]).is_ok());
+        let motion = slope * (0.003 + 0.004) + jacobian * 0.001 + slope * 0.0 + jacobian * 0.02;
+        close(gate_width, 8.0 * 2f64.sqrt() * noise + 3.0 * motion + floor * range);
+    }
+}
+
+#[test]
+fn the_gate_reaches_back_no_further_than_it_remembers() {
+    let far = Settings { target_latency_ns: 640 * MS, ..settings() };
+    let runtime = runtime(&far);
+    let mut gate = InnovationGate::default();
+    for _ in 0..20 {
+        gate.travel.needle += 0.001;
+        gate.accept();
+    }
+    let slope = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt();
+    let width = threshold(1.0, |jump| gate.check(&runtime, &[0.0; 2], &[jump, 0.0]).is_ok());
+    close(width, 3.0 * slope * 0.007 + 0.01 * runtime.target_range);
+}
+
+/// Errors of a loop of gain 0.25: those that grow past twice their start and twice the floor, while the corrections
+/// should have removed the floor.
+#[test]
+fn divergence_needs_growth_and_corrections() {
+    let runtime = runtime(&settings());
+    assert_eq!(runtime.gain, 0.25);
+    let floor = 0.01 * runtime.target_range;
+    let trips = |errors: &[f64], speed: f64| {
+        let mut monitor = DivergenceMonitor::default();
+        errors.iter().position(|error| monitor.update(&runtime, *error, speed))
+    };
+    // Start at 1.1 floors: predicted after k samples is the sum of a quarter of each.
+    assert_eq!(trips(&[1.1 * floor, 1.6 * floor, 1.9 * floor, 2.3 * floor], 0.0), Some(3));
+    assert_eq!(trips(&[1.1 * floor, -1.6 * floor, 1.9 * floor, -2.3 * floor], 0.0), Some(3), "of either sign");
+    assert_eq!(trips(&[1.1 * floor, 1.6 * floor, 1.9 * floor, 2.1 * floor], 0.0), None, "less than twice its start");
+    assert_eq!(trips(&[0.5 * floor, 0.9 * floor, 1.2 * floor, 1.9 * floor], 0.0), None, "less than twice the floor");
+    assert_eq!(trips(&[1.1 * floor, 1.0 * floor, 2.3 * floor], 0.0), None, "a smaller one begins a new window");
+    assert_eq!(trips(&[1.1 * floor, 2.3 * floor], 0.0), None, "the corrections have not removed the floor yet");
+    // A window ends after 3/g = 12 samples: slow growth is drift.
+    let slow: Vec<f64> = (0..60).map(|i| floor * 1.02f64.powi(i)).collect();
+    assert_eq!(trips(&slow, 0.0), None);
+    let fast: Vec<f64> = (0..60).map(|i| floor * 1.1f64.powi(i)).collect();
+    assert!(trips(&fast, 0.0).is_some());
+    // With a needle that moves the lag counts: slope·speed·(d + 1/g)·T = 0.102·0.1·5·0.02.
+    let lag = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt() * 0.1 * 5.0 * 0.02;
+    assert!(lag > 2.0 * floor);
+    assert_eq!(trips(&[1.1 * floor, 1.6 * floor, 1.9 * floor, 2.3 * floor], 0.1), None);
+    let grown = [1.1 * lag, 1.6 * lag, 1.9 * lag, 2.3 * lag];
+    assert_eq!(trips(&grown, -0.1), Some(3));
+    // And the noise of a sensor that states it, eight deviations.
+    let noisy = self::runtime(&Settings { target_noise: floor, ..settings() });
+    let mut monitor = DivergenceMonitor::default();
+    assert!(![1.1, 1.6, 1.9, 2.3].iter().any(|part| monitor.update(&noisy, part * floor, 0.0)));
+    assert!([8.1, 12.0, 14.0, 17.0].iter().any(|part| monitor.update(&noisy, part * floor, 0.0)));
+}
+
+#[test]
+fn the_peak_speed_of_the_needle_is_remembered() {
+    let runtime = runtime(&settings());
+    let lag = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt() * 0.1 * 5.0 * 0.02;
+    let mut monitor = DivergenceMonitor::default();
+    monitor.update(&runtime, 0.0, -0.1);
+    let below = [0.6, 0.9, 1.2, 1.5, 1.8];
+    assert!(!below.iter().any(|part| monitor.update(&runtime, part * lag, 0.0)));
+}
+
+#[test]
+fn a_frozen_value_is_the_fifth_alike_after_the_followed_thing_has_left() {
+    let value = |tick| sample(tick, [0.3, 0.4]);
+    let mut monitor = FrozenMonitor::default();
+    monitor.accept(&value(0), None, &[0.0; 2]);
+    for tick in 1..5 {
+        let (now, before) = (value(tick), value(tick - 1));
+        assert_eq!(monitor.check(&now, Some(&before), &[9.0, 0.0], 1.0), Ok(()), "sample {tick}");
+        monitor.accept(&now, Some(&before), &[1.0, 0.0]);
+    }
+    let check = |followed: f64| monitor.check(&value(5), Some(&value(4)), &[followed, 0.0], 1.0);
+    close(threshold(9.0, |beyond| check(1.0 + beyond).is_ok()), 1.0);
+    assert!(check(2.1).is_err());
+    assert_eq!(monitor.check(&sample(5, [0.3, 0.5]), Some(&value(4)), &[9.0, 0.0], 1.0), Ok(()), "it changes");
+    monitor.accept(&sample(5, [0.3, 0.5]), Some(&value(4)), &[9.0, 0.0]);
+    assert_eq!(monitor.check(&sample(6, [0.3, 0.5]), Some(&sample(5, [0.3, 0.5])), &[0.0; 2], 1.0), Ok(()));
+}
+
+#[test]
+fn a_resolution_is_the_smallest_change_between_its_bounds() {
+    let mut resolution = Resolution::default();
+    close(resolution.unseen_motion(2.0), 4.0 * 0.025 * 2.0);
+    resolution.accept(&sample(0, [0.3, 0.4]), None);
+    resolution.accept(&sample(1, [0.3, 0.4]), Some(&sample(0, [0.3, 0.4])));
+    close(resolution.unseen_motion(2.0), 4.0 * 0.025 * 2.0);
+    resolution.accept(&sample(2, [0.33, 0.44]), Some(&sample(1, [0.3, 0.4])));
+    close(resolution.unseen_motion(4.0), 4.0 * 0.05);
+    resolution.accept(&sample(3, [0.5, 0.44]), Some(&sample(2, [0.33, 0.44])));
+    close(resolution.unseen_motion(4.0), 4.0 * 0.05);
+    resolution.accept(&sample(4, [0.5, 0.44 + 1e-9]), Some(&sample(3, [0.5, 0.44])));
+    close(resolution.unseen_motion(4.0), 4.0 * 0.0005 * 4.0);
+}
+
+#[test]
+fn contradictions_of_the_needle_are_measured_over_a_window() {
+    let runtime = runtime(&settings());
+    // From rest at depth 0.05: the depth may jump by 0.5 % of the range, and a quarter of the jump.
+    let begin = |monitor: &mut NeedleMonitor| {
+        let first = sample(0, [0.05, 0.0]);
+        monitor.accept(&runtime, &first, None);
+        first
+    };
+    let mut monitor = NeedleMonitor::default();
+    let first = begin(&mut monitor);
+    let jump = threshold(0.01, |jump| monitor.check(&runtime, &sample(1, [0.05 + jump, 0.0]), &first).is_ok());
+    close(jump, 0.0005 / 0.75);
+    // The velocity is integrated by the trapezoidal rule; a change of it within one interval is its own uncertainty.
+    let steady = sample(0, [0.05, 0.1]);
+    let mut monitor = NeedleMonitor::default();
+    monitor.accept(&runtime, &steady, None);
+    let behind = threshold(0.01, |by| monitor.check(&runtime, &sample(4, [0.0504 - by, 0.1]), &steady).is_ok());
+    close(behind, 0.0005 + 0.25 * 0.0004);
+    let unsure = threshold(0.01, |by| monitor.check(&runtime, &sample(4, [0.0502 - by, 0.0]), &steady).is_ok());
+    // The motion itself is larger than what is claimed: x = 0.0005 + (x − 0.0002)/4 + 0.0002.
+    close(unsure, 0.00065 / 0.75);
+    // A window ends past 2 % of the range, and after a gap; what was off before is forgotten.
+    let mut monitor = NeedleMonitor::default();
+    begin(&mut monitor);
+    monitor.accept(&runtime, &sample(1, [0.0506, 0.0]), Some(&first));
+    assert!(monitor.check(&runtime, &sample(2, [0.0512, 0.0]), &sample(1, [0.0506, 0.0])).is_err());
+    monitor.accept(&runtime, &sample(7, [0.0506, 0.0]), Some(&sample(1, [0.0506, 0.0])));
+    assert!(monitor.check(&runtime, &sample(8, [0.0512, 0.0]), &sample(7, [0.0506, 0.0])).is_ok());
+    let mut monitor = NeedleMonitor::default();
+    begin(&mut monitor);
+    monitor.accept(&runtime, &sample(1, [0.0506, 0.0]), Some(&first));
+    monitor.accept(&runtime, &sample(2, [0.0527, 0.0]), Some(&sample(1, [0.0506, 0.0])));
+    assert!(monitor.check(&runtime, &sample(3, [0.0533, 0.0]), &sample(2, [0.0527, 0.0])).is_ok());
+}
+
+#[test]
+fn a_window_of_the_needle_ends_after_10_s() {
+    let runtime = runtime(&settings());
+    let mut monitor = NeedleMonitor::default();
+    let mut before = sample(0, [0.05, 0.0]);
+    monitor.accept(&runtime, &before, None);
+    // Creeps by 0.6 % of the range within the window, which is too much at its end, but not in two windows.
+    let mut refused = None;
+    for tick in 1..30_000 {
+        let now = sample(tick, [0.05 + 3e-8 * tick as f64, 0.0]);
+        if monitor.check(&runtime, &now, &before).is_err() {
+            refused = Some(tick);
+            break;
+        }
+        monitor.accept(&runtime, &now, Some(&before));
+        before = now;
+    }
+    assert_eq!(refused, None);
+    let mut monitor = NeedleMonitor::default();
+    let mut before = sample(0, [0.05, 0.0]);
+    monitor.accept(&runtime, &before, None);
+    let found = (1..30_000).find(|tick| {
+        let now = sample(*tick, [0.05 + 8e-8 * *tick as f64, 0.0]);
+        let refused = monitor.check(&runtime, &now, &before).is_err();
+        monitor.accept(&runtime, &now, Some(&before));
+        before = now;
+        refused
+    });
+    // 0.0667 % of the table's unit at 8e-8 per tick.
+    assert_eq!(found, Some(8334));
+}
+
+#[test]
+fn rest_takes_as_long_as_a_sample_may_be_old() {
+    let runtime = runtime(&settings());
+    let resolution = 0.1 * FOLLOWING_FRACTION * 0.05;
+    let mut monitor = RestMonitor::default();
+    let states: Vec<Motion> = (0..8).map(|tick| monitor.enter(&runtime, &sample(tick, [0.01, 0.0]))).collect();
+    assert_eq!(states[..5], [Motion::Unknown; 5]);
+    assert_eq!(states[5..], [Motion::Resting; 3]);
+    assert_eq!(monitor.enter(&runtime, &sample(8, [0.01 + 0.99 * resolution, 0.0])), Motion::Resting);
+    assert_eq!(monitor.enter(&runtime, &sample(9, [0.01 + 1.01 * resolution, 0.0])), Motion::Moving);
+    assert_eq!(monitor.enter(&runtime, &sample(10, [0.01 + 1.01 * resolution, 0.0])), Motion::Unknown);
+    // A gap longer than that begins anew, without a word about motion.
+    let mut monitor = RestMonitor::default();
+    for tick in [0, 4, 9] {
+        monitor.enter(&runtime, &sample(tick, [0.01, 0.0]));
+    }
+    assert_eq!(monitor.enter(&runtime, &sample(14, [0.01, 0.0])), Motion::Resting);
+    assert_eq!(monitor.enter(&runtime, &sample(20, [0.01, 0.0])), Motion::Unknown);
+}
+
+#[test]
+fn a_paddle_follows_within_the_error_and_what_is_on_its_way() {
+    let runtime = runtime(&settings());
+    for age in [0.0, 0.003] {
+        let off = threshold(0.05, |off| FollowingMonitor::follows(&runtime, &[off, 0.01], &[0.0, 0.01], age));
+        close(off, 0.001 + 0.1 * (age + 0.002));
+    }
 }
