@@ -208,6 +208,33 @@ mod tests {
     use super::*;
 
     #[test]
+    fn modes_have_their_numbers_and_names() {
+        for (mode, number, name) in [(Mode::Hold, 1, "HOLD"), (Mode::Run, 2, "RUN"), (Mode::Safe, 3, "SAFE")] {
+            assert_eq!((mode as u32, Mode::from_wire(number), mode.name()), (number, Some(mode), name));
+            assert_eq!(std::format!("{mode:>6}"), std::format!("{name:>6}"));
+        }
+        assert_eq!((Mode::from_wire(0), Mode::from_wire(4)), (None, None));
+    }
+
+    #[test]
+    fn codes_hold_latch_or_go_on_by_their_place() {
+        let holding = Faults::PADDLE_MOVING | Faults::PADDLE_BEYOND_LIMIT | Faults::WAITING | Faults::NEEDLE_TOO_FAST;
+        let latching = Faults::NEEDLE_DEAD | Faults::CLOCK_JUMPED | Faults::WATCHDOG | Faults::OVERRUN;
+        let goes_on = Faults::DEPTH_CLAMPED | Faults::TICKS_SKIPPED | Faults::FROZEN;
+        assert_eq!(holding.intersection(Faults::HOLDING), holding);
+        assert_eq!(latching.intersection(Faults::LATCHING), latching);
+        assert!(goes_on.intersection(Faults::HOLDING | Faults::LATCHING).is_empty());
+        assert!((holding | latching).contains(latching) && !holding.contains(latching));
+        assert!(!(holding | Faults::OVERRUN).contains(latching), "all of them");
+        assert_eq!((Faults::from_bits(1 << 18), Faults::CLOCK_JUMPED.bits()), (Faults::CLOCK_JUMPED, 1 << 18));
+        let mut set = Faults::NONE;
+        set.set_if(Faults::FROZEN, false);
+        assert!(set.is_empty());
+        set.set_if(Faults::FROZEN, true);
+        assert_eq!(set, Faults::FROZEN);
+    }
+
+    #[test]
     fn codes_are_distinct_and_named() {
         let mut all = Faults::NONE;
         for (code, _) in Faults::NAMES {

@@ -74,3 +74,108 @@ impl Clock {
         faults.set_if(Faults::OVERRUN, self.skips.enter(skipped > 0, MAX_SUCCESSIVE_OVERRUNS));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contract::example::table;
+    use crate::settings::Settings;
+
+    const MS: u64 = 1_000_000;
+
+    /// A clock, its accounts, and what became of a tick: time since the last one, faults, skipped, due.
+    struct Ticks {
+        runtime: Runtime<f64>,
+        clock: Clock,
+        ledger: TickLedger,
+    }
+
+    impl Ticks {
+        fn new() -> Self {
+            let runtime = Runtime::new(&table(), &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+            Self { runtime, clock: Clock::default(), ledger: TickLedger::default() }
+        }
+
+        fn start(&mut self, tick: u64, time_ns: u64) -> (Option<u64>, Faults, u64, u64) {
+            let mut faults = Faults::NONE;
+            let inputs = Inputs { tick, time_ns, ..Inputs::default() };
+            let before = self.ledger;
+            let elapsed = self.clock.start(&self.runtime, &inputs, &mut self.ledger, &mut faults);
+            (elapsed, faults, self.ledger.skipped - before.skipped, self.ledger.due - before.due)
+        }
+    }
+
+    #[test]
+    fn ticks_in_step_are_believed_and_skipped_ones_counted() {
+        let mut ticks = Ticks::new();
+        assert_eq!(ticks.start(7, 100 * MS), (Some(MS), Faults::NONE, 0, 1), "the first may be any");
+        assert_eq!(ticks.clock.now_ns(), Some(100 * MS));
+        assert_eq!(ticks.start(8, 101 * MS + 3), (Some(MS + 3), Faults::NONE, 0, 1));
+        assert_eq!(ticks.start(11, 104 * MS), (Some(3 * MS - 3), Faults::TICKS_SKIPPED, 2, 3));
+        assert_eq!(ticks.clock.now_ns(), Some(104 * MS));
+    }
+
+    #[test]
+    fn time_and_numbers_may_differ_by_a_quarter_of_a_second() {
+        let slack = 250 * MS;
+        for (time_ns, fault) in [
+            (MS + slack, Faults::NONE),
+            (MS + slack + 1, Faults::CLOCK_JUMPED),
+            (1 << 63, Faults::CLOCK_JUMPED),
+            (u64::MAX, Faults::CLOCK_JUMPED),
+        ] {
+            let mut ticks = Ticks::new();
+            ticks.start(0, 0);
+            let (elapsed, faults, ..) = ticks.start(1, time_ns);
+            assert_eq!((elapsed.is_some(), faults), (fault.is_empty(), fault), "{time_ns}");
+            // What was rejected has moved nothing.
+            let expected = if fault.is_empty() { time_ns } else { 0 };
+            assert_eq!(ticks.clock.now_ns(), Some(expected));
+        }
+        for (tick, skipped, fault) in
+            [(251, 250, Faults::TICKS_SKIPPED), (252, 0, Faults::CLOCK_JUMPED), (1 << 63, 0, Faults::CLOCK_JUMPED)]
+        {
+            let mut ticks = Ticks::new();
+            ticks.start(0, 0);
+            assert_eq!(ticks.start(tick, MS), ((skipped > 0).then_some(MS), fault, skipped, skipped + 1), "{tick}");
+        }
+    }
+
+    #[test]
+    fn a_rejected_tick_uses_up_its_number_if_that_can_be() {
+        let mut ticks = Ticks::new();
+        ticks.start(0, 10 * MS);
+        assert_eq!(ticks.start(1, 10 * MS), (None, Faults::CLOCK_REVERSED, 0, 1), "time stands");
+        assert_eq!(ticks.start(2, 5 * MS), (None, Faults::CLOCK_REVERSED, 0, 1), "time goes back");
+        assert_eq!(ticks.start(5, 5 * MS), (None, Faults::CLOCK_REVERSED, 2, 3), "and numbers go on");
+        assert_eq!(ticks.start(6, 11 * MS), (Some(MS), Faults::NONE, 0, 1));
+        assert_eq!(ticks.start(6, 12 * MS), (None, Faults::CLOCK_REVERSED, 0, 1), "the number stands");
+        assert_eq!(ticks.start(3, 12 * MS), (None, Faults::CLOCK_REVERSED, 0, 1), "the number goes back");
+        assert_eq!(ticks.start(1_000_000, 9 * MS), (None, Faults::CLOCK_REVERSED, 0, 1), "a number from nowhere");
+        assert_eq!(ticks.start(256, 9 * MS), (None, Faults::CLOCK_REVERSED, 249, 250), "the last one that can be");
+        assert_eq!(ticks.start(257, 12 * MS), (Some(MS), Faults::NONE, 0, 1));
+    }
+
+    #[test]
+    fn after_rearming_any_clock_is_believed() {
+        let mut ticks = Ticks::new();
+        ticks.start(100, 100 * MS);
+        ticks.clock = ticks.clock.rearmed();
+        assert_eq!(ticks.clock.now_ns(), None);
+        assert_eq!(ticks.start(103, 7), (Some(MS), Faults::TICKS_SKIPPED, 2, 3));
+        ticks.clock = ticks.clock.rearmed();
+        assert_eq!(ticks.start(1 << 62, 1 << 62), (Some(MS), Faults::NONE, 0, 1));
+        ticks.clock = ticks.clock.rearmed();
+        assert_eq!(ticks.start(3, 3 * MS), (Some(MS), Faults::NONE, 0, 1));
+        assert_eq!(ticks.start(4, 4 * MS), (Some(MS), Faults::NONE, 0, 1));
+    }
+
+    #[test]
+    fn ten_skips_in_a_row_are_too_many() {
+        let mut ticks = Ticks::new();
+        ticks.start(0, 0);
+        let overrun = |ticks: &mut Ticks, i: u64| ticks.start(2 * i, 2 * i * MS).1.contains(Faults::OVERRUN);
+        let found: std::vec::Vec<bool> = (1..=11).map(|i| overrun(&mut ticks, i)).collect();
+        assert_eq!(found.iter().position(|found| *found), Some(9));
+    }
+}

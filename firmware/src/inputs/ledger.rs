@@ -184,4 +184,62 @@ mod tests {
             assert_eq!(ticks.unaccounted(), 0);
         }
     }
+
+    #[test]
+    fn every_entry_counts_once_on_its_side() {
+        let balanced = StreamLedger {
+            delivered: 7 + 20 + 5 + 6,
+            published: 7 + 20 + 11,
+            consumed: 7,
+            lost: 11,
+            discarded: [1, 2, 3, 4, 5, 3, 1, 1],
+            duplicates: 5,
+            strays: 6,
+        };
+        assert_eq!(balanced.unaccounted(), 0);
+        type Field = fn(&mut StreamLedger) -> &mut u64;
+        let fields: [(Field, u64); 7] = [
+            (|l| &mut l.delivered, 1),
+            (|l| &mut l.published, 1),
+            (|l| &mut l.consumed, 2),
+            (|l| &mut l.lost, 1),
+            (|l| &mut l.discarded[4], 2),
+            (|l| &mut l.duplicates, 1),
+            (|l| &mut l.strays, 1),
+        ];
+        for (i, (field, sides)) in fields.into_iter().enumerate() {
+            for by in [1, u64::MAX] {
+                let mut off = balanced;
+                let place = field(&mut off);
+                *place = place.wrapping_add(by);
+                assert_eq!(off.unaccounted(), sides, "field {i}");
+            }
+        }
+        let ledger = Ledger { needle: StreamLedger { published: 1, ..balanced }, ..Ledger::default() };
+        assert_eq!(ledger.unaccounted(), 37);
+        let ticks = TickLedger { due: 10, run: 1, hold: 2, safe: 3, skipped: 4 };
+        assert_eq!((ticks.unaccounted(), TickLedger { hold: 4, ..ticks }.unaccounted()), (0, 2));
+        let all = Ledger { target: StreamLedger { lost: 1, ..StreamLedger::default() }, ticks, ..Ledger::default() };
+        assert_eq!(all.unaccounted(), 1);
+        let paddle = StreamLedger { strays: 4, ..StreamLedger::default() };
+        let due = TickLedger { due: 12, ..ticks };
+        assert_eq!(Ledger { paddle, ticks: due, ..Ledger::default() }.unaccounted(), 6);
+    }
+
+    #[test]
+    fn reasons_are_named_and_counted_apart() {
+        let mut ledger = StreamLedger::default();
+        for (i, reason) in Discard::ALL.into_iter().enumerate() {
+            assert_eq!(reason as usize, i);
+            for _ in 0..=i {
+                ledger.discard(reason);
+            }
+        }
+        assert_eq!(ledger.discarded, [1, 2, 3, 4, 5, 6, 7, 8]);
+        assert_eq!(Discard::ALL.map(|reason| ledger.discarded_for(reason)), ledger.discarded);
+        let names = Discard::ALL.map(Discard::name);
+        let expected =
+            ["late", "not finite", "out of range", "time", "innovation", "not visible", "frozen", "identity"];
+        assert_eq!(names, expected);
+    }
 }

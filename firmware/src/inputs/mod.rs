@@ -10,6 +10,8 @@ pub(crate) mod sample;
 pub mod sequence;
 pub(crate) mod stream;
 pub(crate) mod supervisor;
+#[cfg(test)]
+mod tests;
 
 pub use ledger::{Discard, Ledger, StreamLedger, TickLedger};
 pub use sequence::{Arrival, SequenceTracker};

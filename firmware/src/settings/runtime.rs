@@ -164,4 +164,65 @@ mod tests {
         }
         assert!(matches!(refuse(Settings { target_noise: f64::INFINITY, ..good }), SettingsError::Range { .. }));
     }
+
+    #[test]
+    fn the_limits_follow_from_settings_and_table() {
+        let settings = Settings { actuator_delay_ns: 3 * MS, ..Settings::new(2 * MS, 20 * MS, 30 * MS) };
+        let runtime = Runtime::new(&table(), &settings).unwrap();
+        assert_eq!((runtime.needle_age.hold_ns, runtime.needle_age.safe_ns), (10 * MS, 250 * MS));
+        assert_eq!((runtime.paddle_age.hold_ns, runtime.paddle_age.safe_ns), (10 * MS, 250 * MS));
+        assert_eq!((runtime.target_age.hold_ns, runtime.target_age.safe_ns), (90 * MS, 330 * MS));
+        let slow = Runtime::new(&table(), &Settings::new(20 * MS, 20 * MS, 0)).unwrap();
+        assert_eq!((slow.needle_age.hold_ns, slow.needle_age.safe_ns), (100 * MS, 1000 * MS));
+        assert_eq!((slow.target_age.hold_ns, slow.target_age.safe_ns), (60 * MS, 300 * MS));
+        let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        let slope = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt();
+        let jacobian = (0.3f64.powi(2) + 0.05f64.powi(2) + 0.04f64.powi(2) + 0.25f64.powi(2)).sqrt();
+        close(runtime.limits.max_step, 0.1 * 2e-3);
+        close(runtime.target_slope, slope);
+        close(runtime.jacobian_norm, jacobian);
+        close(runtime.target_range, 3.0 * 0.1 * slope + jacobian * 0.05);
+        close(runtime.paddle_range, 0.055);
+        close(runtime.following_error, 0.001);
+        close(runtime.paddle_resolution, 0.0001);
+        close(runtime.plausible_speed, 1.0);
+        close(runtime.depth_range(), 0.1);
+        close(runtime.plausible_depth.0, -0.1);
+        close(runtime.plausible_depth.1, 0.2);
+        close(runtime.unseen_motion(0.01), 0.1 * (0.01 + 0.005));
+        assert_eq!((runtime.delay_samples, runtime.gain, runtime.paddle_index), (1, 0.25, 3));
+    }
+
+    #[test]
+    fn settings_are_refused_at_their_limits() {
+        let good = Settings::new(MS, 20 * MS, 20 * MS);
+        let runtime = |settings: Settings| Runtime::new(&table(), &settings);
+        let ten_s = 10_000 * MS;
+        for (settings, holds) in [
+            (Settings { loop_period_ns: ten_s, target_period_ns: ten_s, ..good }, true),
+            (Settings { loop_period_ns: ten_s + 1, target_period_ns: ten_s + 1, ..good }, false),
+            (Settings { target_period_ns: ten_s + 1, ..good }, false),
+            (Settings { target_period_ns: MS, target_latency_ns: 0, ..good }, true),
+            (Settings { target_period_ns: MS - 1, ..good }, false),
+            (Settings { target_period_ns: ten_s, target_latency_ns: ten_s, ..good }, true),
+            (Settings { target_period_ns: ten_s, target_latency_ns: ten_s + 1, ..good }, false),
+            (Settings { target_period_ns: ten_s, actuator_delay_ns: ten_s + 1, ..good }, false),
+            (Settings { target_latency_ns: (65 * 20 - 3) * MS, ..good }, true),
+            (Settings { target_latency_ns: (65 * 20 - 2) * MS, ..good }, false),
+            (Settings { lambda_max: Some(1.0), ..good }, true),
+            (Settings { lambda_max: Some(0.99), ..good }, false),
+            (Settings { lambda_max: Some(100.0), ..good }, true),
+            (Settings { lambda_max: Some(100.1), ..good }, false),
+            (Settings { loop_gain: Some(2.0), ..good }, true),
+            (Settings { loop_gain: Some(2.01), ..good }, false),
+            (Settings { target_noise: -1e-9, ..good }, false),
+            (Settings { following_error: Some(0.0), ..good }, false),
+            (Settings { following_error: Some(f64::INFINITY), ..good }, false),
+            (Settings { following_error: Some(1e-9), ..good }, true),
+        ] {
+            assert_eq!(runtime(settings).is_ok(), holds, "{settings:?}");
+        }
+        let halved = runtime(Settings { lambda_max: Some(2.0), ..good }).unwrap();
+        assert_eq!(halved.gain, 0.125);
+    }
 }
