@@ -34,11 +34,11 @@ impl<T: Scalar> Controller<'_, T> {
 
     fn read_needle(&self, state: &mut State<T>, checks: &Checks<'_, T>, sample: &NeedleSample, faults: &mut Faults) {
         let (sample, previous) = (Measurement::from(sample), state.needle.accepted);
-        let content = checks.needle(&sample, previous.as_ref(), &state.needle_monitor);
-        if !state.needle.offer(&sample, content, &mut state.ledger.needle, faults) {
+        let checked = checks.needle(&sample, previous.as_ref(), &state.needle_monitor);
+        if !state.needle.offer(&sample, checked.map(|_| ()), &mut state.ledger.needle, faults) {
             return;
         }
-        state.needle_monitor.accept(&self.runtime, &sample, previous.as_ref());
+        state.needle_monitor = checked.unwrap_or_default();
         if let Some(previous) = previous {
             state.gate.travel.needle += (sample.values[0] - previous.values[0]).abs();
         }
@@ -53,9 +53,14 @@ impl<T: Scalar> Controller<'_, T> {
     ) -> Option<Measurement> {
         let is_visible = sample.is_visible();
         let (sample, previous) = (Measurement::from(sample), state.target.accepted);
-        let predicted = self.predicted_target(state);
+        // Only a value like the one before it can be frozen.
+        let identical = previous.is_some_and(|previous| previous.values == sample.values);
+        let (predicted, admitted) = if identical {
+            (self.predicted_target(state), state.target_resolution.unseen_motion(self.runtime.target_range))
+        } else {
+            Default::default()
+        };
         let content = if is_visible {
-            let admitted = state.target_resolution.unseen_motion(self.runtime.target_range);
             let frozen = &state.target_frozen;
             checks
                 .target(&sample, previous.as_ref(), &state.gate)

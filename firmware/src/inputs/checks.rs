@@ -17,13 +17,13 @@ pub(crate) struct Checks<'r, T: Scalar> {
 }
 
 impl<T: Scalar> Checks<'_, T> {
-    /// Checks a needle sample against the one before it.
+    /// Checks a needle sample against the one before it. Returns what the monitor knows once it is accepted.
     pub(crate) fn needle(
         &self,
         sample: &Measurement,
         previous: Option<&Measurement>,
         monitor: &NeedleMonitor,
-    ) -> Result<(), Discard> {
+    ) -> Result<NeedleMonitor, Discard> {
         let runtime = self.runtime;
         self.numbers_and_time(sample, previous)?;
         let [depth, velocity] = sample.values;
@@ -32,7 +32,7 @@ impl<T: Scalar> Checks<'_, T> {
             return Err(Discard::OutOfRange);
         }
         let Some(previous) = previous else {
-            return Ok(());
+            return Ok(NeedleMonitor::beginning_with(sample));
         };
         let elapsed = seconds(sample.time_ns - previous.time_ns);
         let [previous_depth, previous_velocity] = previous.values;
@@ -45,7 +45,7 @@ impl<T: Scalar> Checks<'_, T> {
         if (depth - previous_depth).abs() > plausible {
             return Err(Discard::Innovation);
         }
-        monitor.check(runtime, sample, previous)
+        monitor.next(runtime, sample, previous)
     }
 
     /// Checks a target sample; `gate` knows what motion can explain.

@@ -176,7 +176,8 @@ fn values_are_normal_and_within_the_geometry() {
     let range = runtime.target_range;
     assert_eq!((target(0.999 * range), target(1.001 * range)), (Ok(()), Err(Discard::OutOfRange)));
     // One depth range around the table, ten times its speed.
-    let needle = |depth, velocity| checks.needle(&at(990 * MS, [depth, velocity]), None, &NeedleMonitor::default());
+    let needle =
+        |depth, velocity| checks.needle(&at(990 * MS, [depth, velocity]), None, &NeedleMonitor::default()).map(|_| ());
     assert_eq!((needle(-0.0999, 0.0), needle(-0.1001, 0.0)), (Ok(()), Err(Discard::OutOfRange)));
     assert_eq!((needle(0.1999, 0.0), needle(0.2001, 0.0)), (Ok(()), Err(Discard::OutOfRange)));
     assert_eq!((needle(0.0, 0.999), needle(0.0, -1.001)), (Ok(()), Err(Discard::OutOfRange)));

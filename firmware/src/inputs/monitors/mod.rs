@@ -1,7 +1,7 @@
 //! Monitors of what single samples cannot show: frozen values, contradictions, wrong associations, an actuator that
 //! does not follow, a loop that diverges. What each of them cannot see is in [`crate::detection`].
 //!
-//! `check` changes nothing; `accept` enters a sample that has been accepted.
+//! `check` and `next` change nothing; `accept` enters a sample that has been accepted.
 
 mod bucket;
 mod divergence;

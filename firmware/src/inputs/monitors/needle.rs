@@ -20,47 +20,34 @@ pub(crate) struct NeedleMonitor {
 }
 
 impl NeedleMonitor {
-    fn after(&self, sample: &Measurement, previous: &Measurement) -> Self {
-        let elapsed = seconds(sample.time_ns - previous.time_ns);
-        let ([depth, velocity], [previous_depth, previous_velocity]) = (sample.values, previous.values);
-        Self {
-            moved: self.moved + (depth - previous_depth),
-            claimed: self.claimed + 0.5 * (velocity + previous_velocity) * elapsed,
-            since_ns: self.since_ns,
-        }
+    /// A window that begins with this sample.
+    pub(crate) fn beginning_with(sample: &Measurement) -> Self {
+        Self { since_ns: sample.time_ns, ..Self::default() }
     }
 
-    /// Refuses a sample with which depth and velocity contradict each other.
-    pub(crate) fn check<T: Scalar>(
+    /// The window once `sample` is accepted; refuses one with which depth and velocity contradict each other.
+    pub(crate) fn next<T: Scalar>(
         &self,
         runtime: &Runtime<T>,
         sample: &Measurement,
         previous: &Measurement,
-    ) -> Result<(), Discard> {
-        let Self { moved, claimed, .. } = self.after(sample, previous);
+    ) -> Result<Self, Discard> {
+        let elapsed_ns = sample.time_ns - previous.time_ns;
+        let elapsed = seconds(elapsed_ns);
+        let ([depth, velocity], [previous_depth, previous_velocity]) = (sample.values, previous.values);
+        let moved = self.moved + (depth - previous_depth);
+        let claimed = self.claimed + 0.5 * (velocity + previous_velocity) * elapsed;
         let larger = moved.abs().max(claimed.abs());
         // Nobody knows when in a gap the velocity has changed.
-        let unknown = 0.5 * (sample.values[1] - previous.values[1]).abs() * seconds(sample.time_ns - previous.time_ns);
-        let admitted = NEEDLE_CONTRADICTION * runtime.depth_range() + NEEDLE_CONTRADICTION_RATIO * larger + unknown;
-        if (moved - claimed).abs() > admitted { Err(Discard::Frozen) } else { Ok(()) }
-    }
-
-    /// Enters an accepted sample.
-    pub(crate) fn accept<T: Scalar>(
-        &mut self,
-        runtime: &Runtime<T>,
-        sample: &Measurement,
-        previous: Option<&Measurement>,
-    ) {
-        let begin = Self { since_ns: sample.time_ns, ..Self::default() };
-        *self = match previous {
-            Some(previous) if sample.time_ns - previous.time_ns <= runtime.needle_age.hold_ns => {
-                let next = self.after(sample, previous);
-                let far = next.moved.abs().max(next.claimed.abs()) > NEEDLE_WINDOW * runtime.depth_range();
-                let long = sample.time_ns.saturating_sub(next.since_ns) > NEEDLE_WINDOW_NS;
-                if far || long { begin } else { next }
-            }
-            _ => begin,
-        };
+        let unknown = 0.5 * (velocity - previous_velocity).abs() * elapsed;
+        let range = runtime.depth_range();
+        let admitted = NEEDLE_CONTRADICTION * range + NEEDLE_CONTRADICTION_RATIO * larger + unknown;
+        if (moved - claimed).abs() > admitted {
+            return Err(Discard::Frozen);
+        }
+        let ends = elapsed_ns > runtime.needle_age.hold_ns
+            || larger > NEEDLE_WINDOW * range
+            || sample.time_ns.saturating_sub(self.since_ns) > NEEDLE_WINDOW_NS;
+        Ok(if ends { Self::beginning_with(sample) } else { Self { moved, claimed, ..*self } })
     }
 }

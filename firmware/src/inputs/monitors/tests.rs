@@ -265,69 +265,62 @@ fn a_resolution_is_the_smallest_change_between_its_bounds() {
 #[test]
 fn contradictions_of_the_needle_are_measured_over_a_window() {
     let runtime = runtime(&settings());
+    let next = |monitor: &NeedleMonitor, now: &Measurement, before: &Measurement| monitor.next(&runtime, now, before);
     // From rest at depth 0.05: the depth may jump by 0.5 % of the range, and a quarter of the jump.
-    let begin = |monitor: &mut NeedleMonitor| {
-        let first = sample(0, [0.05, 0.0]);
-        monitor.accept(&runtime, &first, None);
-        first
-    };
-    let mut monitor = NeedleMonitor::default();
-    let first = begin(&mut monitor);
-    let jump = threshold(0.01, |jump| monitor.check(&runtime, &sample(1, [0.05 + jump, 0.0]), &first).is_ok());
-    close(jump, 0.0005 / 0.75);
+    let first = sample(0, [0.05, 0.0]);
+    let begun = NeedleMonitor::beginning_with(&first);
+    close(threshold(0.01, |jump| next(&begun, &sample(1, [0.05 + jump, 0.0]), &first).is_ok()), 0.0005 / 0.75);
     // The velocity is integrated by the trapezoidal rule; a change of it within one interval is its own uncertainty.
     let steady = sample(0, [0.05, 0.1]);
-    let mut monitor = NeedleMonitor::default();
-    monitor.accept(&runtime, &steady, None);
-    let behind = threshold(0.01, |by| monitor.check(&runtime, &sample(4, [0.0504 - by, 0.1]), &steady).is_ok());
+    let begun_steady = NeedleMonitor::beginning_with(&steady);
+    let behind = threshold(0.01, |by| next(&begun_steady, &sample(4, [0.0504 - by, 0.1]), &steady).is_ok());
     close(behind, 0.0005 + 0.25 * 0.0004);
-    let unsure = threshold(0.01, |by| monitor.check(&runtime, &sample(4, [0.0502 - by, 0.0]), &steady).is_ok());
+    let unsure = threshold(0.01, |by| next(&begun_steady, &sample(4, [0.0502 - by, 0.0]), &steady).is_ok());
     // The motion itself is larger than what is claimed: x = 0.0005 + (x − 0.0002)/4 + 0.0002.
     close(unsure, 0.00065 / 0.75);
     // A window ends past 2 % of the range, and after a gap; what was off before is forgotten.
-    let mut monitor = NeedleMonitor::default();
-    begin(&mut monitor);
-    monitor.accept(&runtime, &sample(1, [0.0506, 0.0]), Some(&first));
-    assert!(monitor.check(&runtime, &sample(2, [0.0512, 0.0]), &sample(1, [0.0506, 0.0])).is_err());
-    monitor.accept(&runtime, &sample(7, [0.0506, 0.0]), Some(&sample(1, [0.0506, 0.0])));
-    assert!(monitor.check(&runtime, &sample(8, [0.0512, 0.0]), &sample(7, [0.0506, 0.0])).is_ok());
-    let mut monitor = NeedleMonitor::default();
-    begin(&mut monitor);
-    monitor.accept(&runtime, &sample(1, [0.0506, 0.0]), Some(&first));
-    monitor.accept(&runtime, &sample(2, [0.0527, 0.0]), Some(&sample(1, [0.0506, 0.0])));
-    assert!(monitor.check(&runtime, &sample(3, [0.0533, 0.0]), &sample(2, [0.0527, 0.0])).is_ok());
+    let second = sample(1, [0.0506, 0.0]);
+    let off = next(&begun, &second, &first).unwrap();
+    assert!(next(&off, &sample(2, [0.0512, 0.0]), &second).is_err());
+    let later = sample(7, [0.0506, 0.0]);
+    let ended = next(&off, &later, &second).unwrap();
+    assert!(next(&ended, &sample(8, [0.0512, 0.0]), &later).is_ok());
+    let soon = sample(6, [0.0506, 0.0]);
+    let goes_on = next(&off, &soon, &second).unwrap();
+    assert!(next(&goes_on, &sample(7, [0.0512, 0.0]), &soon).is_err(), "5 ticks are no gap");
+    // 2 % of the range: off by 0.0005 from the start at 0.1 per second, and by 0.00069 more after so many ticks.
+    for (ticks, forgotten) in [(10, false), (12, true)] {
+        let depth = |tick: u64| 0.0505 + 1e-4 * tick as f64;
+        let mut before = sample(4, [depth(4), 0.1]);
+        let mut monitor = next(&begun_steady, &before, &steady).unwrap();
+        for tick in 5..5 + ticks {
+            let now = sample(tick, [depth(tick), 0.1]);
+            monitor = next(&monitor, &now, &before).unwrap();
+            before = now;
+        }
+        let now = sample(5 + ticks, [depth(5 + ticks) + 0.00069, 0.1]);
+        assert_eq!(next(&monitor, &now, &before).is_ok(), forgotten, "{ticks} ticks");
+    }
 }
 
 #[test]
 fn a_window_of_the_needle_ends_after_10_s() {
     let runtime = runtime(&settings());
-    let mut monitor = NeedleMonitor::default();
-    let mut before = sample(0, [0.05, 0.0]);
-    monitor.accept(&runtime, &before, None);
-    // Creeps by 0.6 % of the range within the window, which is too much at its end, but not in two windows.
-    let mut refused = None;
-    for tick in 1..30_000 {
-        let now = sample(tick, [0.05 + 3e-8 * tick as f64, 0.0]);
-        if monitor.check(&runtime, &now, &before).is_err() {
-            refused = Some(tick);
-            break;
-        }
-        monitor.accept(&runtime, &now, Some(&before));
-        before = now;
-    }
-    assert_eq!(refused, None);
-    let mut monitor = NeedleMonitor::default();
-    let mut before = sample(0, [0.05, 0.0]);
-    monitor.accept(&runtime, &before, None);
-    let found = (1..30_000).find(|tick| {
-        let now = sample(*tick, [0.05 + 8e-8 * *tick as f64, 0.0]);
-        let refused = monitor.check(&runtime, &now, &before).is_err();
-        monitor.accept(&runtime, &now, Some(&before));
-        before = now;
-        refused
-    });
-    // 0.0667 % of the table's unit at 8e-8 per tick.
-    assert_eq!(found, Some(8334));
+    // Creeps without saying so; the depth may be off by 0.000667 within a window.
+    let refused = |per_tick: f64| {
+        let mut before = sample(0, [0.05, 0.0]);
+        let mut monitor = NeedleMonitor::beginning_with(&before);
+        (1..30_000).find(|tick| {
+            let now = sample(*tick, [0.05 + per_tick * *tick as f64, 0.0]);
+            let next = monitor.next(&runtime, &now, &before);
+            monitor = next.unwrap_or_default();
+            before = now;
+            next.is_err()
+        })
+    };
+    assert_eq!(refused(6.6e-8), None);
+    assert_eq!(refused(6.7e-8), Some(9951));
+    assert_eq!(refused(8e-8), Some(8334));
 }
 
 #[test]
