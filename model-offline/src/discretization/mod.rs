@@ -5,6 +5,7 @@
 //! `Ψ_I(X) = Hᵀ(0) M⁻¹(X) H(X − X_I) φ_a(X − X_I)`. The d_I are *coefficients*, not displacements: Ψ_I(X_J) ≠ δ_IJ.
 //! Everything here is written for D dimensions; only the construction of nodes and cells is planar.
 
+pub mod bisection;
 pub mod boundary;
 pub mod features;
 pub mod finite_element;

@@ -48,20 +48,9 @@ impl Planar {
         spacing: Option<f64>,
         method: Method,
     ) -> Result<Self, DiscretizationError> {
-        let done = |approximation, cells, rule| Self {
-            approximation: Arc::new(approximation),
-            cells: Arc::new(cells),
-            rule: Arc::new(rule),
-            method,
-        };
-        if matches!(method.integration, Integration::FemT3 | Integration::FemT6) {
+        if method.integration.is_element() {
             let triangles = triangulate(&nodes, outline, inclusions)?;
-            let elements = match method.integration {
-                Integration::FemT3 => Elements::linear(nodes, triangles),
-                _ => Elements::quadratic(nodes, triangles),
-            };
-            let (cells, rule) = (elements.cells(), elements.rule());
-            return Ok(done(Approximation::Elements(elements), cells, rule));
+            return Ok(Self::on_triangles(nodes, triangles, method));
         }
         let mut cells = Vec::new();
         if spacing.is_none() || method.integration != Integration::Gauss {
@@ -94,7 +83,27 @@ impl Planar {
                 integration::stabilised_conforming_nodal(&shape, &cells)?
             }
         };
-        Ok(done(Approximation::Kernels(cloud), cells, rule))
+        Ok(Self {
+            approximation: Arc::new(Approximation::Kernels(cloud)),
+            cells: Arc::new(cells),
+            rule: Arc::new(rule),
+            method,
+        })
+    }
+
+    /// Finite elements on triangles that are given: linear ones for `fem-t3`, else quadratic ones.
+    pub fn on_triangles(nodes: Vec<Point2>, triangles: Vec<[u32; 3]>, method: Method) -> Self {
+        let elements = match method.integration {
+            Integration::FemT3 => Elements::linear(nodes, triangles),
+            _ => Elements::quadratic(nodes, triangles),
+        };
+        let (cells, rule) = (elements.cells(), elements.rule());
+        Self {
+            approximation: Arc::new(Approximation::Elements(elements)),
+            cells: Arc::new(cells),
+            rule: Arc::new(rule),
+            method,
+        }
     }
 
     /// Node positions, those that elements add included.

@@ -20,16 +20,28 @@ pub fn triangulate(
     outline: &Polygon,
     inclusions: &[Polygon],
 ) -> Result<Vec<[u32; 3]>, TriangulationError> {
+    triangulate_along(nodes, outline, &inclusions.iter().flat_map(Polygon::edges).collect::<Vec<_>>())
+}
+
+/// The same with edges that follow straight `lines` wherever nodes lie on them.
+///
+/// # Errors
+/// Nodes that coincide, or an outline that its nodes do not follow.
+pub fn triangulate_along(
+    nodes: &[Point2],
+    outline: &Polygon,
+    lines: &[(Point2, Point2)],
+) -> Result<Vec<[u32; 3]>, TriangulationError> {
     let fail = |reason: &str| TriangulationError(reason.to_owned());
     let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
     let tolerance = 1e-9 * outline.size();
-    let edges = edges_along(nodes, outline, tolerance);
+    let edges = edges_along(nodes, outline.edges(), tolerance);
     let mut mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt(sites, edges)
         .map_err(|error| fail(&error.to_string()))?;
     if mesh.num_vertices() != nodes.len() {
         return Err(fail("two nodes coincide"));
     }
-    for [a, b] in inclusions.iter().flat_map(|i| edges_along(nodes, i, tolerance)) {
+    for [a, b] in edges_along(nodes, lines.iter().copied(), tolerance) {
         let (a, b) = (FixedVertexHandle::from_index(a), FixedVertexHandle::from_index(b));
         if mesh.can_add_constraint(a, b) {
             mesh.add_constraint(a, b);
@@ -72,10 +84,10 @@ pub fn area(nodes: &[Point2], t: &[u32; 3]) -> f64 {
     0.5 * cross(b - a, c - a)
 }
 
-/// Pairs of nodes that follow each other along the edges of a polygon.
-fn edges_along(nodes: &[Point2], polygon: &Polygon, tolerance: f64) -> Vec<[usize; 2]> {
+/// Pairs of nodes that follow each other along straight lines.
+fn edges_along(nodes: &[Point2], lines: impl Iterator<Item = (Point2, Point2)>, tolerance: f64) -> Vec<[usize; 2]> {
     let mut edges = Vec::new();
-    for (a, b) in polygon.edges() {
+    for (a, b) in lines {
         let mut on: Vec<(f64, usize)> = nodes
             .iter()
             .enumerate()

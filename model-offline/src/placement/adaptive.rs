@@ -1,10 +1,11 @@
 //! Refinement to a tolerance: no node more than the controllability measures need.
 //!
-//! Nodes are graded towards the singular points, level by level. The error of a level is estimated against an
-//! *independent* method, quadratic triangles on graded nodes, extrapolated (their error halves from level to level, see
-//! [`Grading::level`](crate::discretization::graded::Grading::level)); what the extrapolation leaves open is added to the estimate. Quadratic triangles themselves are
-//! judged by the distance to their own coarser levels.
+//! The error of a model is estimated against an *independent* method: quadratic triangles refined where the answers ask
+//! for it, with an error that nested meshes certify (see the module `goal_oriented`). Nodes of other methods are graded
+//! towards the singular points, level by level, until their distance to that, with what it leaves open, is within the
+//! tolerance. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
 
+use super::goal_oriented::{self, Certified};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Integration, Method, Resolution};
@@ -111,107 +112,66 @@ fn first_level(tolerance: f64) -> i32 {
     if tolerance >= LOOSE { MIN_LEVEL } else { 0 }
 }
 
-/// Refines quadratic triangles until their levels agree within the tolerance; they need no other reference.
+/// Refines quadratic triangles where the answers ask for it; they need no other reference.
 fn refine_elements(scene: &Scene, method: Method, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
-    let mut levels = Levels::default();
-    let mut reached = f64::INFINITY;
-    for level in (first_level(tolerance) - 1).max(MIN_LEVEL)..=MAX_LEVEL {
-        let model = match graded_model(scene, method, level) {
-            Ok(model) => model,
-            Err(ModelError::TooManyNodes { .. }) => break,
-            Err(error) => return Err(error),
-        };
-        let reference_nodes = levels.finest.as_ref().map_or(0, |finest| finest.nodes);
-        levels.push(&model)?;
-        let Some((controllability, target_displacement)) = levels.error() else { continue };
-        let estimate = ErrorEstimate { controllability, target_displacement, reference: 0.0, reference_nodes, level };
-        if estimate.worst() <= tolerance {
-            return Ok((model, estimate));
-        }
-        reached = reached.min(estimate.worst());
-    }
-    Err(ModelError::ToleranceNotReached { tolerance, reached })
-}
-
-/// The last three levels of quadratic triangles. Their error halves from level to level: what the finest is wrong by is
-/// its distance to the level before it, or a third of that to the one before that. Both are looked at, because cells of
-/// the interior halve only every second level: two levels that share them may agree by accident.
-#[derive(Debug, Default)]
-struct Levels {
-    finest: Option<Level>,
-    before: Option<Level>,
-    before_that: Option<Level>,
-}
-
-#[derive(Debug)]
-struct Level {
-    responses: Vec<RestResponse>,
-    nodes: usize,
-}
-
-impl Levels {
-    fn push(&mut self, model: &TissueModel) -> Result<(), ModelError> {
-        let level = Level { responses: rest_responses(model)?, nodes: model.nodes() };
-        self.before_that = self.before.take();
-        self.before = self.finest.replace(level);
-        Ok(())
-    }
-
-    /// Estimated error of the finest level: of the measures, and of the displacements over the largest. None before there
-    /// are three levels.
-    fn error(&self) -> Option<(f64, f64)> {
-        let (Some(finest), Some(before), Some(before_that)) = (&self.finest, &self.before, &self.before_that) else {
-            return None;
-        };
-        let near = distance(&before.responses, &finest.responses);
-        let far = distance(&before_that.responses, &finest.responses);
-        Some((near.0.max(far.0 / 3.0), near.1.max(far.1 / 3.0)))
-    }
-
-    /// What the levels tend to.
-    fn limit(&self) -> Option<Vec<RestResponse>> {
-        let (finest, before_that) = (self.finest.as_ref()?, self.before_that.as_ref()?);
-        Some(finest.responses.iter().zip(&before_that.responses).map(|(f, c)| extrapolated(f, c)).collect())
-    }
+    let mut level = MIN_LEVEL - 1;
+    let mut estimate = None;
+    let (certified, reached) = goal_oriented::refine(scene, |certified| {
+        level += 1;
+        let reference = Reference::from_certified(certified);
+        let found = reference.estimate(&certified.responses, level);
+        estimate = Some(found);
+        found.worst() <= tolerance
+    })?;
+    let Some(estimate) = estimate.filter(|_| reached) else {
+        let reached = estimate.map_or(f64::INFINITY, |e| e.worst());
+        return Err(ModelError::ToleranceNotReached { tolerance, reached });
+    };
+    let planar = certified.model.planar().clone();
+    debug_assert_eq!(method.integration, Integration::FemT6);
+    Ok((TissueModel::on(scene, planar, certified.model.spacing())?, estimate))
 }
 
 /// A solution on quadratic triangles, extrapolated, to judge others by.
 #[derive(Debug, Clone)]
 pub struct Reference {
     responses: Vec<RestResponse>,
-    /// What it leaves open: worst relative error of its finest level.
+    open_by_paddle: Vec<f64>,
+    open_displacement: f64,
+    /// What it leaves open: worst relative error, of all paddles' measures and of the displacements.
     pub open: f64,
-    /// Nodes of the finer level.
+    /// Nodes of the finer mesh.
     pub nodes: usize,
 }
 
 impl Reference {
-    /// Refines until the levels leave no more open than `share`, or as far as nodes are accepted.
+    /// Refines until what the limit leaves open is no more than `share`, or as far as nodes are accepted.
     ///
     /// # Errors
     /// [`ModelError`] as for any model.
     pub fn compute(scene: &Scene, share: f64) -> Result<Self, ModelError> {
-        let method = Method::new(Integration::FemT6);
-        let mut levels = Levels::default();
-        let mut finest = None;
-        for level in -1..=MAX_LEVEL {
-            let model = match graded_model(scene, method, level) {
-                Ok(model) => model,
-                Err(ModelError::TooManyNodes { .. }) if finest.is_some() => break,
-                Err(error) => return Err(error),
-            };
-            levels.push(&model)?;
-            let (Some(error), Some(responses)) = (levels.error(), levels.limit()) else { continue };
-            // Extrapolation removes most of what the finest level leaves; all of it is taken to remain. Around
-            // inclusions, where the order is not quite one, half of it was too little (0.17 % against 0.12 % on
-            // `paper-hull`).
-            let open = error.0.max(error.1);
-            finest = Some(Self { responses, open, nodes: model.nodes() });
-            if open <= share {
-                break;
-            }
+        let (certified, _) = goal_oriented::refine(scene, |certified| certified.worst_open() <= share)?;
+        Ok(Self::from_certified(&certified))
+    }
+
+    fn from_certified(certified: &Certified) -> Self {
+        Self {
+            responses: certified.limit.clone(),
+            open_by_paddle: certified.open.clone(),
+            open_displacement: certified.open_displacement,
+            open: certified.worst_open(),
+            nodes: certified.nodes,
         }
-        finest.ok_or(ModelError::ToleranceNotReached { tolerance: share, reached: f64::INFINITY })
+    }
+
+    /// Estimated relative errors of the controllability measures, paddle by paddle: the distance to the limit, and what
+    /// that leaves open.
+    pub fn errors(&self, responses: &[RestResponse]) -> Vec<f64> {
+        let off = responses
+            .iter()
+            .zip(&self.responses)
+            .map(|(found, limit)| (found.controllability_measure / limit.controllability_measure - 1.0).abs());
+        off.zip(&self.open_by_paddle).map(|(off, open)| off + open).collect()
     }
 
     /// Worst relative distance of the controllability measures, and of the small-depth target displacements over the
@@ -226,10 +186,10 @@ impl Reference {
     }
 
     fn estimate(&self, responses: &[RestResponse], level: i32) -> ErrorEstimate {
-        let (controllability, target_displacement) = distance(responses, &self.responses);
+        let (_, target_displacement) = distance(responses, &self.responses);
         ErrorEstimate {
-            controllability: controllability + self.open,
-            target_displacement: target_displacement + self.open,
+            controllability: self.errors(responses).into_iter().fold(0.0, f64::max),
+            target_displacement: target_displacement + self.open_displacement,
             reference: self.open,
             reference_nodes: self.nodes,
             level,
@@ -246,13 +206,4 @@ pub fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
             displacement.max((a.target_per_depth - b.target_per_depth).norm() / largest),
         )
     })
-}
-
-/// The limit of a sequence whose error halves from level to level, from one level and that two before it.
-fn extrapolated(fine: &RestResponse, coarse: &RestResponse) -> RestResponse {
-    RestResponse {
-        controllability_measure: (4.0 * fine.controllability_measure - coarse.controllability_measure) / 3.0,
-        target_per_depth: (fine.target_per_depth * 4.0 - coarse.target_per_depth) / 3.0,
-        ..*fine
-    }
 }

@@ -4,6 +4,7 @@
 pub mod adaptive;
 pub mod controllability;
 pub mod cross_check;
+mod goal_oriented;
 pub mod rest;
 pub mod study;
 pub mod verdict;

@@ -23,49 +23,101 @@ pub struct RestResponse {
     pub target_per_depth: Vector2<f64>,
 }
 
+/// Displacements of one body to unit rates, as nodal coefficients one after the other: paddle along x, paddle along y,
+/// needle along its axis, and, where they were asked for, to unit loads on the target along x and y.
+#[derive(Debug, Clone)]
+pub(super) struct Fields {
+    coefficients: Vec<f64>,
+    unknowns: usize,
+}
+
+impl Fields {
+    /// Field f in the order above.
+    pub(super) fn field(&self, f: usize) -> &[f64] {
+        &self.coefficients[f * self.unknowns..(f + 1) * self.unknowns]
+    }
+}
+
+/// Rates that are prescribed: paddle along x, along y, needle along its axis.
+const RATES: usize = 3;
+
 /// Responses of all paddles of the model's scene, in its order.
 ///
 /// # Errors
 /// [`ModelError`] when the tangent at rest is singular or a paddle cannot control the target.
 pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelError> {
-    let rule = model.rule();
-    let nodes = model.nodes();
     let count = model.scene().paddles.len();
-    let Some(all) = (0..count).map(|p| model.constrained_rows(Some(p))).collect::<Option<Vec<ConstrainedRows>>>()
-    else {
+    if (0..count).any(|p| model.constrained_rows(Some(p)).is_none()) {
         return (0..count).map(|paddle| rest_response_weakly_imposed(model, paddle)).collect();
-    };
+    }
+    let mut responses = Vec::with_capacity(count);
+    for_each_paddle(model, Loads::None, |paddle, fields| {
+        responses.push(response_of(model, paddle, fields)?);
+        Ok(())
+    })?;
+    Ok(responses)
+}
+
+/// Which loads are looked at besides the rates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Loads {
+    /// None.
+    None,
+    /// Unit loads on the target: the adjoint of asking for its displacement.
+    OnTarget,
+}
+
+/// Solves for every paddle in turn and hands its fields to `visit`: one assembly and one analysis, a factor each. All
+/// right-hand sides pass through a factor together.
+///
+/// # Errors
+/// [`ModelError`] when the tangent at rest is singular, the nodal values are not imposed exactly, or from `visit`.
+pub(super) fn for_each_paddle(
+    model: &TissueModel,
+    loads: Loads,
+    mut visit: impl FnMut(usize, &Fields) -> Result<(), ModelError>,
+) -> Result<(), ModelError> {
+    let rule = model.rule();
+    let unknowns = 2 * model.nodes();
+    let all: Vec<ConstrainedRows> = (0..model.scene().paddles.len())
+        .map(|p| model.constrained_rows(Some(p)))
+        .collect::<Option<_>>()
+        .ok_or_else(|| ModelError::Unsupported("these responses need essential = \"transformation\"".into()))?;
     let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(all.iter().flat_map(ConstrainedRows::node_lists));
-    let pattern = Pattern::new(2, nodes, lists);
+    let pattern = Pattern::new(2, model.nodes(), lists);
     let blocks = BlockPositions::new(rule, &pattern);
-    let (mut state, mut force) = (State::default(), vec![0.0; 2 * nodes]);
-    internal_force(rule, model.tissue(), &vec![0.0; 2 * nodes], &mut state, &mut force)
+    let (mut state, mut force) = (State::default(), vec![0.0; unknowns]);
+    internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)
         .map_err(|_| singular("at rest"))?;
     let mut at_rest = vec![0.0; pattern.entries()];
     tangent(rule, model.tissue(), &state, &pattern, &blocks, &mut at_rest);
 
     let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), ConstrainedRows::default());
-    // Paddle along x, paddle along y, needle along its axis: three right-hand sides pass through each factor together.
-    const RATES: usize = 3;
-    let zero = vec![0.0; RATES * 2 * nodes];
-    let mut response = vec![0.0; RATES * 2 * nodes];
-    let mut responses = Vec::with_capacity(all.len());
+    let columns = RATES + if loads == Loads::OnTarget { 2 } else { 0 };
+    let mut forces = vec![0.0; columns * unknowns];
+    for (column, axis) in (RATES..columns).zip(0..2) {
+        for (&i, value) in model.target_row().nodes.iter().zip(&model.target_row().values) {
+            forces[column * unknowns + 2 * i as usize + axis] += value;
+        }
+    }
+    let mut fields = Fields { coefficients: vec![0.0; columns * unknowns], unknowns };
     for (paddle, rows) in all.into_iter().enumerate() {
-        let mut multipliers = vec![0.0; RATES * 2 * rows.len()];
+        let mut multipliers = vec![0.0; columns * 2 * rows.len()];
         solver.constrain(rows);
         solver.load(&at_rest);
         solver.factorise().map_err(|_| singular("the tangent at rest is not positive definite"))?;
-        let rates = [
+        let mut rates = [
             model.prescribed_values(Some(paddle), 0.0, Vector2::x()),
             model.prescribed_values(Some(paddle), 0.0, Vector2::y()),
             model.prescribed_values(Some(paddle), 1.0, Vector2::zeros()),
-        ];
-        let unknowns = Unknowns { x: &mut response, multipliers: &mut multipliers };
-        solver.solve(&zero, &rates.concat(), 1e-12, unknowns);
-        let target = |rate: usize| model.target_row().interpolate(&response[rate * 2 * nodes..]);
-        responses.push(response_of(model, paddle, Matrix2::from_columns(&[target(0), target(1)]), target(2))?);
+        ]
+        .concat();
+        rates.resize(multipliers.len(), 0.0);
+        let unknowns = Unknowns { x: &mut fields.coefficients, multipliers: &mut multipliers };
+        solver.solve(&forces, &rates, 1e-12, unknowns);
+        visit(paddle, &fields)?;
     }
-    Ok(responses)
+    Ok(())
 }
 
 /// Nitsche's terms change the matrix with the paddle: each has a body of its own.
@@ -73,25 +125,28 @@ fn rest_response_weakly_imposed(model: &TissueModel, paddle: usize) -> Result<Re
     let mut body = model.body(Some(paddle), NewtonSettings::default())?;
     let jacobian = body.actuation_jacobian()?;
     let target_per_depth = body.depth_sensitivity()?;
-    response_of(model, paddle, jacobian, target_per_depth)
+    RestResponse::of(model, paddle, jacobian, target_per_depth)
 }
 
-fn response_of(
-    model: &TissueModel,
-    paddle: usize,
-    jacobian: Matrix2<f64>,
-    target_per_depth: Vector2<f64>,
-) -> Result<RestResponse, ModelError> {
-    let scene = model.scene();
-    let direction = best_direction(&jacobian, scene.needle.orthogonal()).map_err(|singular| {
-        ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition: singular.condition }
-    })?;
-    Ok(RestResponse {
-        jacobian,
-        controllability_measure: direction.norm(),
-        best_direction: direction,
-        target_per_depth,
-    })
+/// What the fields of one paddle say about it.
+pub(super) fn response_of(model: &TissueModel, paddle: usize, fields: &Fields) -> Result<RestResponse, ModelError> {
+    let target = |rate: usize| model.target_row().interpolate(fields.field(rate));
+    RestResponse::of(model, paddle, Matrix2::from_columns(&[target(0), target(1)]), target(2))
+}
+
+impl RestResponse {
+    pub(super) fn of(
+        model: &TissueModel,
+        paddle: usize,
+        jacobian: Matrix2<f64>,
+        target_per_depth: Vector2<f64>,
+    ) -> Result<Self, ModelError> {
+        let scene = model.scene();
+        let direction = best_direction(&jacobian, scene.needle.orthogonal()).map_err(|singular| {
+            ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition: singular.condition }
+        })?;
+        Ok(Self { jacobian, controllability_measure: direction.norm(), best_direction: direction, target_per_depth })
+    }
 }
 
 fn singular(detail: &str) -> Failure {
