@@ -9,7 +9,8 @@ use host_sim::bench::stability::behaviour::Resolution;
 use host_sim::bench::stability::simulate;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
-use host_sim::report::stability::{csv, figure, summary};
+use host_sim::report::stability::{csv, summary};
+use host_sim::report::stability_chart::figure;
 use model_offline::scene::Scene;
 
 use super::progress::Bar;

@@ -1,9 +1,9 @@
 //! Every sample and every tick accounted for.
 
 use maud::{Markup, html};
+use model_offline::output::chart::number::{NO_NUMBER, count};
 
 use super::insertion::strategies;
-use super::number::{NO_NUMBER, count};
 use crate::bench::result::RunResult;
 use crate::runtime::ledger::LedgerResult;
 

@@ -1,25 +1,22 @@
 //! The report: one HTML file and pictures, made from a [`RunResult`] alone.
 //!
-//! The page needs no network and no script to be read: the script only moves the bodies along the insertion. Charts are
-//! drawn here, by a small module of axes and marks (`chart`), and styled by the page, so that they follow light, dark
-//! and print.
+//! The page needs no network and no script to be read: the script only moves the bodies along the insertion. Charts come
+//! from [`model_offline::output::chart`] and are styled by the page, so that they follow light, dark and print.
 
 mod attachments;
-mod axis;
-mod chart;
 pub mod directory;
+mod embed;
 mod insertion;
 mod ledger;
-mod number;
 pub mod paper;
 mod placement;
 mod scene;
 mod settings;
 mod slider;
 pub mod stability;
+pub mod stability_chart;
 mod style;
 pub mod summary;
-mod svg;
 mod timing;
 pub mod timing_summary;
 mod view;
@@ -31,11 +28,12 @@ pub(crate) use self::view::mesh;
 mod tests;
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use model_offline::output::chart::number::{in_unit, number, plain};
+use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
 
+use self::embed::{charts, inline, panels};
 use self::insertion::{CaseCharts, case_charts, case_name, strategies};
-use self::number::{in_unit, number, plain};
 use self::paper::{is_paper, paper_optima};
-use self::svg::{Drawing, sheet};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 
 const SCRIPT: &str = include_str!("page.js");
@@ -52,10 +50,6 @@ const PARTS: [(&str, &str); 7] = [
     ("ledger", "Ledger"),
     ("repeat", "To repeat it"),
 ];
-
-fn charts(drawings: &[Drawing]) -> Markup {
-    html! { div.charts { @for drawing in drawings { figure { (drawing.inline()) } } } }
-}
 
 /// The dynamic strategy of a case: lockstep, or free-run where that is all.
 fn dynamic(case: &CaseResult) -> Option<&StrategyResult> {
@@ -81,6 +75,15 @@ fn sentence(run: &RunResult) -> String {
         })
         .collect();
     let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
+    let reduction = reduction(run).map_or_else(String::new, |range| {
+        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's")
+    });
+    let text = format!("{}{agreement}{reduction}.", placements.join("; "));
+    text.replacen("tissue", "Tissue", 1)
+}
+
+/// How many times smaller the dynamic paddle's largest error is than the static one's, over all cases.
+fn reduction(run: &RunResult) -> Option<String> {
     let factors: Vec<f64> =
         run.cases.iter().filter_map(|case| case.improvement).filter(|factor| factor.is_finite()).collect();
     let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
@@ -88,13 +91,7 @@ fn sentence(run: &RunResult) -> String {
     // Small factors with a digit behind the point: "1 times smaller" says nothing.
     let factor = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
     let range = if factor(low) == factor(high) { factor(low) } else { format!("{} to {}", factor(low), factor(high)) };
-    let reduction = if factors.is_empty() {
-        String::new()
-    } else {
-        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's")
-    };
-    let text = format!("{}{agreement}{reduction}.", placements.join("; "));
-    text.replacen("tissue", "Tissue", 1)
+    (!factors.is_empty()).then_some(range)
 }
 
 fn head(run: &RunResult) -> Markup {
@@ -155,7 +152,7 @@ fn part(number: usize, content: &Markup) -> Markup {
 fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
     let frames = strategies_of(run).map(|strategy| strategy.frames.len()).max().unwrap_or(0);
     html! {
-        figure.scene { (scene::at_rest(run).inline()) figcaption {
+        figure.scene { (inline(&scene::at_rest(run))) figcaption {
             "At rest: outline, nodes (dots), immobile boundary (hatched), needle with its contact and direction, paddle \
              positions with their numbers (the best dynamic one blue, with a star)"
             @if !run.geometry.inclusions.is_empty() { ", inclusion of the tissue “inclusion”" }
@@ -178,7 +175,7 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
         @for (i, case) in run.cases.iter().enumerate() {
             div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
         }
-        figure.colours { (surface.colour_bar(run).inline()) }
+        figure.colours { (inline(&surface.colour_bar(run))) }
         p.quiet {
             @if frames > 1 { "Between " (frames) " solved states per strategy the slider interpolates. " }
             "A strategy that would repeat another case is left out."
@@ -194,7 +191,7 @@ fn static_part(run: &RunResult) -> Markup {
     html! {
         p { "The paddle is attached and held while the needle goes in. The best place is where the target's largest \
              displacement orthogonal to the needle is smallest." }
-        (charts(&placement::static_charts(run)))
+        (panels(&placement::static_charts(run)))
         @if is_paper(&run.scene) {
             p.quiet { "The values of the paper's Figures 2 and 3 are not available, only the optima that its text names: \
                        4 in homogeneous tissue, 2 with the inclusion. These are marked." }
@@ -207,7 +204,7 @@ fn controllability_part(run: &RunResult) -> Markup {
     html! {
         p { "How far the paddle has to move to move the target by one unit orthogonal to the needle: ‖J⁻¹n‖, where J is \
              d(target)/d(paddle) at rest with the needle held. Less is better." }
-        (charts(&placement::controllability_charts(run)))
+        (panels(&placement::controllability_charts(run)))
         (placement::controllability_table(run))
     }
 }
@@ -218,7 +215,7 @@ fn insertion_part(run: &RunResult, cases: &[CaseCharts]) -> Markup {
              others, so it is also drawn alone, on its own scale." }
         @for (case, drawn) in run.cases.iter().zip(cases) {
             h3 { "Tissue: " (case_name(case)) }
-            (charts(&drawn.drawings))
+            (charts(&drawn.drawings()))
         }
         (insertion::table(run))
     }
@@ -270,33 +267,60 @@ pub fn render_with(run: &RunResult, attachments: &Attachments) -> String {
     page.into_string()
 }
 
+/// Panels as a file of their own.
+fn figure(title: String, panels: Vec<Panel>, columns: usize) -> String {
+    Figure { title, caption: String::new(), panels, columns }.svg()
+}
+
+/// The best paddle of every tissue.
+fn best(run: &RunResult, of: fn(&PlacementResult) -> u32) -> String {
+    let names = run.placements.iter().map(|placement| format!("{} {}", placement.tissue, of(placement)));
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// The scene at rest and its body side by side, under a title.
+fn scene_picture(run: &RunResult, drawings: &[Drawing]) -> String {
+    let title = format!("Scene {}: at rest, and at full depth under the dynamic paddle", run.scene);
+    let scene = sheet("", drawings, 2);
+    let caption =
+        "Dots: nodes; hatched: immobile; ring: target; numbers: paddle positions, the best dynamic one with a star.";
+    sheet(&title, &[heading(&title, caption, scene.size[0]), scene], 1).file()
+}
+
 /// Pictures for use elsewhere: file name and SVG, on a white ground.
 pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     let surface = scene::Surface::new(run);
     let mut scene = vec![scene::at_rest(run)];
     if let Some((i, case)) = run.cases.iter().enumerate().find(|(_, case)| dynamic(case).is_some()) {
-        let strategy = dynamic(case).into_iter();
-        scene
-            .extend(strategy.map(|strategy| surface.body(run, String::new(), &format!("dynamic, case {i}"), strategy)));
+        let body = |strategy| surface.body(run, String::new(), &format!("dynamic, case {i}"), strategy);
+        let body = dynamic(case).map(body);
+        scene.extend(body.map(|body| sheet("", &[body, surface.colour_bar(run)], 1)));
     }
-    let insertion: Vec<Drawing> =
-        run.cases.iter().enumerate().flat_map(|(i, case)| case_charts(run, i, case).drawings).collect();
+    let insertion: Vec<Panel> =
+        run.cases.iter().enumerate().flat_map(|(i, case)| case_charts(run, i, case).panels()).collect();
     let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
+    let reduction = reduction(run).map_or_else(
+        || "Error along the insertion".to_owned(),
+        |range| format!("The dynamic paddle's largest error is {range} times smaller than the static one's"),
+    );
+    let static_title = format!("Best static paddle: {}", best(run, |placement| placement.best_static));
+    let dynamic_title = format!("Best dynamic paddle: {}", best(run, |placement| placement.best_dynamic));
+    let mut pictures = vec![
+        ("scene.svg", scene_picture(run, &scene)),
+        ("static-error.svg", figure(static_title, placement::static_charts(run), 2)),
+        ("controllability.svg", figure(dynamic_title, placement::controllability_charts(run), 2)),
+        ("error-along-insertion.svg", figure(reduction, insertion, columns)),
+    ];
     let mut timing = timing::charts(run);
     timing.truncate(3);
-    let mut pictures = vec![
-        ("scene.svg", sheet(&scene, 2)),
-        ("static-error.svg", sheet(&placement::static_charts(run), 2)),
-        ("controllability.svg", sheet(&placement::controllability_charts(run), 2)),
-        ("error-along-insertion.svg", sheet(&insertion, columns)),
-    ];
     if !timing.is_empty() {
-        pictures.push(("timing-histogram.svg", sheet(&timing, 3)));
+        pictures
+            .push(("timing-histogram.svg", figure("Timing of the controller's loop, free-run".to_owned(), timing, 3)));
     }
     pictures
 }
 
 /// Histograms of loops with bins of 1 µs and logarithmic axes, as one picture.
 pub fn timing_histograms(loops: &[(&str, &crate::runtime::durations::LoopTiming)]) -> String {
-    sheet(&timing::histograms(loops), 3)
+    figure("Timing of the loops".to_owned(), timing::histograms(loops), 3)
 }

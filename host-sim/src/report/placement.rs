@@ -1,16 +1,16 @@
 //! Where to put the paddle: the paper's Figures 2 and 3 and its Table III.
 
 use maud::{Markup, html};
+use model_offline::output::chart::number::{NO_NUMBER, in_unit, minus, number, plain};
+use model_offline::output::chart::{Axis, Bars, Colour, Dash, Marker, Panel, Place, ReferenceLine, Series, Strip};
 
-use super::axis::Axis;
-use super::chart::Chart;
-use super::number::{NO_NUMBER, in_unit, number, plain};
 use super::paper::{is_paper, paper_controllability, paper_optima};
-use super::svg::{Drawing, Marker};
 use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
 
-fn names(placement: &PlacementResult) -> impl Iterator<Item = String> {
-    placement.paddles.iter().map(|paddle| paddle.index.to_string())
+/// Paddles as places of an axis, one of them with words below its number.
+fn places(placement: &PlacementResult, best: u32, words: &str) -> Axis {
+    let name = |index: u32| if index == best { format!("{index}\n{words}") } else { index.to_string() };
+    Axis::categories("paddle position", placement.paddles.iter().map(|paddle| name(paddle.index)).collect())
 }
 
 /// Place of a paddle on the horizontal axis.
@@ -22,51 +22,57 @@ fn at_the_end(paddle: &PaddlePlacement) -> f64 {
     paddle.orthogonal.last().copied().unwrap_or(f64::NAN)
 }
 
+/// Points of a chart over the paddles.
+fn over(placement: &PlacementResult, value: impl Fn(&PaddlePlacement) -> f64) -> Vec<(f64, f64)> {
+    placement.paddles.iter().enumerate().map(|(i, paddle)| (i as f64, value(paddle))).collect()
+}
+
 /// Orthogonal displacement with every paddle held, one chart per tissue on the same scale.
-pub(super) fn static_charts(run: &RunResult) -> Vec<Drawing> {
+pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
     let all = run.placements.iter().flat_map(|placement| &placement.paddles);
     let values: Vec<f64> = all.flat_map(|paddle| [0.0, at_the_end(paddle), paddle.max_orthogonal]).collect();
     run.placements
         .iter()
         .map(|placement| {
             let figure = match placement.tissue.name() {
-                "homogeneous" if is_paper(&run.scene) => ", as in Figure 2",
-                "inclusion" if is_paper(&run.scene) => ", as in Figure 3",
+                "homogeneous" if is_paper(&run.scene) => " (the paper's Figure 2)",
+                "inclusion" if is_paper(&run.scene) => " (the paper's Figure 3)",
                 _ => "",
             };
-            let mut chart = Chart::new(
-                &format!("Tissue: {}{figure}", placement.tissue),
-                &format!("Static error against paddle position, tissue {}", placement.tissue),
-                Axis::places("paddle position", names(placement)),
-                Axis::linear("orthogonal displacement", &run.units[0], values.iter().copied()),
+            let mut panel = Panel::new(
+                &format!(
+                    "Tissue {}: paddle {} moves the target least{figure}",
+                    placement.tissue, placement.best_static
+                ),
+                places(placement, placement.best_static, "best static"),
+                Axis::linear("orthogonal displacement", &run.units[0]).enclosing(values.iter().copied()),
             );
+            panel.description = format!("Static error against paddle position, tissue {}", placement.tissue);
             if let Some((optimum, _)) = paper_optima(&run.scene, placement.tissue)
                 && let Some(x) = place(placement, optimum)
             {
-                chart.strip("strip", "the paper's optimum", x - 0.4, x + 0.4);
+                panel.strips.push(Strip { label: "the paper's optimum".to_owned(), range: [x - 0.4, x + 0.4] });
             }
-            let points = || placement.paddles.iter().enumerate().map(|(i, paddle)| (i as f64, paddle));
-            chart.segment("zero", [-0.5, 0.0], [placement.paddles.len() as f64 - 0.5, 0.0]);
-            for (x, paddle) in points() {
-                chart.segment("stem", [x, 0.0], [x, at_the_end(paddle)]);
-            }
-            chart.markers(Marker::Disc, "ours", "at full depth", points().map(|(x, p)| [x, at_the_end(p)]));
-            chart.markers(
-                Marker::Dash,
-                "size",
-                "largest size on the way",
-                points().map(|(x, p)| [x, p.max_orthogonal]),
-            );
-            if let Some(x) = place(placement, placement.best_static) {
-                chart.heading(x, "best");
-            }
-            chart.finish()
+            panel.lines.push(ReferenceLine::new("", Place::Y(0.0), Dash::Solid));
+            let ends = over(placement, at_the_end);
+            let stems = ends.iter().map(|(x, y)| [x - 0.02, x + 0.02, *y]).collect();
+            panel.bars.push(Bars { label: String::new(), colour: Colour::Vermillion, bars: stems });
+            panel.series = vec![
+                Series::scatter("at full depth", Colour::Vermillion, Marker::Circle, ends),
+                Series::scatter(
+                    "largest size on the way",
+                    Colour::Ink,
+                    Marker::Dash,
+                    over(placement, |p| p.max_orthogonal),
+                ),
+            ];
+            panel
         })
         .collect()
 }
 
 /// Controllability measures, one chart per tissue on the same scale.
-pub(super) fn controllability_charts(run: &RunResult) -> Vec<Drawing> {
+pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
     let paper = |placement: &PlacementResult, index| paper_controllability(&run.scene, placement.tissue, index);
     let values: Vec<f64> = run
         .placements
@@ -79,26 +85,22 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Drawing> {
     run.placements
         .iter()
         .map(|placement| {
-            let mut chart = Chart::new(
-                &format!("Tissue: {}", placement.tissue),
-                &format!("Controllability measure of every paddle, tissue {}", placement.tissue),
-                Axis::places("paddle position", names(placement)),
-                Axis::linear("controllability measure ‖J⁻¹n‖ (less is better)", "1", values.iter().copied()),
+            let mut panel = Panel::new(
+                &format!("Tissue {}: paddle {} needs the least travel", placement.tissue, placement.best_dynamic),
+                places(placement, placement.best_dynamic, "best dynamic"),
+                Axis::linear("controllability measure ‖J⁻¹n‖ (less is better)", "1").enclosing(values.iter().copied()),
             );
-            let points = || placement.paddles.iter().enumerate().map(|(i, paddle)| (i as f64, paddle));
-            let reported: Vec<[f64; 2]> =
-                points().filter_map(|(x, p)| paper(placement, p.index).map(|value| [x, value])).collect();
+            panel.description = format!("Controllability measure of every paddle, tissue {}", placement.tissue);
+            let places = placement.paddles.iter().enumerate();
+            let reported: Vec<(f64, f64)> =
+                places.filter_map(|(i, p)| paper(placement, p.index).map(|value| (i as f64, value))).collect();
             if !reported.is_empty() {
-                chart.line("paper-line", "", reported.iter().copied());
-                chart.markers(Marker::Diamond, "paper", "the paper's Table III", reported);
+                let series = Series::scatter("the paper's Table III", Colour::Ink, Marker::Diamond, reported);
+                panel.series.push(series.open().joined(Dash::Dashed));
             }
-            let measures = || points().map(|(x, paddle)| [x, paddle.controllability_measure]);
-            chart.line("ours-line", "", measures());
-            chart.markers(Marker::Disc, "ours", "this run", measures());
-            if let Some(x) = place(placement, placement.best_dynamic) {
-                chart.heading(x, "best");
-            }
-            chart.finish()
+            let ours = over(placement, |p| p.controllability_measure);
+            panel.series.push(Series::scatter("this run", Colour::Blue, Marker::Circle, ours).joined(Dash::Solid));
+            panel
         })
         .collect()
 }
@@ -110,7 +112,7 @@ fn mark(best: bool) -> Option<&'static str> {
 fn deviation(value: f64, reference: Option<f64>) -> String {
     match reference {
         Some(reference) if (value / reference).is_finite() => {
-            super::number::minus(format!("{:+.1} %", (value / reference - 1.0) * 100.0))
+            minus(format!("{:+.1} %", (value / reference - 1.0) * 100.0))
         }
         _ => NO_NUMBER.to_owned(),
     }

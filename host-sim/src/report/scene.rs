@@ -3,17 +3,17 @@
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
+use model_offline::output::chart::number::{in_unit, number};
+use model_offline::output::chart::style::band;
+use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
 
-use super::number::{in_unit, number, plain};
-use super::svg::{Anchor, Drawing, Px};
+use super::embed::inline;
 use super::view::{View, along, inside, middle};
 use crate::bench::result::{CaseResult, Geometry, RunResult, StrategyResult};
 
 /// Width of the scene and of a body, px.
 const SCENE_WIDTH: f64 = 420.0;
 const BODY_WIDTH: f64 = 300.0;
-/// Colours of the displacement field.
-pub(super) const BANDS: usize = 10;
 
 /// Short strokes on the outer side of the immobile boundary.
 fn hatch(drawing: &mut Drawing, view: &View, geometry: &Geometry, part: &[[f64; 2]]) {
@@ -72,7 +72,7 @@ fn beside(geometry: &Geometry, extent: f64, segment: &[[f64; 2]; 2]) -> [f64; 2]
 pub(super) fn at_rest(run: &RunResult) -> Drawing {
     let geometry = &run.geometry;
     let view = View::new(run, SCENE_WIDTH);
-    let mut drawing = Drawing::new(view.size, format!("Scene {} at rest", run.scene));
+    let mut drawing = Drawing::new(view.size(), format!("Scene {} at rest", run.scene));
     drawing.polygon("body", &view.path(&geometry.outline));
     for inclusion in &geometry.inclusions {
         drawing.polygon("inclusion", &view.path(inclusion));
@@ -105,18 +105,18 @@ fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 /// Names of the parts, beside them.
 fn words(drawing: &mut Drawing, view: &View, geometry: &Geometry) {
     let [x, y] = view.at(geometry.target);
-    drawing.text("small halo", [x - 12.0, y - 12.0], Anchor::End, "target");
+    drawing.text("tick halo", [x - 12.0, y - 12.0], Anchor::End, "target");
     let [needle, _] = view.needle(geometry, 0.0);
-    drawing.text("small halo", [needle[0] + 9.0, needle[1] + 12.0], Anchor::Start, "needle");
+    drawing.text("tick halo", [needle[0] + 9.0, needle[1] + 12.0], Anchor::Start, "needle");
     if let Some(inclusion) = geometry.inclusions.first() {
         let low = view.path(inclusion).iter().map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max);
         let [x, _] = view.at(middle(inclusion));
-        drawing.text("small halo", [x, low + 14.0], Anchor::Middle, "inclusion");
+        drawing.text("tick halo", [x, low + 14.0], Anchor::Middle, "inclusion");
     }
     if let Some(part) = geometry.immobile.first() {
         let [x, y] = view.at(middle(part));
-        let (anchor, shift) = if x > 0.5 * view.size[0] { (Anchor::End, -10.0) } else { (Anchor::Start, 10.0) };
-        drawing.text("small halo", [x + shift, y + 4.0], anchor, "immobile");
+        let (anchor, shift) = if x > 0.5 * view.size()[0] { (Anchor::End, -10.0) } else { (Anchor::Start, 10.0) };
+        drawing.text("tick halo", [x + shift, y + 4.0], anchor, "immobile");
     }
 }
 
@@ -161,22 +161,18 @@ impl Surface {
         }
     }
 
-    fn band(&self, displacement: f64) -> usize {
-        ((displacement / self.largest * BANDS as f64) as usize).min(BANDS - 1)
-    }
-
     /// The body at full depth: displacement field, outlines, needle, paddle, target.
     pub(super) fn body(&self, run: &RunResult, id: String, name: &str, strategy: &StrategyResult) -> Drawing {
         let (view, geometry) = (&self.view, &run.geometry);
         let nodes = displaced(view, geometry, &strategy.deformed_nodes);
-        let mut drawing = Drawing::new(view.size, format!("Body at full depth: {name}"));
+        let mut drawing = Drawing::new(view.size(), format!("Body at full depth: {name}"));
         drawing.id = id;
         drawing.open_group("field");
         for corners in &self.triangles {
             let corners: Vec<_> = corners.iter().filter_map(|corner| nodes.get(*corner)).collect();
             let displacement = corners.iter().map(|corner| corner.1).sum::<f64>() / corners.len().max(1) as f64;
             let points: Vec<Px> = corners.iter().map(|corner| corner.0).collect();
-            drawing.polygon(&format!("f{}", self.band(displacement)), &points);
+            drawing.polygon(&band(displacement / self.largest), &points);
         }
         drawing.close_group();
         drawing.polygon("rest", &view.path(&geometry.outline));
@@ -207,20 +203,8 @@ impl Surface {
 
     /// The colours and what they mean.
     pub(super) fn colour_bar(&self, run: &RunResult) -> Drawing {
-        let mut drawing = Drawing::new([BODY_WIDTH, 44.0], "Colours of the displacement");
-        let width = (BODY_WIDTH - 20.0) / BANDS as f64;
-        for band in 0..BANDS {
-            drawing.rectangle(&format!("f{band}"), [10.0 + band as f64 * width, 4.0], [width, 12.0]);
-        }
-        let largest = self.largest / self.view.length(1.0);
-        for part in [0.0, 0.5, 1.0] {
-            let x = 10.0 + part * (BODY_WIDTH - 20.0);
-            let anchor = [Anchor::Start, Anchor::Middle, Anchor::End][(part * 2.0) as usize];
-            drawing.text("tick", [x, 30.0], anchor, &plain(part * largest));
-        }
         let what = in_unit("size of the displacement", &run.units[0]);
-        drawing.text("muted", [0.5 * BODY_WIDTH, 43.0], Anchor::Middle, &what);
-        drawing
+        colour_bar(BODY_WIDTH, &what, self.largest / self.view.length(1.0))
     }
 }
 
@@ -230,7 +214,7 @@ pub(super) fn bodies(run: &RunResult, surface: &Surface, case_number: usize, cas
         div.bodies {
             @for (class, name, strategy) in super::insertion::strategies(case).iter().filter(|shown| shown.0 != "free") {
                 figure {
-                    (surface.body(run, body_id(case_number, class), name, strategy).inline())
+                    (inline(&surface.body(run, body_id(case_number, class), name, strategy)))
                     figcaption {
                         b { (name) @if let Some(paddle) = strategy.paddle { ", paddle " (paddle) } }
                         " · " output id=(format!("{}-numbers", body_id(case_number, class))) {

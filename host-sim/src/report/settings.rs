@@ -1,9 +1,9 @@
 //! Everything that is needed to do it again.
 
 use maud::{Markup, html};
+use model_offline::output::chart::number::{NO_NUMBER, count, number, plain};
 
 use super::insertion::{case_name, strategies};
-use super::number::{NO_NUMBER, count, number, plain};
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
 
 /// A word of a command line as a shell takes it.

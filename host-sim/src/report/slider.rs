@@ -1,9 +1,10 @@
 //! What the page's slider needs: the body along the way and the time series, as numbers only.
 
+use model_offline::output::chart::style::BANDS;
 use serde::Serialize;
 
 use super::insertion::{CaseCharts, strategies};
-use super::scene::{BANDS, Surface, body_id};
+use super::scene::{Surface, body_id};
 use crate::bench::result::{RunResult, StrategyResult};
 
 /// Points of a time series that the slider can show.
@@ -22,7 +23,7 @@ struct Data<'a> {
     normal: [f64; 2],
     scale: f64,
     bodies: Vec<Body>,
-    charts: Vec<&'a (String, [f64; 4])>,
+    charts: Vec<(String, [f64; 4])>,
 }
 
 #[derive(Serialize)]
@@ -92,7 +93,7 @@ pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) ->
         normal: geometry.orthogonal,
         scale: surface.view.length(1.0),
         bodies,
-        charts: charts.iter().flat_map(|case| &case.spans).collect(),
+        charts: charts.iter().flat_map(CaseCharts::spans).collect(),
     };
     // Numbers that are not finite become null, which the page skips.
     serde_json::to_string(&data).unwrap_or_else(|_| "null".to_owned()).replace('<', "\\u003c")

@@ -1,13 +1,12 @@
-//! The closed loop's stability as CSV, as a chart, and on one screen.
+//! The closed loop's stability as CSV and on one screen.
 
 use std::fmt::Write as _;
 
 use firmware::stability::gain_limit;
-use model_offline::output::chart::{Axis, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
 
 use crate::bench::stability::StabilityResult;
 use crate::bench::stability::behaviour::Behaviour;
-use crate::bench::stability::cells::{ANGLES, Boundary, DELAYS};
+use crate::bench::stability::cells::{Boundary, DELAYS};
 use crate::bench::stability::mismatch::Mismatch;
 use crate::bench::stability::rate_limit::{self, Cell, Law};
 use crate::bench::tissue::Tissue;
@@ -98,148 +97,11 @@ fn rate_limit_row(c: &Cell) -> [String; 22] {
     row
 }
 
-const MARKERS: [(Marker, bool); 6] = [
-    (Marker::Circle, true),
-    (Marker::Square, false),
-    (Marker::Triangle, true),
-    (Marker::Diamond, false),
-    (Marker::TriangleDown, true),
-    (Marker::Circle, false),
-];
-const DASHES: [Dash; 4] = [Dash::Solid, Dash::Dashed, Dash::DashDot, Dash::Dotted];
-
-/// Theory beside simulation, tables on other tissue, and rate limits.
-pub fn figure(result: &StabilityResult) -> Figure {
-    let mut panels = vec![boundary_panel(result)];
-    if !result.mismatches.is_empty() {
-        let allowed =
-            ReferenceLine { label: "allowed for".into(), at: Place::Y(result.lambda_max), dash: Dash::Dashed };
-        let unstable = ReferenceLine { label: "unstable below".into(), at: Place::Y(1.0), dash: Dash::Dashed };
-        let size = "largest |λ| of J·Ĵ⁻¹";
-        let (plain, included) = (Tissue::Homogeneous, Tissue::Inclusion);
-        let sizes = |title, table, line| mismatch_panel(result, title, size, table, line, &|m| m.largest);
-        panels.push(sizes("Table does not know of the inclusion", plain, allowed.clone()));
-        panels.push(sizes("Table believes in an inclusion", included, allowed));
-        panels.push(mismatch_panel(
-            result,
-            "… and what that leaves of the margin",
-            "gain limit over gain",
-            included,
-            unstable,
-            &|m| m.simulated_margin,
-        ));
-    }
-    for law in [Law::Plain, Law::AntiWindup] {
-        panels.push(rate_panel(result, law, rate_limit::DELAYS[1]));
-    }
-    Figure {
-        title: format!("Where the closed loop stops being stable: {}", result.scene),
-        caption: "e⁺ = e − g·J·Ĵ⁻¹·e(k−d); lines are theory, markers are simulated".into(),
-        panels,
-        columns: 3,
-    }
-}
-
-/// Limit of the gain against the angle of the eigenvalues, by delay.
-fn boundary_panel(result: &StabilityResult) -> Panel {
-    let mut series = Vec::new();
-    for (k, delay) in DELAYS.into_iter().enumerate() {
-        let curve = (0..=89).map(|a| (f64::from(a), gain_limit(f64::from(a).to_radians(), delay))).collect();
-        let (marker, filled) = MARKERS[k];
-        series.push(Series::curve("", DASHES[k % DASHES.len()], curve));
-        let found = result
-            .boundaries
-            .iter()
-            .filter(|b| b.delay == delay && b.size == 1.0 && b.simulated_cells > 0)
-            .map(|b| (b.angle, simulated_limit(result, b)))
-            .collect();
-        series.push(Series {
-            line: Some(DASHES[k % DASHES.len()]),
-            ..Series::scatter(&format!("delay {delay}"), marker, filled, Vec::new())
-        });
-        series.push(Series::scatter("", marker, filled, found));
-    }
-    let largest = ANGLES.iter().copied().fold(0.0, f64::max);
-    Panel {
-        series,
-        ..Panel::new(
-            "Gain, delay and Jacobian error",
-            Axis::linear("|arg λ|, degrees").range(0.0, largest),
-            Axis::log("largest stable g·|λ|").range(0.01, 3.0),
-        )
-    }
-}
-
 /// The middle between the last cell that settles and the first that does not.
-fn simulated_limit(result: &StabilityResult, boundary: &Boundary) -> f64 {
+pub(super) fn simulated_limit(result: &StabilityResult, boundary: &Boundary) -> f64 {
     let gains = result.gains();
     let last = gains[boundary.simulated_cells - 1];
     gains.get(boundary.simulated_cells).map_or(last, |next| (last * next).sqrt())
-}
-
-fn mismatch_panel(
-    result: &StabilityResult,
-    title: &str,
-    label: &str,
-    table: Tissue,
-    line: ReferenceLine,
-    height: &dyn Fn(&Mismatch) -> f64,
-) -> Panel {
-    let mut paddles: Vec<u32> = result.mismatches.iter().map(|m| m.paddle).collect();
-    paddles.sort_unstable();
-    paddles.dedup();
-    let series = paddles
-        .iter()
-        .enumerate()
-        .map(|(k, &paddle)| {
-            let points = result
-                .mismatches
-                .iter()
-                .filter(|m| m.paddle == paddle && m.table == table)
-                .map(|m| (m.depth, height(m)))
-                .collect();
-            let (marker, filled) = MARKERS[(k + 1) % MARKERS.len()];
-            Series { line: Some(Dash::Dotted), ..Series::scatter(&format!("paddle {paddle}"), marker, filled, points) }
-        })
-        .collect::<Vec<_>>();
-    let top = series
-        .iter()
-        .flat_map(|s| &s.points)
-        .map(|p| p.1)
-        .chain(match line.at {
-            Place::Y(y) => Some(y),
-            Place::X(_) => None,
-        })
-        .fold(0.0, f64::max);
-    Panel {
-        series,
-        lines: vec![line],
-        ..Panel::new(title, Axis::linear("needle depth"), Axis::linear(label).range(0.0, 1.15 * top))
-    }
-}
-
-fn rate_panel(result: &StabilityResult, law: Law, delay: u32) -> Panel {
-    let of = |behaviour| {
-        let cells = result.cells.iter().filter(|c| c.law == law && c.delay == delay && c.behaviour == behaviour);
-        cells.map(|c| (c.gain_share, c.amplitude)).collect::<Vec<_>>()
-    };
-    let title = match law {
-        Law::Plain => format!("Rate limit, plain integral, delay {delay}"),
-        Law::AntiWindup => format!("Rate limit, the controller's, delay {delay}"),
-    };
-    Panel {
-        series: vec![
-            Series::scatter("settles", Marker::Dot, false, of(Behaviour::Settles)),
-            Series::scatter("cycles", Marker::Circle, false, of(Behaviour::Cycles)),
-            Series::scatter("only bounded by the limits", Marker::Square, true, of(Behaviour::Diverges)),
-        ],
-        lines: vec![ReferenceLine { label: "linear theory".into(), at: Place::X(1.0), dash: Dash::Dashed }],
-        ..Panel::new(
-            &title,
-            Axis::log("gain over its linear limit").range(0.07, 1.8),
-            Axis::log("error over reach per sample").range(0.08, 130.0),
-        )
-    }
 }
 
 /// One screen.

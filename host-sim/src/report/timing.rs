@@ -1,11 +1,10 @@
 //! How punctual the loops were.
 
 use maud::{Markup, html};
+use model_offline::output::chart::number::{count, number};
+use model_offline::output::chart::{Axis, Bars, Colour, Dash, Panel, Place, ReferenceLine};
 
-use super::axis::Axis;
-use super::chart::Chart;
-use super::number::{count, number};
-use super::svg::Drawing;
+use super::embed::panels;
 use crate::bench::result::RunResult;
 use crate::runtime::durations::{Distribution, LoopTiming};
 
@@ -38,7 +37,12 @@ fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3
 }
 
-fn histogram(name: &str, what: &str, distribution: &Distribution, period_us: f64) -> Drawing {
+/// The power of ten at or above a value.
+fn next_power(value: f64) -> f64 {
+    10f64.powi((value * 0.999_999).log10().ceil() as i32)
+}
+
+fn histogram(name: &str, what: &str, distribution: &Distribution, period_us: f64) -> Panel {
     // Bin 0 has no left end on a logarithmic axis; half a microsecond stands for it.
     let [left, right] = [|bin: u64| (bin as f64).max(0.5), |bin: u64| bin as f64 + 1.0];
     let bins = &distribution.bins_us;
@@ -46,21 +50,25 @@ fn histogram(name: &str, what: &str, distribution: &Distribution, period_us: f64
     let low = 10f64.powi(first.log10().floor() as i32).max(0.5);
     let high = bins.last().map_or(10.0, |bin| right(bin.0)).max(period_us);
     let most = bins.iter().map(|bin| bin.1).max().unwrap_or(1) as f64;
-    let mut chart = Chart::new(
-        &format!("{name}, {what}"),
-        &format!("Histogram of the {what}, {name}"),
-        Axis::logarithmic(&format!("{what} [µs]"), low, high),
-        Axis::logarithmic("ticks per bin of 1 µs", 0.7, most),
+    let [median, late] = [distribution.p50_ns, distribution.p999_ns].map(us);
+    let mut panel = Panel::new(
+        &format!("{name}: {what} below {} µs in 99.9 % of the ticks", number(late, 3)),
+        Axis::log(what, "µs").range(low, next_power(high)),
+        Axis::log("ticks per bin of 1 µs", "").range(0.7, next_power(most.max(1.4))),
     );
-    chart.bars("bar", bins.iter().map(|(bin, ticks)| [left(*bin), right(*bin), *ticks as f64]));
-    chart.mark("limit", us(distribution.p50_ns), &format!("median {}", number(us(distribution.p50_ns), 3)), 0);
-    chart.mark("limit", us(distribution.p999_ns), &format!("99.9 % {}", number(us(distribution.p999_ns), 3)), 1);
-    chart.mark("size", period_us, "period", 2);
-    chart.finish()
+    panel.description = format!("Histogram of the {what}, {name}");
+    let bars = bins.iter().map(|(bin, ticks)| [left(*bin), right(*bin), *ticks as f64]).collect();
+    panel.bars.push(Bars { label: String::new(), colour: Colour::Blue, bars });
+    panel.lines = vec![
+        ReferenceLine::new(&format!("median {} µs", number(median, 3)), Place::X(median), Dash::Dashed),
+        ReferenceLine::new(&format!("99.9 % {} µs", number(late, 3)), Place::X(late), Dash::Dotted),
+        ReferenceLine::new(&format!("period {} µs", number(period_us, 3)), Place::X(period_us), Dash::Solid),
+    ];
+    panel
 }
 
 /// Three histograms per loop.
-pub(super) fn histograms(loops: &[(&str, &LoopTiming)]) -> Vec<Drawing> {
+pub(super) fn histograms(loops: &[(&str, &LoopTiming)]) -> Vec<Panel> {
     loops
         .iter()
         .flat_map(|(name, timing)| {
@@ -71,15 +79,10 @@ pub(super) fn histograms(loops: &[(&str, &LoopTiming)]) -> Vec<Drawing> {
 }
 
 /// Three histograms per controller.
-pub(super) fn charts(run: &RunResult) -> Vec<Drawing> {
-    loops(run)
-        .iter()
-        .filter(|(name, _)| name.ends_with("controller"))
-        .flat_map(|(name, timing)| {
-            let period_us = 1e6 / timing.rate_hz;
-            distributions(timing).map(|(what, distribution)| histogram(name, what, distribution, period_us))
-        })
-        .collect()
+pub(super) fn charts(run: &RunResult) -> Vec<Panel> {
+    let loops = loops(run);
+    let controllers = loops.iter().filter(|(name, _)| name.ends_with("controller"));
+    histograms(&controllers.map(|(name, timing)| (name.as_str(), *timing)).collect::<Vec<_>>())
 }
 
 fn percentiles(run: &RunResult) -> Markup {
@@ -136,7 +139,7 @@ pub(super) fn section(run: &RunResult) -> Markup {
         } @else {
             (counts(run))
             (percentiles(run))
-            (super::charts(&charts(run)))
+            (panels(&charts(run)))
             p.quiet {
                 "Release lateness is start minus scheduled release, execution time end minus start, response time end \
                  minus scheduled release. A deadline miss is a response longer than the period. A period that had passed \

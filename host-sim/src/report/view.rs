@@ -1,8 +1,8 @@
 //! The plane of the scene on paper, and the body's nodes as a surface.
 
+use model_offline::output::chart::{Plane, Px};
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
-use super::svg::Px;
 use crate::bench::result::{Geometry, RunResult};
 
 /// Length of the needle outside the tissue, as a part of the scene's size.
@@ -13,9 +13,7 @@ const MARGIN: f64 = 0.07;
 /// Equal scales on both axes, y upwards.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
-    scale: f64,
-    low: [f64; 2],
-    pub(super) size: Px,
+    plane: Plane,
     /// Larger side of the scene, length.
     pub(super) extent: f64,
 }
@@ -31,25 +29,28 @@ impl View {
         let extent = bounds.extent();
         bounds.add(along(middle(&geometry.needle_contact), geometry.needle_axis, -NEEDLE * extent));
         let margin = MARGIN * bounds.extent();
-        let size = [0, 1].map(|i| bounds.high[i] - bounds.low[i] + 2.0 * margin);
-        // A drawing is at most half as high again as it is wide.
-        let scale = (width / size[0]).min(1.5 * width / size[1]);
-        Self { scale, low: bounds.low.map(|low| low - margin), size: [size[0] * scale, size[1] * scale], extent }
+        let plane = Plane::new(bounds.low.map(|low| low - margin), bounds.high.map(|high| high + margin), width);
+        Self { plane, extent }
+    }
+
+    /// Width and height, px.
+    pub(super) fn size(&self) -> Px {
+        self.plane.size
     }
 
     /// A length, px.
     pub(super) fn length(&self, length: f64) -> f64 {
-        length * self.scale
+        self.plane.length(length)
     }
 
     /// A point, px.
-    pub(super) fn at(&self, [x, y]: [f64; 2]) -> Px {
-        [(x - self.low[0]) * self.scale, self.size[1] - (y - self.low[1]) * self.scale]
+    pub(super) fn at(&self, point: [f64; 2]) -> Px {
+        self.plane.at(point)
     }
 
     /// Points, px.
     pub(super) fn path(&self, points: &[[f64; 2]]) -> Vec<Px> {
-        points.iter().map(|point| self.at(*point)).collect()
+        self.plane.path(points)
     }
 
     /// From the far end of the needle to its contact, at this depth.

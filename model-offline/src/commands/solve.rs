@@ -118,7 +118,7 @@ fn write(
         output::write_whole(path, output::vtu::vtu(model, body).as_bytes())?;
     }
     if let Some(path) = &args.svg {
-        output::write_whole(path, output::svg::svg(model, body).as_bytes())?;
+        output::write_whole(path, output::body::svg(model, body).as_bytes())?;
     }
     Ok(())
 }

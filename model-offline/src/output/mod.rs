@@ -1,8 +1,8 @@
 //! What the model writes: JSON, VTU, figures. Every file is written whole or not at all.
 
+pub mod body;
 pub mod chart;
 mod preflight;
-pub mod svg;
 pub mod table_text;
 pub mod terminal;
 pub mod vtu;

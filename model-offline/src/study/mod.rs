@@ -2,6 +2,7 @@
 pub mod candidates;
 pub mod fit;
 pub mod insertion;
+mod looks;
 pub mod measurement;
 pub mod pareto;
 mod pareto_chart;

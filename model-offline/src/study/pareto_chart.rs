@@ -1,94 +1,189 @@
 //! The comparison as a figure and as a table for the terminal.
 
+use super::looks::look;
 use super::measurement::{Job, Linearity, ModelKind, Point};
 use super::pareto::Pareto;
-use crate::discretization::Integration;
-use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
+use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Note, Panel, Series};
 use std::fmt::Write as _;
 
-fn marker(integration: Integration) -> Marker {
-    match integration {
-        Integration::Dni => Marker::Diamond,
-        Integration::Scni => Marker::Circle,
-        Integration::ScniStabilised => Marker::Square,
-        Integration::Mscni => Marker::Dot,
-        Integration::Nsni => Marker::Square,
-        Integration::Gauss => Marker::Plus,
-        Integration::FemT3 => Marker::Triangle,
-        Integration::FemT6 => Marker::TriangleDown,
-    }
+/// What a panel shows: one error of one job.
+struct View {
+    job: Job,
+    title: &'static str,
+    quantity: &'static str,
+    error: fn(&Point) -> f64,
+    /// What filled and open markers tell apart; nothing where all are alike.
+    filled: Option<Filling>,
 }
 
-/// Series of a job's points, told apart by a label, and the front.
-fn panel(
-    pareto: &Pareto,
-    job: Job,
-    title: &str,
-    y: &str,
-    error: fn(&Point) -> f64,
-    look: fn(&Point) -> (String, Marker, bool),
-) -> Panel {
-    let x = if job == Job::Step { "time of one step, s" } else { "time, s (one thread, best of several)" };
-    let mut panel = Panel::new(title, Axis::log(x), Axis::log(y));
-    for point in pareto.points.iter().filter(|p| p.job == job) {
-        let (label, marker, filled) = look(point);
-        let at = (point.wall_s, error(point));
-        let place = panel.series.iter().position(|s| s.label == label);
-        let place = place.unwrap_or_else(|| {
-            panel.series.push(Series::scatter(&label, marker, filled, Vec::new()));
-            panel.series.len() - 1
-        });
-        if point.failure.is_some() {
-            panel.series[place].failures.push(at);
-        } else {
-            panel.series[place].points.push(at);
+/// A second property, told by filled and open markers.
+#[derive(Clone, Copy)]
+struct Filling {
+    /// What a filled and an open marker stand for.
+    names: [&'static str; 2],
+    of: fn(&Point) -> bool,
+}
+
+const GRADED: Filling =
+    Filling { names: ["filled: graded nodes", "open: uniform nodes"], of: |p| p.discretization.resolution.is_graded() };
+const NONLINEAR: Filling =
+    Filling { names: ["filled: nonlinear law", "open: linear law"], of: |p| p.law == Linearity::Nonlinear };
+
+const VIEWS: [View; 4] = [
+    View {
+        job: Job::Placement,
+        title: "All Jacobians",
+        quantity: "error of the controllability measure, over itself",
+        error: |p| p.error_cm,
+        filled: Some(GRADED),
+    },
+    View {
+        job: Job::Placement,
+        title: "Small-depth displacement",
+        quantity: "error of the target displacement, over the largest",
+        error: |p| p.error_static,
+        filled: Some(GRADED),
+    },
+    View {
+        job: Job::Insertion,
+        title: "Whole insertion, all paddles",
+        quantity: "error of the target displacement, over the largest",
+        error: |p| p.error_static,
+        filled: Some(NONLINEAR),
+    },
+    View {
+        job: Job::Step,
+        title: "One step of a simulator",
+        quantity: "error of the target displacement, over the largest",
+        error: |p| p.error_static,
+        filled: None,
+    },
+];
+
+/// Name, colour and marker of a point's method: of the rule, or of the plant where the job compares plants.
+fn method(point: &Point) -> (&'static str, Colour, Marker) {
+    match (point.job, point.method) {
+        (Job::Step, ModelKind::Reduced) => ("reduced", Colour::Green, Marker::Square),
+        (Job::Step, ModelKind::Condensed) => ("condensed", Colour::Blue, Marker::Diamond),
+        (Job::Step, _) => ("full", Colour::Vermillion, Marker::Circle),
+        _ => {
+            let integration = point.discretization.method.integration;
+            let (colour, marker) = look(integration);
+            (integration.name(), colour, marker)
         }
     }
-    // The front of this panel's own error.
-    let mut points: Vec<(f64, f64)> = pareto
-        .points
-        .iter()
-        .filter(|p| p.job == job && p.failure.is_none())
-        .map(|p| (p.wall_s, error(p)))
-        .filter(|(t, e)| t.is_finite() && e.is_finite())
-        .collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut best = f64::INFINITY;
-    points.retain(|(_, e)| {
-        let better = *e < best;
-        best = best.min(*e);
-        better
-    });
-    panel.series.push(Series::curve("Pareto front", Dash::Solid, points));
-    panel
 }
 
-/// Series that differ in filling only share a name with both meanings, so that the legend stays short.
-fn look(point: &Point, filled: bool) -> (String, Marker, bool) {
-    let integration = point.discretization.method.integration;
-    let rule = integration.name();
-    let label = match (integration, filled) {
-        // A cross cannot be filled.
-        (Integration::Gauss, _) => rule.to_owned(),
-        (_, true) => format!("{rule}: graded; nonlinear law"),
-        (_, false) => format!("{rule}: uniform; linear law"),
-    };
-    (label, marker(integration), filled && integration != Integration::Gauss)
+/// An error in per cent, with two digits.
+fn percent(error: f64) -> String {
+    let percent = 100.0 * error;
+    let decimals = if percent >= 10.0 { 0 } else { (1.0 - percent.log10().floor()).clamp(0.0, 6.0) as usize };
+    format!("{percent:.decimals$} %")
 }
 
-fn by_rule(point: &Point) -> (String, Marker, bool) {
-    look(point, point.discretization.resolution.is_graded())
-}
+impl View {
+    /// The points that no other beats in both time and this panel's error, fastest first.
+    fn front<'a>(&self, pareto: &'a Pareto) -> Vec<&'a Point> {
+        let usable = |p: &&Point| p.job == self.job && p.failure.is_none() && p.wall_s.is_finite();
+        let mut front: Vec<&Point> =
+            pareto.points.iter().filter(usable).filter(|p| (self.error)(p).is_finite()).collect();
+        front.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
+        let mut best = f64::INFINITY;
+        front.retain(|p| {
+            let better = (self.error)(p) < best;
+            best = best.min((self.error)(p));
+            better
+        });
+        front
+    }
 
-fn by_law(point: &Point) -> (String, Marker, bool) {
-    look(point, point.law == Linearity::Nonlinear)
-}
+    /// Method with its second property, as the conclusion names it.
+    fn kind(&self, point: &Point) -> String {
+        let name = method(point).0;
+        match (self.job, self.filled.is_some_and(|filling| (filling.of)(point))) {
+            (Job::Placement, true) => format!("{name} on graded nodes"),
+            (Job::Placement, false) => format!("{name} on uniform nodes"),
+            (Job::Insertion, true) => format!("{name} with the nonlinear law"),
+            (Job::Insertion, false) => format!("{name} with the linear law"),
+            (Job::Step, _) => format!("the {name} model"),
+        }
+    }
 
-fn by_plant(point: &Point) -> (String, Marker, bool) {
-    match point.method {
-        ModelKind::Reduced => ("reduced model".into(), Marker::Square, true),
-        ModelKind::Condensed => ("condensed linear model".into(), Marker::Diamond, false),
-        _ => ("full model".into(), Marker::Circle, true),
+    /// Who holds the widest stretch of the front, and from which error to which.
+    fn conclusion(&self, front: &[&Point]) -> Option<String> {
+        let stretches = front.chunk_by(|a, b| self.kind(a) == self.kind(b));
+        let width = |stretch: &[&Point]| (self.error)(stretch[0]) / (self.error)(stretch[stretch.len() - 1]);
+        let widest = stretches.max_by(|a, b| width(a).total_cmp(&width(b)))?;
+        let (first, last) = (widest.first()?, widest.last()?);
+        let ends = [first, last].map(|p| percent((self.error)(p)));
+        let range =
+            if ends[0] == ends[1] { format!("at {}", ends[0]) } else { format!("from {} to {}", ends[0], ends[1]) };
+        Some(format!("{} is fastest {range}", self.kind(first)))
+    }
+
+    fn panel(&self, pareto: &Pareto) -> Panel {
+        let front = self.front(pareto);
+        let what = if self.job == Job::Step { "time of one step" } else { "time on one thread, best of several" };
+        let title = self.conclusion(&front).map_or_else(|| self.title.to_owned(), |c| format!("{}: {c}", self.title));
+        let mut panel = Panel::new(&title, Axis::log(what, "s"), Axis::log(self.quantity, "1"));
+        let front_line = front.iter().map(|p| (p.wall_s, (self.error)(p))).collect();
+        panel.series.push(Series::curve("Pareto front", Colour::Ink, Dash::Solid, front_line));
+        let all: Vec<&Point> = pareto.points.iter().filter(|p| p.job == self.job).collect();
+        // Dominated points first: the front lies above them.
+        let on_front = |p: &Point| front.iter().any(|f| std::ptr::eq(*f, p));
+        for bright in [false, true] {
+            for point in all.iter().filter(|p| on_front(p) == bright) {
+                self.add(&mut panel.series, point, bright);
+            }
+        }
+        self.explain(&mut panel.series, &all);
+        panel.notes = front
+            .iter()
+            .map(|p| Note { at: (p.wall_s, (self.error)(p)), text: format!("{}, {}", method(p).0, p.nodes) })
+            .collect();
+        panel
+    }
+
+    /// Adds a point to the series of its look.
+    fn add(&self, series: &mut Vec<Series>, point: &Point, bright: bool) {
+        let (name, colour, marker) = method(point);
+        let colour = if bright { colour } else { Colour::Faint };
+        let filled = self.filled.is_none_or(|filling| (filling.of)(point));
+        let alike = |s: &Series| (s.marker, s.filled, s.colour) == (Some(marker), filled, colour);
+        let place = series.iter().position(alike).unwrap_or_else(|| {
+            series.push(Series { filled, ..Series::scatter("", colour, marker, Vec::new()) });
+            series.len() - 1
+        });
+        let at = (point.wall_s, (self.error)(point));
+        if point.failure.is_some() {
+            series[place].failures.push(at);
+        } else {
+            let (settings, error) = (point.discretization.settings(), percent(at.1));
+            series[place].titles.push(format!("{name}, {settings}, {} nodes: {error} in {:.3e} s", point.nodes, at.0));
+            series[place].points.push(at);
+        }
+    }
+
+    /// What shapes and fillings mean, for the legend alone.
+    fn explain(&self, series: &mut Vec<Series>, all: &[&Point]) {
+        let mut sample = |label: &str, colour, marker| {
+            series.push(Series::scatter(label, colour, marker, Vec::new()));
+            series.len() - 1
+        };
+        let mut seen: Vec<&str> = Vec::new();
+        for point in all {
+            let (name, colour, marker) = method(point);
+            if !seen.contains(&name) {
+                seen.push(name);
+                sample(name, colour, marker);
+            }
+        }
+        sample("dominated, shape by method", Colour::Faint, Marker::Circle);
+        if let Some(Filling { names: [filled, open], .. }) = self.filled {
+            sample(filled, Colour::Ink, Marker::Circle);
+            let open = sample(open, Colour::Ink, Marker::Circle);
+            series[open].filled = false;
+        }
     }
 }
 
@@ -96,40 +191,17 @@ impl Pareto {
     /// The comparison as one SVG.
     pub fn svg(&self, scene: &str, tissue: &str) -> String {
         let barrier = self.barrier.map_or(String::new(), |b| format!(", barrier {b:.0} added for finite depth"));
+        let conclusion = VIEWS[0].conclusion(&VIEWS[0].front(self));
+        let title = conclusion.unwrap_or_else(|| "No method has a point on the front".to_owned());
         Figure {
-            title: format!("Error against time: {scene}, {tissue} tissue"),
+            title: format!("{title}: error against time, scene {scene}, {tissue} tissue"),
             caption: format!(
-                "references good to {:.2} % (small depth) and {:.2} % (finite depth){barrier}",
-                100.0 * self.open.0,
-                100.0 * self.open.1
+                "References good to {} (small depth) and {} (finite depth){barrier}. Points of the front are named with \
+                 method and number of nodes.",
+                percent(self.open.0),
+                percent(self.open.1)
             ),
-            panels: vec![
-                panel(self, Job::Placement, "All Jacobians", "error of controllability", |p| p.error_cm, by_rule),
-                panel(
-                    self,
-                    Job::Placement,
-                    "Small-depth displacement",
-                    "error, of the largest",
-                    |p| p.error_static,
-                    by_rule,
-                ),
-                panel(
-                    self,
-                    Job::Insertion,
-                    "Whole insertion, all paddles",
-                    "error, of the largest",
-                    |p| p.error_static,
-                    by_law,
-                ),
-                panel(
-                    self,
-                    Job::Step,
-                    "One step of a simulator",
-                    "error, of the largest",
-                    |p| p.error_static,
-                    by_plant,
-                ),
-            ],
+            panels: VIEWS.iter().map(|view| view.panel(self)).collect(),
             columns: 2,
         }
         .svg()

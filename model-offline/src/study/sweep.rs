@@ -3,7 +3,7 @@
 use super::candidates::base_spacing;
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::model::{ModelError, TissueModel};
-use crate::output::chart::{Axis, Dash, Figure, Marker, Panel, Series};
+use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Series};
 use crate::parallel;
 use crate::placement::adaptive::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
@@ -131,42 +131,75 @@ impl Sweep {
         out
     }
 
+    /// Best paddles on the coarsest and on the finest mesh of a rule, and in the limit.
+    fn moves(&self, rule: Integration) -> [(u32, u32); 3] {
+        let of_rule = || self.steps.iter().filter(|step| step.discretization.method.integration == rule);
+        let optima = |step: Option<&Step>| {
+            step.and_then(|step| step.responses.as_deref().ok()).map_or((0, 0), |responses| self.optima(responses))
+        };
+        [optima(of_rule().next()), optima(of_rule().next_back()), self.optima(self.reference.responses())]
+    }
+
     /// Both rankings against the number of nodes: one panel per approach, one line per paddle, the limit at the right.
     pub fn svg(&self) -> String {
-        const MARKERS: [Marker; 6] =
-            [Marker::Circle, Marker::Square, Marker::Triangle, Marker::Diamond, Marker::TriangleDown, Marker::Plus];
-        let rule = Integration::Scni;
-        let panel = |title: &str, y: &str, key: &dyn Fn(&RestResponse) -> f64| {
-            let mut panel = Panel::new(title, Axis::log("nodes"), Axis::linear(y));
-            for (k, paddle) in self.scene.paddles.iter().enumerate() {
-                let mut points: Vec<(f64, f64)> = self
-                    .steps
-                    .iter()
-                    .filter(|step| step.discretization.method.integration == rule)
-                    .filter_map(|step| Some((step.nodes as f64, key(&step.responses.as_ref().ok()?[k]))))
-                    .collect();
-                let marker = MARKERS[k % MARKERS.len()];
-                let label = format!("paddle {}", paddle.index);
-                let end = points.last().map_or(1.0, |p| p.0) * 3.0;
-                points.sort_by(|a, b| a.0.total_cmp(&b.0));
-                panel.series.push(Series { line: Some(Dash::Solid), ..Series::scatter(&label, marker, false, points) });
-                let limit = vec![(end, key(&self.reference.responses()[k]))];
-                panel.series.push(Series::scatter("", marker, true, limit));
+        let moves = self.moves(Integration::Scni);
+        let says = |name: &str, of: fn((u32, u32)) -> u32| {
+            let [coarse, fine, limit] = moves.map(of);
+            if coarse == fine && fine == limit {
+                format!("best {name} paddle {limit} on every mesh")
+            } else {
+                format!("best {name} paddle {coarse} on the coarsest mesh, {fine} on the finest, {limit} in the limit")
             }
-            panel
+        };
+        let (fixed, moved) = (says("static", |o| o.0), says("dynamic", |o| o.1));
+        let changes = |of: fn((u32, u32)) -> u32| moves.map(of).windows(2).any(|pair| pair[0] != pair[1]);
+        let decides = match (changes(|o| o.0), changes(|o| o.1)) {
+            (true, true) => "The mesh decides which paddle is best",
+            (true, false) => "The mesh decides which static paddle is best, not which dynamic one",
+            (false, true) => "The mesh decides which dynamic paddle is best, not which static one",
+            (false, false) => "The best paddles are the same on every mesh",
         };
         Figure {
-            title: format!("What the mesh decides: {}, {} tissue", self.scene.name, self.scene.tissue()),
+            title: format!("{decides}: {}, {} tissue", self.scene.name, self.scene.tissue()),
             caption:
-                "SCNI on uniform nodes; filled: continuum limit (quadratic triangles, extrapolated). Lowest is best."
+                "SCNI on uniform nodes, coarsest to finest; filled at the right: continuum limit (quadratic triangles, \
+                      extrapolated). Lowest is best."
                     .into(),
             panels: vec![
-                panel("Fixture, small depth", "|orthogonal displacement| per depth", &|r| self.orthogonal(r).abs()),
-                panel("Actuator", "controllability measure", &|r| r.controllability_measure),
+                self.panel(&fixed, "|orthogonal target displacement| per depth", &|r| self.orthogonal(r).abs()),
+                self.panel(&moved, "controllability measure ‖J⁻¹n‖", &|r| r.controllability_measure),
             ],
             columns: 2,
         }
         .svg()
+    }
+
+    fn panel(&self, title: &str, quantity: &str, key: &dyn Fn(&RestResponse) -> f64) -> Panel {
+        const MARKERS: [Marker; 6] = [
+            Marker::Circle,
+            Marker::Square,
+            Marker::Triangle,
+            Marker::Diamond,
+            Marker::TriangleDown,
+            Marker::TriangleRight,
+        ];
+        let mut panel = Panel::new(title, Axis::log("nodes", ""), Axis::linear(quantity, ""));
+        for (k, paddle) in self.scene.paddles.iter().enumerate() {
+            let mut points: Vec<(f64, f64)> = self
+                .steps
+                .iter()
+                .filter(|step| step.discretization.method.integration == Integration::Scni)
+                .filter_map(|step| Some((step.nodes as f64, key(&step.responses.as_ref().ok()?[k]))))
+                .collect();
+            let (colour, marker) = (Colour::CYCLE[k % Colour::CYCLE.len()], MARKERS[k % MARKERS.len()]);
+            let label = format!("paddle {}", paddle.index);
+            let end = points.last().map_or(1.0, |p| p.0) * 3.0;
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            panel.series.push(Series::scatter(&label, colour, marker, points).open().joined(Dash::Solid));
+            let limit = vec![(end, key(&self.reference.responses()[k]))];
+            panel.series.push(Series::scatter("", colour, marker, limit));
+        }
+        panel
     }
 }
 

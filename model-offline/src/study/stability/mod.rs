@@ -11,6 +11,7 @@ pub mod plan;
 pub mod probe;
 pub mod zero_energy;
 
+mod chart;
 mod files;
 mod verdict;
 
@@ -23,7 +24,8 @@ use plan::{Entry, Setting};
 use probe::Outcome;
 use zero_energy::ZeroEnergy;
 
-pub use files::{csv, figure, zero_energy_csv};
+pub use chart::figure;
+pub use files::{csv, zero_energy_csv};
 pub use verdict::{Pairs, Verdict, summary, verdict};
 
 /// Whether the law with some factor c has a limit in compression, and where.

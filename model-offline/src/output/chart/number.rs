@@ -1,25 +1,25 @@
-//! Numbers as people read them.
+//! Numbers as people read them: in charts, tables and pages alike.
 
 const SUPERSCRIPTS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// What stands for a number that is none.
-pub(super) const NO_NUMBER: &str = "–";
+pub const NO_NUMBER: &str = "–";
 
 /// `10ⁿ`.
-pub(super) fn power_of_ten(exponent: i32) -> String {
+pub fn power_of_ten(exponent: i32) -> String {
     let digits = exponent.unsigned_abs().to_string();
     let sign = if exponent < 0 { "⁻" } else { "" };
     let digits: String = digits.bytes().map(|digit| SUPERSCRIPTS[usize::from(digit - b'0')]).collect();
     format!("10{sign}{digits}")
 }
 
-/// Decimal exponent of a number; 0 for 0.
-pub(super) fn exponent(value: f64) -> i32 {
+/// Decimal exponent of a number; 0 for 0 and for what is not finite.
+pub fn exponent(value: f64) -> i32 {
     if value == 0.0 || !value.is_finite() { 0 } else { value.abs().log10().floor() as i32 }
 }
 
 /// With this many significant digits; `–` when it is not finite.
-pub(super) fn number(value: f64, digits: i32) -> String {
+pub fn number(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return NO_NUMBER.to_owned();
     }
@@ -38,7 +38,7 @@ pub(super) fn number(value: f64, digits: i32) -> String {
 }
 
 /// As short as three significant digits allow: settings and places.
-pub(super) fn plain(value: f64) -> String {
+pub fn plain(value: f64) -> String {
     let text = number(value, 3);
     match text.split_once('.') {
         Some((_, decimals)) if decimals.bytes().all(|digit| digit.is_ascii_digit()) => {
@@ -49,7 +49,7 @@ pub(super) fn plain(value: f64) -> String {
 }
 
 /// An integer with thin spaces between thousands.
-pub(super) fn count(value: u64) -> String {
+pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -62,7 +62,7 @@ pub(super) fn count(value: u64) -> String {
 }
 
 /// A true minus sign.
-pub(super) fn minus(text: String) -> String {
+pub fn minus(text: String) -> String {
     match text.strip_prefix('-') {
         Some(rest) => format!("−{rest}"),
         None => text,
@@ -70,7 +70,7 @@ pub(super) fn minus(text: String) -> String {
 }
 
 /// A scene's unit label in brackets; the label `1` means that the scene has no units.
-pub(super) fn in_unit(what: &str, unit: &str) -> String {
+pub fn in_unit(what: &str, unit: &str) -> String {
     match unit {
         "" | "1" => what.to_owned(),
         unit => format!("{what} [{unit}]"),

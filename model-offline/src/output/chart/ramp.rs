@@ -1,0 +1,19 @@
+//! The colours of a field and what they mean.
+
+use super::drawing::{Anchor, Drawing};
+use super::number::plain;
+use super::style::BANDS;
+
+/// A bar of the colours from 0 to `largest`, with what they show and its unit below.
+pub fn colour_bar(width: f64, label: &str, largest: f64) -> Drawing {
+    let mut drawing = Drawing::new([width, 46.0], format!("Colours of the {label}"));
+    let step = (width - 20.0) / BANDS as f64;
+    for band in 0..BANDS {
+        drawing.rectangle(&format!("f{band}"), [10.0 + band as f64 * step, 4.0], [step, 12.0]);
+    }
+    for (part, anchor) in [(0.0, Anchor::Start), (0.5, Anchor::Middle), (1.0, Anchor::End)] {
+        drawing.text("tick", [10.0 + part * (width - 20.0), 29.0], anchor, &plain(part * largest));
+    }
+    drawing.text("muted", [0.5 * width, 43.0], Anchor::Middle, label);
+    drawing
+}
