@@ -36,6 +36,26 @@ fn functions_of_firmware_fit_a_screen() {
     assert_functions_fit("firmware");
 }
 
+#[test]
+fn no_imports_of_firmware_run_in_a_circle() {
+    assert_no_circles("firmware");
+}
+
+#[test]
+fn no_imports_of_model_offline_run_in_a_circle() {
+    assert_no_circles("model-offline");
+}
+
+#[test]
+fn functions_of_host_sim_fit_a_screen() {
+    assert_functions_fit("host-sim");
+}
+
+#[test]
+fn functions_of_model_offline_fit_a_screen() {
+    assert_functions_fit("model-offline");
+}
+
 /// A crate in a directory of its own: paths and texts.
 fn planted(files: &[(&str, &str)]) -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
