@@ -20,17 +20,12 @@ use heapless::String;
 use nalgebra::SMatrix;
 use serde::Deserialize;
 
+pub use super::format::{FORMAT_VERSION, MAX_TABLE_BYTES};
 use super::{Gains, Knot, Paddle, Table, TableError, Units, Validity};
 use crate::scalar::{Scalar, ScalarKind};
 
-/// Version of the table format. postcard cannot append fields compatibly, so every change of the payload bumps it.
-pub const FORMAT_VERSION: u16 = 1;
-
 /// Bytes before the payload.
 pub const HEADER_BYTES: usize = 52;
-
-/// A buffer of this size holds every encoded table of dimension 2 or 3.
-pub const MAX_TABLE_BYTES: usize = 64 * 1024;
 
 const MAGIC: [u8; 8] = *b"STILLPT\0";
 const CHECKSUM_BYTES: usize = 4;

@@ -170,7 +170,7 @@ impl fmt::Display for TableError {
                 f,
                 "table format version {found}, this build reads version {}: write the table again with the \
                  `model-offline` of this build",
-                super::codec::FORMAT_VERSION
+                super::format::FORMAT_VERSION
             ),
             Self::Reserved => write!(f, "reserved header bytes are not zero; {REWRITE}"),
             Self::UnknownScalar { found } => write!(f, "unknown scalar kind {found}; {REWRITE}"),
@@ -218,7 +218,7 @@ impl fmt::Display for TableError {
                 write!(f, "{field} is out of proportion with the rest of the table: check its unit in the scene")
             }
             Self::BufferTooSmall { bytes } => {
-                write!(f, "{bytes} bytes cannot hold the table: give {}", super::codec::MAX_TABLE_BYTES)
+                write!(f, "{bytes} bytes cannot hold the table: give {}", super::format::MAX_TABLE_BYTES)
             }
         }
     }

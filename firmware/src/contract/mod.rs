@@ -9,14 +9,16 @@ pub mod error;
 #[cfg(test)]
 pub(crate) mod example;
 pub mod faults;
+pub mod format;
 pub mod frames;
 pub mod table;
 mod validate;
 
 pub(crate) use bounds::TableBounds;
-pub use codec::{Header, MAX_TABLE_BYTES, decode, decode_into, encode};
+pub use codec::{Header, decode, decode_into, encode};
 pub use error::TableError;
 pub use faults::{Faults, Mode};
+pub use format::MAX_TABLE_BYTES;
 pub use frames::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 pub use table::{Gains, Knot, MAX_KNOTS, Paddle, Table, Units, Validity};
 pub use validate::{CONDITION_LIMIT, condition_number};

@@ -2,7 +2,7 @@
 //! functions there, so that assembly knows one loop only: `∫ W(F) dΩ ≈ Σ_q w_q W(I + Σ_I d_I ⊗ g_I(q))`.
 
 use super::nodal_cells::NodalCell;
-use super::shape_functions::Reproduce;
+use super::shape_functions::Wanted;
 use super::{ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2};
 
@@ -132,7 +132,7 @@ pub fn direct_nodal(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resul
     for (node, cell) in cells.iter().enumerate() {
         let x = shape.cloud().positions()[node];
         shape.cloud().covering(&x, &x, &mut candidates);
-        shape.evaluate(&x, node, &candidates, Reproduce::Field, true, &mut stencil)?;
+        shape.evaluate(&x, node, &candidates, Wanted::GRADIENTS, &mut stencil)?;
         rule.push(cell.area, node, &stencil.nodes, &stencil.gradients);
     }
     Ok(rule)
@@ -188,9 +188,9 @@ pub fn naturally_stabilised_nodal(
     for (node, cell) in cells.iter().enumerate() {
         let x = shape.cloud().positions()[node];
         shape.cloud().covering(&x, &x, &mut candidates);
-        shape.evaluate(&x, node, &candidates, Reproduce::Field, true, &mut field)?;
+        shape.evaluate(&x, node, &candidates, Wanted::GRADIENTS, &mut field)?;
         for (axis, stencil) in derivative.iter_mut().enumerate() {
-            shape.evaluate(&x, node, &candidates, Reproduce::Derivative(axis), true, stencil)?;
+            shape.evaluate(&x, node, &candidates, Wanted::implicit_gradient(axis), stencil)?;
         }
         let mean = if consistent {
             average.compute(node, cell, &GAUSS_2)?;
@@ -238,7 +238,7 @@ pub fn gauss(
             let x = corners[0] * l[0] + corners[1] * l[1] + corners[2] * l[2];
             shape.cloud().covering(&x, &x, &mut candidates);
             let mut stencil = Stencil::default();
-            shape.evaluate(&x, node, &candidates, Reproduce::Field, true, &mut stencil)?;
+            shape.evaluate(&x, node, &candidates, Wanted::GRADIENTS, &mut stencil)?;
             stencils.push(stencil);
         }
         if consistent {
@@ -355,7 +355,7 @@ impl<'a, 'c> CellAverage<'a, 'c> {
             }
             for (s, weight) in points {
                 let x = a + (b - a) * *s;
-                self.shape.evaluate(&x, node, &self.candidates, Reproduce::Field, false, &mut self.stencil)?;
+                self.shape.evaluate(&x, node, &self.candidates, Wanted::VALUES, &mut self.stencil)?;
                 for (&i, &value) in self.stencil.nodes.iter().zip(&self.stencil.values) {
                     self.nodes.push(i);
                     self.sum[i as usize] += normal * (weight * value);

@@ -61,8 +61,8 @@ fn fitted(outline: &Polygon, spacing: f64, points: &[Point2], segments: &[(Point
             fixed.push(p);
         }
     }
-    for &(a, b) in segments {
-        fill_gaps(a, b, spacing, tolerance, &nodes, &mut fixed);
+    for &segment in segments {
+        fill_gaps(segment, spacing, tolerance, &nodes, &mut fixed);
     }
     nodes.retain(|x| {
         let is_feature = points.iter().any(|f| (f - x).norm() <= tolerance);
@@ -73,7 +73,7 @@ fn fitted(outline: &Polygon, spacing: f64, points: &[Point2], segments: &[(Point
 }
 
 /// Adds evenly spaced nodes where those on the segment from `a` to `b` leave a gap.
-fn fill_gaps(a: Point2, b: Point2, spacing: f64, tolerance: f64, nodes: &[Point2], fixed: &mut Vec<Point2>) {
+fn fill_gaps((a, b): (Point2, Point2), spacing: f64, tolerance: f64, nodes: &[Point2], fixed: &mut Vec<Point2>) {
     let length = (b - a).norm();
     let direction = (b - a) / length;
     let mut stations: Vec<f64> = nodes

@@ -27,4 +27,4 @@ pub use method::{Basis, Discretization, Essential, Integration, Method, Resoluti
 pub use nodal_cells::NodalCell;
 pub use node_cloud::NodeCloud;
 pub use planar::{DiscretizationError, Planar};
-pub use shape_functions::{ShapeError, ShapeFunctions, Stencil};
+pub use shape_functions::{ShapeError, ShapeFunctions, Stencil, Wanted};

@@ -4,7 +4,7 @@ use super::finite_element::Elements;
 use super::method::{Basis, Integration, Method};
 use super::nodal_cells::{Across, clipped_voronoi};
 use super::triangulation::{TriangulationError, triangulate};
-use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, integration, subcells};
+use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, Wanted, integration, subcells};
 use crate::geometry::{Point, Point2, Polygon};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -159,7 +159,7 @@ impl Planar {
     /// [`ShapeError`] where too few kernels cover the point.
     pub fn value_stencil(&self, x: &Point<2>) -> Result<Stencil<2>, ShapeError> {
         match &*self.approximation {
-            Approximation::Kernels(cloud) => ShapeFunctions::new(cloud, self.method.basis).at(x, false),
+            Approximation::Kernels(cloud) => ShapeFunctions::new(cloud, self.method.basis).at(x, Wanted::VALUES),
             Approximation::Elements(elements) => Ok(elements.value_stencil(x)),
         }
     }

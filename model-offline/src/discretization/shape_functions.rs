@@ -61,11 +61,36 @@ impl<const D: usize> Stencil<D> {
 /// The second gives *implicit* gradients Ψ_I^(j): Σ_I Ψ_I^(j)(x) u(X_I) ≈ ∂u/∂x_j, exact for the basis, at no cost of
 /// differentiating the moment matrix (Chen, Zhang & Belytschko 2004; used by NSNI).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reproduce {
+enum Reproduce {
     /// The field.
     Field,
     /// Its derivative along axis j.
     Derivative(usize),
+}
+
+/// What of the shape functions is wanted at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Wanted {
+    reproduce: Reproduce,
+    gradients: bool,
+}
+
+impl Wanted {
+    /// Ψ_I.
+    pub const VALUES: Self = Self { reproduce: Reproduce::Field, gradients: false };
+    /// Ψ_I and ∇Ψ_I.
+    pub const GRADIENTS: Self = Self { reproduce: Reproduce::Field, gradients: true };
+
+    /// The implicit gradients along axis j, and their own gradients.
+    pub const fn implicit_gradient(j: usize) -> Self {
+        Self { reproduce: Reproduce::Derivative(j), gradients: true }
+    }
+}
+
+/// Moment matrix M(x) and its slopes ∂M/∂x_k, lower triangles; the slopes are 0 when only values are wanted.
+struct Moments<const D: usize, const P: usize> {
+    matrix: SMatrix<f64, P, P>,
+    slopes: [SMatrix<f64, P, P>; D],
 }
 
 /// Shape functions over a cloud of nodes.
@@ -93,7 +118,7 @@ where
     ///
     /// # Errors
     /// [`ShapeError`], naming the node nearest to the point.
-    pub fn at(&self, x: &Point<D>, gradients: bool) -> Result<Stencil<D>, ShapeError> {
+    pub fn at(&self, x: &Point<D>, wanted: Wanted) -> Result<Stencil<D>, ShapeError> {
         let mut candidates = Vec::new();
         self.cloud.covering(x, x, &mut candidates);
         let nearest = candidates
@@ -102,7 +127,7 @@ where
             .min_by(|&a, &b| self.distance(a, x).total_cmp(&self.distance(b, x)))
             .unwrap_or(0);
         let mut stencil = Stencil::default();
-        self.evaluate(x, nearest as usize, &candidates, Reproduce::Field, gradients, &mut stencil)?;
+        self.evaluate(x, nearest as usize, &candidates, wanted, &mut stencil)?;
         Ok(stencil)
     }
 
@@ -120,8 +145,7 @@ where
         x: &Point<D>,
         node: usize,
         candidates: &[u32],
-        what: Reproduce,
-        gradients: bool,
+        wanted: Wanted,
         out: &mut Stencil<D>,
     ) -> Result<(), ShapeError> {
         let evaluate = match (D, self.basis) {
@@ -131,26 +155,18 @@ where
             (2, Basis::Quadratic) => Self::evaluate_sized::<6>,
             _ => Self::evaluate_sized::<10>,
         };
-        evaluate(self, x, node, candidates, what, gradients, out)
+        evaluate(self, x, node, candidates, wanted, out)
     }
 
-    /// The same for a basis of P monomials.
-    #[allow(clippy::too_many_arguments)] // Private, one caller: the dispatch on P above.
-    fn evaluate_sized<const P: usize>(
+    /// Moments of the candidates that cover `x`, and their names; offsets in units of `scale`.
+    fn moments<const P: usize>(
         &self,
         x: &Point<D>,
-        node: usize,
+        scale: f64,
         candidates: &[u32],
-        what: Reproduce,
-        gradients: bool,
-        out: &mut Stencil<D>,
-    ) -> Result<(), ShapeError> {
-        out.nodes.clear();
-        out.values.clear();
-        out.gradients.clear();
-        // Offsets are measured in units of the local support, so that M is dimensionless and its condition number
-        // says something about the nodes and not about the units.
-        let scale = self.cloud.half_widths()[node];
+        wanted: Wanted,
+        nodes: &mut Vec<u32>,
+    ) -> Moments<D, P> {
         let mut moment = SMatrix::<f64, P, P>::zeros();
         let mut moment_slope = [SMatrix::<f64, P, P>::zeros(); D];
         for &i in candidates {
@@ -159,14 +175,14 @@ where
             if phi <= 0.0 {
                 continue;
             }
-            out.nodes.push(i);
+            nodes.push(i);
             let h = monomials::<D, P>(&(offset / scale));
             for r in 0..P {
                 for c in 0..=r {
                     moment[(r, c)] += phi * h[r] * h[c];
                 }
             }
-            if gradients {
+            if wanted.gradients {
                 for k in 0..D {
                     let dh = monomial_slope::<D, P>(&(offset / scale), k) / scale;
                     for r in 0..P {
@@ -177,6 +193,26 @@ where
                 }
             }
         }
+        Moments { matrix: moment, slopes: moment_slope }
+    }
+
+    /// The same for a basis of P monomials.
+    fn evaluate_sized<const P: usize>(
+        &self,
+        x: &Point<D>,
+        node: usize,
+        candidates: &[u32],
+        wanted: Wanted,
+        out: &mut Stencil<D>,
+    ) -> Result<(), ShapeError> {
+        out.nodes.clear();
+        out.values.clear();
+        out.gradients.clear();
+        // Offsets are measured in units of the local support, so that M is dimensionless and its condition number
+        // says something about the nodes and not about the units.
+        let scale = self.cloud.half_widths()[node];
+        let Moments { matrix: mut moment, slopes: mut moment_slope } =
+            self.moments::<P>(x, scale, candidates, wanted, &mut out.nodes);
         moment.fill_upper_triangle_with_lower_triangle();
         let failure = |condition: f64| ShapeError {
             node,
@@ -194,13 +230,13 @@ where
         if condition.is_nan() || condition > MAX_MOMENT_CONDITION {
             return Err(failure(condition));
         }
-        let b: SVector<f64, P> = match what {
+        let b: SVector<f64, P> = match wanted.reproduce {
             Reproduce::Field => inverse.column(0).into(),
             Reproduce::Derivative(j) => inverse.column(1 + j) * (-1.0 / scale),
         };
         // ∂b = −M⁻¹ ∂M b.
         let mut b_slope = [SVector::<f64, P>::zeros(); D];
-        if gradients {
+        if wanted.gradients {
             for (slope, m) in b_slope.iter_mut().zip(&mut moment_slope) {
                 m.fill_upper_triangle_with_lower_triangle();
                 *slope = -(inverse * (*m * b));
@@ -212,7 +248,7 @@ where
             let h = monomials::<D, P>(&(offset / scale));
             let correction = b.dot(&h);
             out.values.push(correction * phi);
-            if gradients {
+            if wanted.gradients {
                 out.gradients.push(Point::from_fn(|k, _| {
                     let dh = monomial_slope::<D, P>(&(offset / scale), k) / scale;
                     (b_slope[k].dot(&h) + b.dot(&dh)) * phi + correction * phi_slope[k]
@@ -291,7 +327,7 @@ mod tests {
         let cloud = jittered_lattice::<D>(6);
         let shape = ShapeFunctions::new(&cloud, basis);
         let x = Point::<D>::from_fn(|k, _| 2.3 + 0.17 * k as f64);
-        let stencil = shape.at(&x, true).unwrap();
+        let stencil = shape.at(&x, Wanted::GRADIENTS).unwrap();
         for power in 0..=degree {
             for axis in 0..D {
                 let field = |p: &Point<D>| (0.3 + p[axis] - 0.5 * p[D - 1]).powi(power);
@@ -331,11 +367,12 @@ mod tests {
         let cloud = jittered_lattice::<2>(7);
         let shape = ShapeFunctions::new(&cloud, Basis::Quadratic);
         let x = Point::<2>::new(2.9, 3.2);
-        let here = shape.at(&x, true).unwrap();
+        let here = shape.at(&x, Wanted::GRADIENTS).unwrap();
         for k in 0..2 {
             let mut step = Point::<2>::zeros();
             step[k] = 1e-5;
-            let (ahead, behind) = (shape.at(&(x + step), false).unwrap(), shape.at(&(x - step), false).unwrap());
+            let (ahead, behind) =
+                (shape.at(&(x + step), Wanted::VALUES).unwrap(), shape.at(&(x - step), Wanted::VALUES).unwrap());
             let value = |s: &Stencil<2>, i| s.nodes.binary_search(&i).map_or(0.0, |at| s.values[at]);
             for (&i, gradient) in here.nodes.iter().zip(&here.gradients) {
                 let difference = (value(&ahead, i) - value(&behind, i)) / 2e-5;
@@ -349,7 +386,7 @@ mod tests {
         let shape_error = |positions: Vec<[f64; 2]>, half_width: f64| {
             let n = positions.len();
             let cloud = NodeCloud::new(positions.into_iter().map(Point::from).collect(), vec![half_width; n]);
-            ShapeFunctions::new(&cloud, Basis::Linear).at(&cloud.positions()[1], false).unwrap_err()
+            ShapeFunctions::new(&cloud, Basis::Linear).at(&cloud.positions()[1], Wanted::VALUES).unwrap_err()
         };
         let too_small = shape_error(vec![[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], 0.5);
         assert_eq!((too_small.node, too_small.neighbours), (1, 1));

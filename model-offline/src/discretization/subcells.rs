@@ -15,7 +15,7 @@
 
 use super::integration::GAUSS_2;
 use super::nodal_cells::NodalCell;
-use super::shape_functions::Reproduce;
+use super::shape_functions::Wanted;
 use super::{Quadrature, ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2, cross};
 
@@ -177,7 +177,7 @@ impl<'a, 'c> Subcells<'a, 'c> {
         }
         for (s, weight) in GAUSS_2 {
             let x = a + (b - a) * s;
-            self.shape.evaluate(&x, node, &self.candidates, Reproduce::Field, false, &mut self.stencil)?;
+            self.shape.evaluate(&x, node, &self.candidates, Wanted::VALUES, &mut self.stencil)?;
             let mut at = 0;
             for (i, value) in self.stencil.nodes.iter().zip(&self.stencil.values) {
                 while self.candidates[at] != *i {

@@ -90,6 +90,11 @@ impl Pattern {
         Some(self.column_starts[j as usize * self.dimension] as usize + rank * self.dimension)
     }
 
+    /// Number of block columns: nodes.
+    pub fn blocks(&self) -> usize {
+        self.block_starts.len() - 1
+    }
+
     /// Entries per scalar column of block column j: the stride between a block's columns.
     #[inline]
     pub fn column_length(&self, j: u32) -> usize {

@@ -5,64 +5,10 @@
 //! [stabilisation](super::stabilisation) add theirs.
 
 use super::stabilisation;
+use super::tissue::Tissue;
 use crate::discretization::Quadrature;
 use crate::linalg::Pattern;
-use crate::material::{Law, Material, Matrix, determinant};
-
-/// The materials of a tissue, and how much of each every cell contains.
-#[derive(Debug, Clone)]
-pub struct Tissue {
-    materials: Vec<Law>,
-    /// Shear moduli of the materials at rest.
-    shear_moduli: Vec<f64>,
-    /// Per cell: range into `parts`.
-    offsets: Vec<u32>,
-    /// (material, factor on its energy).
-    parts: Vec<(u32, f64)>,
-}
-
-impl Tissue {
-    /// A tissue of one material in every cell.
-    pub fn uniform(material: Law, cells: usize) -> Self {
-        Self::new(vec![material], (0..cells).map(|_| vec![(0, 1.0)]))
-    }
-
-    /// A tissue from the parts of every cell: (index into `materials`, factor on the energy).
-    pub fn new(materials: Vec<Law>, cells: impl IntoIterator<Item = Vec<(u32, f64)>>) -> Self {
-        let (mut offsets, mut parts) = (vec![0], Vec::new());
-        for cell in cells {
-            parts.extend(cell);
-            offsets.push(parts.len() as u32);
-        }
-        let shear_moduli = materials.iter().map(<Law as Material<2>>::rest_shear_modulus).collect();
-        Self { materials, shear_moduli, offsets, parts }
-    }
-
-    /// Shear modulus μ₀ of a cell at rest, stress units.
-    #[inline]
-    pub fn rest_shear_modulus(&self, cell: u32) -> f64 {
-        let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
-        self.parts[range].iter().map(|&(m, factor)| self.shear_moduli[m as usize] * factor).sum()
-    }
-
-    /// The materials and energy factors of a cell.
-    #[inline]
-    pub fn parts(&self, cell: u32) -> impl Iterator<Item = (&Law, f64)> + '_ {
-        let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
-        self.parts[range].iter().map(|&(m, factor)| (&self.materials[m as usize], factor))
-    }
-
-    /// Whether every material is linear, so that one tangent serves every state.
-    pub fn is_linear(&self) -> bool {
-        self.materials.iter().all(Law::is_linear)
-    }
-
-    /// The same tissue with every law replaced by its small-strain limit.
-    #[must_use]
-    pub fn linearised(&self) -> Self {
-        Self { materials: self.materials.iter().map(Law::linearised).collect(), ..self.clone() }
-    }
-}
+use crate::material::{Material, Matrix, determinant};
 
 /// A configuration that the model does not admit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -155,6 +101,8 @@ pub fn internal_force<const D: usize>(
 pub struct BlockPositions {
     /// For every point and every ordered pair (row ≥ column) of its nodes: first entry of the block's first column.
     positions: Vec<u32>,
+    /// Per node: entries between the columns of its blocks.
+    strides: Vec<u32>,
 }
 
 impl BlockPositions {
@@ -171,17 +119,17 @@ impl BlockPositions {
                 }
             }
         }
-        Self { positions }
+        let strides = (0..pattern.blocks() as u32).map(|j| pattern.column_length(j) as u32).collect();
+        Self { positions, strides }
     }
 }
 
 /// Tangent stiffness at the state that [`internal_force`] left, added into `values` (lower triangle of blocks, laid
-/// out by `pattern`).
+/// out by the pattern of `blocks`).
 pub fn tangent<const D: usize>(
     rule: &Quadrature<D>,
     tissue: &Tissue,
     state: &State<D>,
-    pattern: &Pattern,
     blocks: &BlockPositions,
     values: &mut [f64],
 ) {
@@ -203,7 +151,7 @@ pub fn tangent<const D: usize>(
             let t: [[[f64; D]; D]; D] = std::array::from_fn(|k| {
                 std::array::from_fn(|i| std::array::from_fn(|m| (0..D).map(|l| a[i][m][k][l] * gj[l]).sum()))
             });
-            let stride = pattern.column_length(j);
+            let stride = blocks.strides[j as usize] as usize;
             let rows = &point.gradients[column..];
             if let Some(stabilisation) = point.stabilisation.get(packed..packed + rows.len()) {
                 for (b, &at) in stabilisation.iter().zip(&blocks.positions[next..next + rows.len()]) {

@@ -1,6 +1,6 @@
 //! Essential boundary conditions: nodal values prescribed exactly, or weakly by terms of the energy.
 
-use super::assembly::Tissue;
+use super::tissue::Tissue;
 use crate::discretization::Stencil;
 use crate::linalg::Pattern;
 use std::sync::Arc;

@@ -4,6 +4,7 @@ pub mod assembly;
 pub mod constraints;
 pub mod nitsche;
 pub mod stabilisation;
+pub mod tissue;
 
-pub use assembly::Tissue;
 pub use constraints::{ConstrainedRows, Constraints, WeaklyImposed};
+pub use tissue::Tissue;

@@ -5,8 +5,8 @@
 //! SCNI the boundary term is the very integral that the cell's gradient was averaged with and the linear patch test holds
 //! to rounding. The term of the tangent with ∂²P/∂F² (u − g) is left out: it vanishes with the gap.
 
-use super::assembly::Tissue;
 use super::constraints::WeaklyImposed;
+use super::tissue::Tissue;
 use crate::discretization::Planar;
 use crate::discretization::boundary::BoundaryPoint;
 use crate::geometry::Point;

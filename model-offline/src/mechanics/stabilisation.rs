@@ -1,7 +1,7 @@
 //! The constant stabilisation of an integration rule: energy `½ Σ_q μ₀(cell) Σ_IJ B_IJ(q) d_I·d_J`, with the packed
 //! matrices B of the [rule](crate::discretization::Quadrature) and the shear modulus at rest μ₀ of the cell's tissue.
 
-use super::Tissue;
+use super::tissue::Tissue;
 use crate::discretization::Quadrature;
 use nalgebra::{DMatrix, DVector};
 

@@ -90,7 +90,7 @@ pub(super) fn for_each_paddle(
     internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)
         .map_err(|_| singular("at rest"))?;
     let mut at_rest = vec![0.0; pattern.entries()];
-    tangent(rule, model.tissue(), &state, &pattern, &blocks, &mut at_rest);
+    tangent(rule, model.tissue(), &state, &blocks, &mut at_rest);
 
     let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), ConstrainedRows::default());
     let columns = RATES + if loads == Loads::OnTarget { 2 } else { 0 };

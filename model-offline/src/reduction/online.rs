@@ -10,7 +10,7 @@
 //! them.
 
 use crate::material::Material as _;
-use crate::mechanics::assembly::Tissue;
+use crate::mechanics::Tissue;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix2, Vector2};
 use std::sync::Arc;
 

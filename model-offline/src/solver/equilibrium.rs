@@ -9,7 +9,8 @@ use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::linalg::Pattern;
-use crate::mechanics::assembly::{self, BlockPositions, Inverted, State, Tissue};
+use crate::mechanics::Tissue;
+use crate::mechanics::assembly::{self, BlockPositions, Inverted, State};
 use crate::mechanics::{Constraints, WeaklyImposed};
 use serde::Serialize;
 use std::sync::Arc;
@@ -337,7 +338,7 @@ impl<const D: usize> Equilibrium<D> {
     fn refactorise(&mut self) -> bool {
         let (rule, tissue, at, blocks, weak) = (&self.rule, &self.tissue, &self.at, &self.blocks, &self.weak);
         self.solver.assemble(|pattern, values| {
-            assembly::tangent(rule, tissue, &at.state, pattern, blocks, values);
+            assembly::tangent(rule, tissue, &at.state, blocks, values);
             if let Some(weak) = weak {
                 weak.add_tangent(tissue, &at.coefficients, pattern, values);
             }

@@ -21,6 +21,19 @@ const LEFT: f64 = 30.0;
 /// From the axis to its tick labels, px.
 const TICK: f64 = 7.0;
 
+impl Panel {
+    /// The panel with its legend below, this wide in px.
+    pub fn drawing(&self, width: f64) -> Drawing {
+        let layout = Layout::new(self, width);
+        draw(self, &layout, layout.head(), &layout.legend)
+    }
+
+    /// Left and right end of the abscissa on a drawing of this width, px, and what they stand for.
+    pub fn horizontal_span(&self, width: f64) -> [f64; 4] {
+        Layout::new(self, width).horizontal_span()
+    }
+}
+
 fn dashes(dash: Dash) -> &'static str {
     match dash {
         Dash::Solid => "",

@@ -1,8 +1,7 @@
 //! One pair of axes and what is drawn between them.
 
 use super::axis::Axis;
-use super::draw::{Layout, draw};
-use super::drawing::{Drawing, Marker};
+use super::drawing::Marker;
 use super::style::Colour;
 
 /// Pattern of a line.
@@ -171,16 +170,5 @@ impl Panel {
             notes: Vec::new(),
             cursor: false,
         }
-    }
-
-    /// The panel with its legend below, this wide in px.
-    pub fn drawing(&self, width: f64) -> Drawing {
-        let layout = Layout::new(self, width);
-        draw(self, &layout, layout.head(), &layout.legend)
-    }
-
-    /// Left and right end of the abscissa on a drawing of this width, px, and what they stand for.
-    pub fn horizontal_span(&self, width: f64) -> [f64; 4] {
-        Layout::new(self, width).horizontal_span()
     }
 }

@@ -86,7 +86,7 @@ impl Lattice {
 
     /// Three by three Gauss points in every quarter of the lattice squares, for the kernels' own pieces on them.
     fn exact_rule(&self, method: Method) -> Result<Quadrature<2>, DiscretizationError> {
-        use crate::discretization::{NodeCloud, ShapeFunctions};
+        use crate::discretization::{NodeCloud, ShapeFunctions, Wanted};
         let cloud = NodeCloud::new(self.nodes.clone(), vec![method.support; self.nodes.len()]);
         let shape = ShapeFunctions::new(&cloud, method.basis);
         let mut rule = Quadrature::default();
@@ -97,7 +97,7 @@ impl Lattice {
                 let low = corner + Point::<2>::new((k % PIECES) as f64, (k / PIECES) as f64) / PIECES as f64;
                 for (s, ws) in GAUSS_3 {
                     for (t, wt) in GAUSS_3 {
-                        let stencil = shape.at(&(low + Point::<2>::new(s, t) / PIECES as f64), true)?;
+                        let stencil = shape.at(&(low + Point::<2>::new(s, t) / PIECES as f64), Wanted::GRADIENTS)?;
                         let weight = ws * wt / (PIECES * PIECES) as f64;
                         rule.push(weight, 0, &stencil.nodes, &stencil.gradients);
                     }
