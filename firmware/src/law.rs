@@ -89,4 +89,20 @@ mod tests {
         }
         assert_eq!(Direction::Inverse.solve(&Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
     }
+
+    #[test]
+    fn past_the_condition_limit_the_inverse_is_damped_by_the_formula() {
+        for smallest in [1e-1, 1e-2, 3e-3, 1e-4] {
+            // Singular values 2 and 2σ along the axes: (σ² + μ²)⁻¹σ for each, by hand.
+            let jacobian = Matrix2::new(2.0, 0.0, 0.0, 2.0 * smallest);
+            let condition = (1.0 + smallest * smallest) / smallest;
+            let ratio = (DAMPING_CONDITION / condition).min(1.0);
+            let norm = 2.0 * (1.0 + smallest * smallest).sqrt();
+            let damping = (norm / DAMPING_CONDITION).powi(2) * (1.0 - ratio * ratio);
+            let component = |value: f64, n: f64| value / (value * value + damping) * n;
+            let expected = Vector2::new(component(2.0, 0.6), component(2.0 * smallest, 0.8));
+            let solved = Direction::Inverse.solve(&jacobian, &Vector2::new(0.6, 0.8));
+            assert!((solved - expected).norm() < 1e-9 * expected.norm(), "σ {smallest}: {solved} {expected}");
+        }
+    }
 }

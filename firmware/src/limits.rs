@@ -161,6 +161,25 @@ mod tests {
         assert!((back.x - 0.7).abs() < 1e-12, "the first correction back acts in full");
     }
 
+    #[test]
+    fn outside_only_corrections_that_lead_back_are_taken() {
+        let limits = Limits { shape: PositionLimit::Box, max_step: 10.0, ..LIMITS };
+        let edge = 0.5f64.sqrt();
+        let (outside, previous) = (Vector2::new(edge + 0.2, 0.0), Vector2::new(edge, 0.0));
+        let integrate = |x: f64, y: f64| limits.integrate(&outside, &Vector2::new(x, y), &Vector2::zeros(), &previous);
+        assert_eq!(integrate(-0.1, 0.0), Vector2::new(edge + 0.2, 0.0) + Vector2::new(-0.1, 0.0));
+        assert_eq!(integrate(0.1, 0.0), outside, "further out");
+        assert_eq!(integrate(0.0, 0.3), outside, "along the boundary: no nearer");
+        // One that leaves the admissible positions is taken up to their boundary.
+        let inside = limits.integrate(&Vector2::zeros(), &Vector2::new(2.0, 0.1), &Vector2::zeros(), &Vector2::zeros());
+        assert!((inside - Vector2::new(edge, 0.1)).norm() < 1e-15);
+        // On its way at full rate, the paddle is asked for no more of the same, but for less at once.
+        let slow = Limits { max_step: 0.1, ..LIMITS };
+        let (goal, zero) = (Vector2::new(0.5, 0.0), Vector2::zeros());
+        let underway = |x: f64| slow.integrate(&goal, &Vector2::new(x, 0.0), &zero, &zero);
+        assert_eq!((underway(0.1), underway(-0.1)), (goal, Vector2::new(0.4, 0.0)));
+    }
+
     proptest! {
         #[test]
         fn what_is_cut_differs_and_the_rest_is_left_alone(angle in 0.0..6.3f64, limit in 0.1..10.0f64, ulps in -9..9i32) {

@@ -409,6 +409,65 @@ fn saturation_recovers_without_overshoot() {
 }
 
 #[test]
+fn accounts_go_on_when_rearming_and_rearming_in_run_does_nothing() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.run(1000);
+    let state = closed.state.clone();
+    closed.state.rearm();
+    assert_eq!(closed.state, state);
+    closed.tick(|inputs| inputs.time_ns -= 5 * MS);
+    let before = *closed.state.ledger();
+    assert_eq!((before.ticks.due, before.ticks.safe, before.needle.consumed), (1001, 1, 1000));
+    let sequence = closed.last.unwrap().sequence;
+    closed.state.rearm();
+    assert_eq!((*closed.state.ledger(), closed.state.mode()), (before, Mode::Hold));
+    closed.last = None;
+    closed.run(1);
+    assert_eq!((closed.state.ledger().ticks.due, closed.last.unwrap().sequence), (1002, sequence + 1));
+}
+
+#[test]
+fn the_delay_and_the_gain_in_use_are_told() {
+    let table = table();
+    let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 38 * MS)).unwrap();
+    assert_eq!(controller.delay_samples(), 2);
+    assert!((controller.loop_gain() - 4.0 / 27.0).abs() < 1e-15);
+}
+
+/// A target that is pushed away so far that the paddle needs many samples to get there at its full rate.
+#[test]
+fn a_long_motion_at_full_rate_does_not_overshoot() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings { loop_gain: Some(0.9), ..settings() });
+    closed.plant.speed = 0.0;
+    closed.plant.offset = 8e-3;
+    let mut least: f64 = 8e-3;
+    for _ in 0..2000 {
+        closed.tick(|_| {});
+        least = least.min(closed.plant.target().x);
+    }
+    assert!(least > -4e-4, "overshoot {least}");
+    assert!(closed.plant.target().x.abs() < 1e-5, "{}", closed.plant.target().x);
+}
+
+#[test]
+fn a_paddle_that_hangs_is_frozen_once_the_command_has_left_it() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings { following_error: Some(1.0), ..settings() });
+    closed.run(1000);
+    let (stuck, commanded) = (closed.plant.paddle, Vector2::from(closed.last.unwrap().displacement));
+    while !closed.state.faults().contains(Faults::FROZEN) {
+        closed.tick(|inputs| inputs.paddle.as_mut().unwrap().displacement = stuck.into());
+        assert!(closed.plant.tick < 4000, "never found");
+    }
+    // 0.5 % of the range, and what is on its way for two ticks at the full rate.
+    let left = (Vector2::from(closed.last.unwrap().displacement) - commanded).norm();
+    let admitted = 0.005 * 0.05 + 0.1 * 2e-3;
+    assert!((admitted..admitted + 2e-4).contains(&left), "{left}, {admitted} admitted");
+}
+
+#[test]
 fn counters_may_start_anywhere() {
     let table = table();
     let (mut zero, mut wrapping) = (Loop::new(&table, &settings()), Loop::new(&table, &settings()));
