@@ -427,6 +427,21 @@ fn accounts_go_on_when_rearming_and_rearming_in_run_does_nothing() {
     assert_eq!((closed.state.ledger().ticks.due, closed.last.unwrap().sequence), (1002, sequence + 1));
 }
 
+/// Long before the paddle is at its limit: corrections that act are what tells a wrong sign.
+#[test]
+fn a_sign_error_is_found_before_saturation() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.plant.jacobian = -jacobian();
+    let mut limited = false;
+    while closed.state.mode() != Mode::Safe {
+        closed.tick(|_| {});
+        limited |= closed.state.faults().contains(Faults::POSITION_LIMITED);
+        assert!(closed.plant.tick < 5000, "never found");
+    }
+    assert!(closed.state.faults().contains(Faults::DIVERGENCE) && !limited);
+}
+
 #[test]
 fn the_delay_and_the_gain_in_use_are_told() {
     let table = table();
