@@ -79,7 +79,7 @@ fn reference(share: f64) -> Reference {
 fn rules_with_stable_modes_are_right_on_even_nodes() {
     let reference = reference(0.005);
     for (integration, most) in [
-        (Integration::default(), 0.08),
+        (Integration::default(), 0.09),
         (Integration::Nsni, 0.08),
         (Integration::Gauss, 0.05),
         (Integration::FemT6, 0.05),

@@ -20,6 +20,8 @@ const LOOSE: f64 = 0.03;
 const LONGEST_SKIP: i32 = 2;
 /// Share of the tolerance that the reference may leave open.
 const REFERENCE_SHARE: f64 = 0.25;
+/// The same where that decides.
+const SHARP_SHARE: f64 = 0.08;
 
 /// What a refinement found out about its own error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -77,7 +79,7 @@ fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate),
     if method.integration == Integration::FemT6 {
         return refine_elements(scene, method, tolerance);
     }
-    let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
+    let mut reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
     let mut level = first_level(tolerance);
     let mut tried = level - 1;
@@ -92,7 +94,16 @@ fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate),
             Err(ModelError::TooManyNodes { .. }) => break,
             Err(error) => return Err(error),
         };
-        let estimate = reference.estimate(&rest_responses(&model)?, level);
+        let responses = rest_responses(&model)?;
+        let mut estimate = reference.estimate(&responses, level);
+        if estimate.worst() > tolerance
+            && estimate.worst() - reference.open <= tolerance
+            && !reference.is_sharp(tolerance)
+        {
+            // What the reference leaves open decides: sharpening it costs less than another level, and serves all to come.
+            reference = Reference::compute(scene, SHARP_SHARE * tolerance)?;
+            estimate = reference.estimate(&responses, level);
+        }
         if estimate.worst() <= tolerance {
             return Ok((model, estimate));
         }
@@ -162,6 +173,10 @@ impl Reference {
             open: certified.worst_open(),
             nodes: certified.nodes,
         }
+    }
+
+    fn is_sharp(&self, tolerance: f64) -> bool {
+        self.open <= SHARP_SHARE * tolerance
     }
 
     /// Estimated relative errors of the controllability measures, paddle by paddle: the distance to the limit, and what
