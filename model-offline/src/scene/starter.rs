@@ -148,8 +148,7 @@ impl Layout {
             out,
             "\n# [actuator]                        # limits of the paddle; defaults follow from the depth\n\
              # max_displacement = {d}\n# max_rate = {d}                     # per second\n# max_needle_speed = {}\n\n\
-             [discretization]\nspacing = {}                       # between nodes; or: tolerance = 0.05\n\
-             support = 2.0                       # kernel support over spacing\nintegration = \"scni\"                # dni | scni | nsni | gauss | fem-t3 | fem-t6\n",
+             [discretization]\ntolerance = 0.02                    # of the controllability measures; or: spacing = {}, between nodes\n",
             number(2.0 * self.depth),
             number(self.spacing),
             d = number(self.depth),
