@@ -237,7 +237,7 @@ mod tests {
     fn a_lost_sample_shows_as_unaccounted() {
         let mut span = SequenceSpan::default();
         span.see(2);
-        let ledger = StreamLedger { published: 1, consumed: 1, ..StreamLedger::default() };
+        let ledger = StreamLedger { delivered: 1, published: 1, consumed: 1, ..StreamLedger::default() };
         let account = span.account(&ledger, Some(5));
         assert_eq!((account.overwritten, account.in_flight), (2, 3));
         assert_eq!(stream(&account, 6).unaccounted, 0);

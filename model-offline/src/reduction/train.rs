@@ -44,6 +44,9 @@ const NEGLIGIBLE: f64 = 1e-7;
 const SAMPLING_TOLERANCES: [f64; 3] = [3e-2, 1e-2, 3e-3];
 /// Numbers in the matrix that the sample is chosen by, at most: what a few hundred megabytes hold.
 const LARGEST_FIT: usize = 30_000_000;
+/// What the estimate misses between the states tried, at most, per what it missed on those: the half of the tolerance that
+/// training leaves to them.
+const BETWEEN_TRIALS: f64 = 2.0;
 /// The paddle's range over what it takes to hold the target.
 const WORKSPACE_MARGIN: f64 = 2.0;
 
@@ -270,9 +273,11 @@ fn trial(reduced: &mut ReducedModel, trials: &[Snapshot]) -> (f64, f64) {
         return (f64::INFINITY, f64::INFINITY);
     }
     let outcomes: Vec<(f64, f64)> = outcomes.into_iter().flatten().collect();
-    reduced.underestimate = outcomes.iter().map(|(error, estimate)| error - estimate).fold(0.0, f64::max);
+    let missed = outcomes.iter().map(|(error, estimate)| error - estimate).fold(0.0, f64::max);
+    // The estimate is for the states between those tried, which miss by more.
+    reduced.underestimate = BETWEEN_TRIALS * missed;
     let worst = |part: fn(&(f64, f64)) -> f64| outcomes.iter().map(part).fold(0.0, f64::max);
-    (worst(|o| o.0), worst(|o| o.1) + reduced.underestimate)
+    (worst(|o| o.0), worst(|o| o.1) + missed)
 }
 
 /// How large a reduced model is.
