@@ -19,7 +19,7 @@
 //! | [`exchange`] | shared memory between plant and controller, the serial line to a board |
 //! | [`runtime`] | the loop at work: both processes, in [lockstep](runtime::plant::lockstep) and in [free-run](runtime::plant::free_run) |
 //! | [`record`] | recordings of every tick, their replay, files for other tools |
-//! | [`bench`] | strategies [compared](bench::comparison), [faults](bench::faults), [timing](bench::timing), [stability](bench::stability), the controller on a [board](bench::board) |
+//! | [`bench`](mod@bench) | strategies [compared](bench::comparison), [faults](bench::faults), [timing](bench::timing), [stability](bench::stability), the controller on a [board](bench::board) |
 //! | [`report`], [`view`] | what a person sees |
 //!
 //! Two modes of time, never mixed: in lockstep it comes from the messages, and the same seed gives the same bytes; in
