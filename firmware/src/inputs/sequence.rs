@@ -72,6 +72,11 @@ impl SequenceTracker {
         Arrival::Late
     }
 
+    /// Whether a number lies behind everything that is remembered.
+    pub(crate) fn is_forgotten(&self, sequence: u32) -> bool {
+        self.newest.is_some_and(|newest| newest.wrapping_sub(sequence).cast_signed() >= WINDOW.cast_signed())
+    }
+
     /// Enters the number of a sample that follows the accepted ones, which it may do in a gap that a refused one has
     /// left; `false` for one that has arrived before.
     pub(crate) fn enter(&mut self, sequence: u32, ledger: &mut StreamLedger) -> bool {

@@ -58,6 +58,12 @@ impl Stream {
         ledger: &mut StreamLedger,
         faults: &mut Faults,
     ) -> bool {
+        if let (Err(reason), true) = (content, self.arrivals.is_forgotten(sequence)) {
+            // Far too late and refused: no sender that counts anew.
+            ledger.strays += 1;
+            *faults |= fault_of(reason);
+            return false;
+        }
         let lost = ledger.lost;
         if !self.arrivals.enter(sequence, ledger) {
             *faults |= Faults::DUPLICATE;
