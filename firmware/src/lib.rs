@@ -104,7 +104,7 @@ pub mod schedule;
 
 pub mod law;
 pub mod limits;
-pub mod stability;
+pub mod loop_stability;
 pub mod table_lookup;
 
 pub mod settings;

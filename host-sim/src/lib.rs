@@ -19,7 +19,7 @@
 //! | [`exchange`] | shared memory between plant and controller, the serial line to a board |
 //! | [`runtime`] | the loop at work: both processes, in [lockstep](runtime::plant::lockstep) and in [free-run](runtime::plant::free_run) |
 //! | [`record`] | recordings of every tick, their replay, files for other tools |
-//! | [`bench`](mod@bench) | strategies [compared](bench::comparison), [faults](bench::faults), [timing](bench::timing), [stability](bench::stability), the controller on a [board](bench::board) |
+//! | [`bench`](mod@bench) | strategies [compared](bench::comparison), [faults](bench::faults), [timing](bench::timing), [stability](bench::loop_stability), the controller on a [board](bench::board) |
 //! | [`report`], [`view`] | what a person sees |
 //!
 //! Two modes of time, never mixed: in lockstep it comes from the messages, and the same seed gives the same bytes; in
@@ -29,10 +29,10 @@
 //! The controller with a tissue that is linear about its own table, in one thread and virtual time:
 //!
 //! ```
-//! use host_sim::bench::{faults::closed_loop::{ClosedLoop, Setup}, fixture::fixture};
+//! use host_sim::bench::{faults::closed_loop::{ClosedLoop, Setup}, paper_table::paper_table};
 //!
 //! # fn main() -> Result<(), host_sim::SimError> {
-//! let table = fixture()?;
+//! let table = paper_table()?;
 //! let mut closed_loop = ClosedLoop::new(&table, Setup::new(&table, 1))?;
 //! closed_loop.run(5_500);
 //! assert_eq!(closed_loop.mode(), firmware::Mode::Run);
@@ -58,7 +58,7 @@ pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, S
 pub use bench::error::SimError;
 pub use bench::result::RunResult;
 pub use bench::strategy::{ControllerSetup, Extras, Insertion, Label};
-pub use bench::tissue::Tissue;
+pub use bench::tissue_variant::TissueVariant;
 pub use exchange::Space;
 pub use record::recording::Recording;
 pub use record::replay::replay_file;

@@ -6,7 +6,7 @@ use std::cell::Cell;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::io::run_tick;
 use firmware::{Controller, Inputs, Mode, Settings, State};
-use host_sim::bench::fixture::fixture;
+use host_sim::bench::paper_table::paper_table;
 use host_sim::exchange::{ControllerPorts, Departure, PlantPorts, Space};
 use host_sim::record::recording::Header;
 use host_sim::record::recording::stream::StreamRecorder;
@@ -76,7 +76,7 @@ fn the_counter_counts() {
 
 #[test]
 fn the_step_allocates_nothing() {
-    let table = fixture().unwrap();
+    let table = paper_table().unwrap();
     let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 0)).unwrap();
     let mut state = State::<f64>::new();
     let mut command = PaddleCommand::default();
@@ -95,7 +95,7 @@ fn the_step_allocates_nothing() {
 
 #[test]
 fn the_loop_allocates_no_more_than_its_transport() {
-    let table = fixture().unwrap();
+    let table = paper_table().unwrap();
     let settings = Settings::new(MS, 20 * MS, 0);
     let controller = Controller::new(&table, &settings).unwrap();
     let mut state = State::<f64>::new();

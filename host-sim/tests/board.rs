@@ -165,17 +165,17 @@ impl Plant {
 
 /// What came of a run.
 #[derive(Debug)]
-struct Outcome {
+struct BoardRun {
     last: PaddleCommand,
     lost_ticks: u64,
     worst_error: f64,
 }
 
 /// Runs the loop for so many ticks; both limits must hold on every command that arrives.
-fn drive(device: &mut Device, plant: &mut Plant, ticks: u64) -> Outcome {
+fn drive(device: &mut Device, plant: &mut Plant, ticks: u64) -> BoardRun {
     let table = table();
     let step = table.paddle.max_rate * 1e-3;
-    let mut outcome = Outcome { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
+    let mut outcome = BoardRun { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
     for _ in 0..ticks {
         let inputs = plant.sense();
         let answer = device.step(&inputs, PATIENCE).unwrap();

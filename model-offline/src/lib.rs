@@ -40,6 +40,7 @@
 //! # Ok::<(), table::TableBuildError>(())
 //! ```
 
+mod choice;
 pub mod discretization;
 pub mod geometry;
 pub mod guide;

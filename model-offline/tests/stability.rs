@@ -22,7 +22,7 @@ fn plain(integration: Integration, spacing: f64, paddle: u32) -> Outcome {
 }
 
 /// Needle depths that an independent implementation reached on this scene (homogeneous, increments of 0.01, plain
-/// Newton, c = 0.779), as a fixture with paddle 2 and paddle 4; they must be met within one increment.
+/// Newton, c = 0.779), with paddle 2 and paddle 4 static; they must be met within one increment.
 #[test]
 fn depths_agree_with_an_independent_implementation() {
     use Integration::{Dni, FemT3, Scni};

@@ -9,8 +9,8 @@ use model_offline::solver::equilibrium::{DiscreteBody, Equilibrium, NewtonSettin
 use std::sync::Arc;
 use tests::{jittered_rectangle, rectangle};
 
-fn method(integration: Integration, basis: Basis, support: f64, consistent: bool) -> Method {
-    Method { integration, basis, support, consistent }
+fn method(integration: Integration, basis: Basis, support: f64) -> Method {
+    Method { basis, support, ..Method::new(integration) }
 }
 
 /// Plane-stress Lamé parameters: λ* = Eν/(1 − ν²), μ = E/(2(1 + ν)).
@@ -78,8 +78,7 @@ fn timoshenko_cantilever_tip_deflection() {
     ] {
         let nodes = jittered_rectangle(l, d, 48, 12, 0.0, 1);
         let planar =
-            Planar::new(&rectangle(l, d), &[], nodes, Some(1.0), method(integration, Basis::Linear, 2.0, true))
-                .unwrap();
+            Planar::new(&rectangle(l, d), &[], nodes, Some(1.0), method(integration, Basis::Linear, 2.0)).unwrap();
         let (mut body, prescribed) =
             hold(&planar, &plane_stress(3e7, 0.3), 1.0, |x| (x.x.abs() < 1e-9).then(|| timoshenko(x)));
         // τ_xy = −P/(2I) (D²/4 − y²) on the free end.
@@ -111,7 +110,7 @@ fn cook(n: usize) -> (Polygon, Vec<Point2>) {
 
 fn cook_tip(integration: Integration, material: &Law, n: usize, steps: u32) -> f64 {
     let (outline, nodes) = cook(n);
-    let planar = Planar::new(&outline, &[], nodes, None, method(integration, Basis::Linear, 2.0, true)).unwrap();
+    let planar = Planar::new(&outline, &[], nodes, None, method(integration, Basis::Linear, 2.0)).unwrap();
     let (mut body, prescribed) = hold(&planar, material, 1.0, |x| (x.x.abs() < 1e-9).then(Point2::zeros));
     let load =
         planar.boundary_force(|_, n| if n.x > 0.99 { Point2::new(0.0, 1.0 / 16.0) } else { Point2::zeros() }).unwrap();
@@ -181,8 +180,7 @@ fn manufactured(integration: Integration, basis: Basis, support: f64, n: usize) 
     };
     let h = 1.0 / n as f64;
     let nodes = jittered_rectangle(1.0, 1.0, n, n, 0.15, 3);
-    let planar =
-        Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(h), method(integration, basis, support, true)).unwrap();
+    let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(h), method(integration, basis, support)).unwrap();
     let law = Law::linear(lambda, mu).unwrap();
     let tissue = Tissue::uniform(law, planar.cells().len());
     // Weakly, so that the boundary does not limit the order.
@@ -274,7 +272,7 @@ fn spectrum(integration: Integration) -> Vec<f64> {
     use model_offline::mechanics::assembly::displacement_gradient;
     let nodes = jittered_rectangle(1.0, 1.0, 6, 6, 0.0, 1);
     let planar =
-        Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(1.0 / 6.0), method(integration, Basis::Linear, 2.0, true))
+        Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(1.0 / 6.0), method(integration, Basis::Linear, 2.0))
             .unwrap();
     let n = 2 * planar.positions().len();
     let law = Law::saint_venant_kirchhoff(383.0, 318.5).unwrap();

@@ -77,7 +77,7 @@ fn every_method_converges_to_the_continuum_on_graded_nodes() {
 
 #[test]
 fn the_static_optimum_moves_with_the_mesh_and_the_dynamic_one_does_not() {
-    // In the continuum limit of the paper's scene the best fixture in homogeneous tissue is paddle 2, not 4.
+    // In the continuum limit of the paper's scene the best static paddle in homogeneous tissue is paddle 2, not 4.
     let limits = limits("paper", "homogeneous");
     let best = |key: &dyn Fn(&Limit) -> f64| {
         1 + (0..limits.len()).min_by(|&a, &b| key(&limits[a]).total_cmp(&key(&limits[b]))).unwrap()

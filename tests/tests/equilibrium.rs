@@ -179,7 +179,7 @@ fn the_paddles_forces_balance_those_of_needle_and_wall() {
 #[test]
 fn the_volumetric_barrier_gives_the_finite_depth_profile_a_mesh_limit() {
     // Without it, halving the spacing of the paper's scene ends the run before depth 0.1; with it the run completes,
-    // finer nodes change the profile less and less, and the best fixture stays paddle 4.
+    // finer nodes change the profile less and less, and the best static paddle stays paddle 4.
     let text = model_offline::scene::BUNDLED[0].1;
     let guarded = text.replacen("mu_c = 1.0", "mu_c = 1.0\nbarrier = 300.0", 1);
     let study = |text: &str, spacing: f64| {

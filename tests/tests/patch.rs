@@ -1,6 +1,6 @@
 //! Linear patch test: a linear displacement on the boundary must give the same linear displacement inside.
 
-use model_offline::discretization::{Integration, Method, Planar};
+use model_offline::discretization::{Consistency, Integration, Method, Planar};
 use model_offline::geometry::Point2;
 use model_offline::material::{Law, Material as _};
 use model_offline::mechanics::nitsche::Nitsche;
@@ -32,9 +32,9 @@ fn on_boundary(x: &Point2) -> bool {
 }
 
 /// Largest error of the nodal displacements over the largest displacement, on 11 × 11 nodes of the unit square.
-fn patch_error(boundary: Boundary, integration: Integration, consistent: bool, jitter: f64) -> f64 {
+fn patch_error(boundary: Boundary, integration: Integration, consistency: Consistency, jitter: f64) -> f64 {
     let nodes = jittered_rectangle(1.0, 1.0, 10, 10, jitter, 11);
-    let method = Method { consistent, ..Method::new(integration) };
+    let method = Method { consistency, ..Method::new(integration) };
     let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes, Some(SPACING), method).unwrap();
     let material = Law::linear(383.0, 318.5).unwrap();
     let tissue = Tissue::uniform(material.clone(), planar.cells().len());
@@ -77,7 +77,7 @@ fn patch_error(boundary: Boundary, integration: Integration, consistent: bool, j
 fn consistent_boundary_terms_make_scni_exact() {
     for boundary in [Boundary::Nitsche, Boundary::Tractions] {
         for integration in [Integration::Scni, Integration::ScniStabilised, Integration::Mscni] {
-            let error = patch_error(boundary, integration, false, 0.4);
+            let error = patch_error(boundary, integration, Consistency::Uncorrected, 0.4);
             assert!(error < 1e-10, "{integration:?} {boundary:?}: {error:.1e}");
         }
     }
@@ -88,7 +88,7 @@ fn the_consistent_correction_makes_every_rule_exact() {
     // Corrected DNI, one point per cell with the cell's boundary average, is SCNI.
     for integration in [Integration::Nsni, Integration::Gauss, Integration::FemT3, Integration::FemT6] {
         for boundary in [Boundary::Nitsche, Boundary::Tractions] {
-            let error = patch_error(boundary, integration, true, 0.4);
+            let error = patch_error(boundary, integration, Consistency::Corrected, 0.4);
             assert!(error < 1e-10, "{integration:?} {boundary:?}: {error:.1e}");
         }
     }
@@ -100,7 +100,7 @@ fn rules_without_the_correction_fail_by_a_known_amount() {
     for (integration, low, high) in
         [(Integration::Dni, 1e-3, 0.5), (Integration::Nsni, 1e-4, 0.5), (Integration::Gauss, 1e-5, 0.1)]
     {
-        let error = patch_error(Boundary::Tractions, integration, false, 0.4);
+        let error = patch_error(Boundary::Tractions, integration, Consistency::Uncorrected, 0.4);
         println!("{integration:?} uncorrected: {error:.1e}");
         assert!((low..high).contains(&error), "{integration:?}: {error:.1e}");
     }
@@ -116,7 +116,7 @@ fn the_transformation_method_leaves_the_published_error_and_no_more() {
         (Integration::Dni, 0.0, 7e-4),
         (Integration::Dni, 0.4, 4e-2),
     ] {
-        let error = patch_error(Boundary::Transformation, integration, false, jitter);
+        let error = patch_error(Boundary::Transformation, integration, Consistency::Uncorrected, jitter);
         println!("{integration:?}, jitter {jitter}: {error:.2e}");
         assert!(error < 2.5 * expected, "{integration:?} {jitter}: {error:.2e}, published {expected:.0e}");
         assert!(error > 1e-6, "an exact patch test would mean that something else is tested");

@@ -49,7 +49,7 @@ pub struct Validity<T: Scalar> {
     pub needle_speed: T,
 }
 
-/// Controller settings that the table suggests; see [`crate::stability`].
+/// Controller settings that the table suggests; see [`crate::loop_stability`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Gains<T: Scalar> {

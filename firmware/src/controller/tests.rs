@@ -9,7 +9,7 @@ use crate::contract::example::{jacobian, table};
 use crate::contract::{Table, TargetSample};
 use crate::detection::{MAX_SUCCESSIVE_OVERRUNS, TICKS_TO_HOLD};
 use crate::inputs::Discard;
-use crate::stability;
+use crate::loop_stability;
 
 mod attacks;
 
@@ -110,7 +110,7 @@ fn a_slow_target_sensor_makes_no_oscillation() {
 fn growth(ratio: f64) -> f64 {
     let mut table = table();
     table.paddle.max_rate = 1e3;
-    let limit = stability::gain_limit(0.0, 1);
+    let limit = loop_stability::gain_limit(0.0, 1);
     let mut closed = Loop::new(&table, &Settings { loop_gain: Some(ratio * limit), ..settings() });
     closed.plant.speed = 0.0;
     let start = 1e-5;

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::law::Direction;
 use crate::limits::PositionLimit;
+use crate::loop_stability;
 use crate::schedule::quotient;
-use crate::stability;
 
 mod runtime;
 
@@ -27,7 +27,7 @@ pub struct Settings {
     pub actuator_delay_ns: u64,
     /// Standard deviation of the target sensor per component, length.
     pub target_noise: f64,
-    /// Loop gain g per target sample; `None`: [`stability::default_gain`].
+    /// Loop gain g per target sample; `None`: [`loop_stability::default_gain`].
     pub loop_gain: Option<f64>,
     /// Largest |λ| of J·Ĵ⁻¹ over the expected model errors; `None`: the table's.
     pub lambda_max: Option<f64>,
@@ -105,7 +105,7 @@ impl fmt::Display for SettingsError {
                 f,
                 "the target is {samples} samples old when a correction acts, at most {} are sensible: \
                  lower the latency",
-                stability::MAX_DELAY_SAMPLES
+                loop_stability::MAX_DELAY_SAMPLES
             ),
             Self::Range { field, admitted } => write!(f, "{field} must be {admitted}"),
         }

@@ -8,8 +8,8 @@ use crate::detection::{
 };
 use crate::law::Direction;
 use crate::limits::Limits;
+use crate::loop_stability;
 use crate::scalar::Scalar;
-use crate::stability;
 use crate::units::seconds;
 
 /// Limits of the age of an input, ns.
@@ -65,13 +65,13 @@ impl<T: Scalar> Runtime<T> {
     pub(crate) fn new<const D: usize>(table: &Table<T, D>, settings: &Settings) -> Result<Self, SettingsError> {
         check_periods(settings)?;
         let delay_samples = settings.delay_samples();
-        if delay_samples > stability::MAX_DELAY_SAMPLES {
+        if delay_samples > loop_stability::MAX_DELAY_SAMPLES {
             return Err(SettingsError::Delay { samples: delay_samples });
         }
         let lambda_max = settings.lambda_max.unwrap_or(table.gains.lambda_max.to_f64());
         check("lambda_max", "from 1 to 100", (1.0..=100.0).contains(&lambda_max))?;
         // Not limited to the stable range: stability is charted on both sides of its limit.
-        let gain = settings.loop_gain.unwrap_or(stability::default_gain(delay_samples, lambda_max));
+        let gain = settings.loop_gain.unwrap_or(loop_stability::default_gain(delay_samples, lambda_max));
         check("loop gain", "above 0 and at most 2", gain > 0.0 && gain <= 2.0)?;
         let noise = settings.target_noise;
         check("target noise", "finite and not negative", noise.is_finite() && noise >= 0.0)?;

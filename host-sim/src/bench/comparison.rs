@@ -17,7 +17,7 @@ use sha2::{Digest, Sha256};
 use super::describe;
 use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, TableResult};
 use super::strategy::{ControllerSetup, Extras, Insertion, Label, Measured};
-use super::tissue::Tissue;
+use super::tissue_variant::TissueVariant;
 use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
 use crate::record::files::{Artifact, read_bytes};
@@ -31,9 +31,9 @@ use crate::world::simulation::Simulation;
 #[derive(Clone, Debug)]
 pub struct ComparisonOptions {
     /// Tissue of the simulation; none: both, and the inclusion with a table that does not know it.
-    pub tissue: Option<Tissue>,
+    pub tissue: Option<TissueVariant>,
     /// Tissue that the planner and the table believe in; none: the simulation's.
-    pub table_tissue: Option<Tissue>,
+    pub table_tissue: Option<TissueVariant>,
     /// Controller table to use instead of computing one.
     pub table: Option<PathBuf>,
     /// Whether a table of another scene is used all the same.
@@ -125,14 +125,14 @@ pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -
 
 /// Whether a table was computed from this scene, with or without its inclusions.
 pub fn is_of(table: &Table<f64, 2>, scene: &Scene) -> bool {
-    Tissue::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash)
+    TissueVariant::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash)
 }
 
 /// A plant, and what its controller believes.
 #[derive(Clone, Copy, Debug)]
 struct Case {
-    tissue: Tissue,
-    table_tissue: Tissue,
+    tissue: TissueVariant,
+    table_tissue: TissueVariant,
     /// A mismatch repeats nothing that its plant's own case shows already.
     is_mismatch: bool,
 }
@@ -156,22 +156,28 @@ impl Case {
 fn cases(options: &ComparisonOptions, scene: &Scene, table: Option<&Table<f64, 2>>) -> Result<Vec<Case>, SimError> {
     let has_inclusion = !scene.inclusions.is_empty();
     let asked = [options.tissue, options.table_tissue];
-    if !has_inclusion && asked.contains(&Some(Tissue::Inclusion)) {
+    if !has_inclusion && asked.contains(&Some(TissueVariant::Inclusion)) {
         return Err(SimError::NoInclusion { scene: scene.name.clone() });
     }
     let believed = match table {
-        Some(table) if table.tissue == Tissue::Homogeneous.name() => Some(Tissue::Homogeneous),
-        Some(table) if has_inclusion && table.tissue == Tissue::Inclusion.name() => Some(Tissue::Inclusion),
+        Some(table) if table.tissue == TissueVariant::Homogeneous.name() => Some(TissueVariant::Homogeneous),
+        Some(table) if has_inclusion && table.tissue == TissueVariant::Inclusion.name() => {
+            Some(TissueVariant::Inclusion)
+        }
         _ => options.table_tissue,
     };
     let case = |tissue| Case { tissue, table_tissue: believed.unwrap_or(tissue), is_mismatch: false };
     let mut cases = match options.tissue {
         Some(tissue) => vec![case(tissue)],
-        None if has_inclusion => Tissue::ALL.map(case).to_vec(),
-        None => vec![case(Tissue::Homogeneous)],
+        None if has_inclusion => TissueVariant::ALL.map(case).to_vec(),
+        None => vec![case(TissueVariant::Homogeneous)],
     };
     if has_inclusion && options.tissue.is_none() && believed.is_none() {
-        cases.push(Case { tissue: Tissue::Inclusion, table_tissue: Tissue::Homogeneous, is_mismatch: true });
+        cases.push(Case {
+            tissue: TissueVariant::Inclusion,
+            table_tissue: TissueVariant::Homogeneous,
+            is_mismatch: true,
+        });
     }
     Ok(cases)
 }
@@ -179,7 +185,7 @@ fn cases(options: &ComparisonOptions, scene: &Scene, table: Option<&Table<f64, 2
 /// A tissue of the comparison, with its placement study.
 #[derive(Debug)]
 struct Studied {
-    tissue: Tissue,
+    tissue: TissueVariant,
     model: TissueModel,
     placement: Placement,
     wall_s: f64,
@@ -306,7 +312,7 @@ impl<'p> Comparison<'p> {
             let is_its = move |case: &Case| case.tissue == tissue || case.table_tissue == tissue;
             self.cases.iter().any(is_its)
         };
-        let models = Tissue::ALL
+        let models = TissueVariant::ALL
             .into_iter()
             .filter(|tissue| occurs(*tissue))
             .map(|tissue| Ok((tissue, discretise(&tissue.of(&self.scene))?.0)))
@@ -327,7 +333,7 @@ impl<'p> Comparison<'p> {
         Ok(())
     }
 
-    fn studied(&self, tissue: Tissue) -> &Studied {
+    fn studied(&self, tissue: TissueVariant) -> &Studied {
         let found = self.studied.iter().find(|studied| studied.tissue == tissue);
         found.expect("the tissues of all cases are studied")
     }
@@ -351,7 +357,7 @@ impl<'p> Comparison<'p> {
             .collect()
     }
 
-    fn compute_table(&self, tissue: Tissue) -> Result<EncodedTable, SimError> {
+    fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
         self.progress.say(&format!("{tissue}: controller table"));
         let studied = self.studied(tissue);
         let table = build(&studied.model, studied.placement.optimum.dynamic_paddle, &TableOptions::default())?;
@@ -402,7 +408,7 @@ impl<'p> Comparison<'p> {
     fn strategies(
         &self,
         case: &Case,
-        (none, fixture): Uncontrolled,
+        (none, static_paddle): Uncontrolled,
         table: &EncodedTable,
         spectator: Option<&dyn Spectator>,
     ) -> Result<(Strategies, Vec<Artifact>), SimError> {
@@ -411,8 +417,11 @@ impl<'p> Comparison<'p> {
             artifacts.extend(measured.artifacts);
             measured.result
         };
-        let mut strategies =
-            Strategies { none: none.map(&mut keep), fixture: fixture.map(&mut keep), ..Strategies::default() };
+        let mut strategies = Strategies {
+            none: none.map(&mut keep),
+            static_paddle: static_paddle.map(&mut keep),
+            ..Strategies::default()
+        };
         if self.options.mode != Some(RunMode::FreeRun) {
             strategies.dynamic = Some(keep(self.dynamic(case, table, RunMode::Lockstep, spectator)?));
         }
@@ -461,10 +470,10 @@ impl<'p> Comparison<'p> {
         let controller = Controller::new(table, &settings)?;
         let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
         let improvement = strategies
-            .fixture
+            .static_paddle
             .as_ref()
             .zip(dynamic)
-            .map(|(fixture, dynamic)| fixture.max_orthogonal_error / dynamic.max_orthogonal_error);
+            .map(|(static_paddle, dynamic)| static_paddle.max_orthogonal_error / dynamic.max_orthogonal_error);
         Ok(CaseResult {
             tissue: case.tissue,
             table_tissue: self.believed_tissue(table),

@@ -6,7 +6,7 @@ use model_offline::placement::Placement;
 use model_offline::scene::Scene;
 
 use super::result::{Geometry, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
-use super::tissue::Tissue;
+use super::tissue_variant::TissueVariant;
 use crate::world::simulation::Simulation;
 
 fn point(point: &Point2) -> [f64; 2] {
@@ -70,7 +70,7 @@ pub fn command_line() -> Vec<String> {
 }
 
 /// A placement study.
-pub fn placement(tissue: Tissue, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
+pub fn placement(tissue: TissueVariant, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
     let integration = serde_json::to_value(model.scene().discretization.method.integration);
     PlacementResult {
         tissue,

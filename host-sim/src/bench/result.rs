@@ -6,7 +6,7 @@ use firmware::{Faults, Mode};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::tissue::Tissue;
+use super::tissue_variant::TissueVariant;
 use crate::runtime::durations::LoopTiming;
 use crate::runtime::ledger::LedgerResult;
 use crate::runtime::mode::RunMode;
@@ -114,7 +114,7 @@ pub struct PaddleGeometry {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlacementResult {
     /// Its tissue.
-    pub tissue: Tissue,
+    pub tissue: TissueVariant,
     /// Nodes of the model.
     pub nodes: usize,
     /// Its integration rule.
@@ -156,7 +156,7 @@ pub struct PaddlePlacement {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct CaseResult {
     /// Tissue of the simulation.
-    pub tissue: Tissue,
+    pub tissue: TissueVariant,
     /// Tissue that the planner and the table believed in.
     pub table_tissue: String,
     /// The table.
@@ -197,7 +197,7 @@ pub struct Strategies {
     pub none: Option<StrategyResult>,
     /// The best static paddle of the table's tissue, held.
     #[serde(rename = "static")]
-    pub fixture: Option<StrategyResult>,
+    pub static_paddle: Option<StrategyResult>,
     /// The table's paddle, controlled.
     pub dynamic: Option<StrategyResult>,
     /// The same on the machine's clock.

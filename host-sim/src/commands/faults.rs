@@ -10,7 +10,7 @@ use host_sim::bench::faults::catalogue::ROWS;
 use host_sim::bench::faults::evidence::Verdict;
 use host_sim::bench::faults::random::{Composed, composed};
 use host_sim::bench::faults::report::{FaultsResult, RowResult};
-use host_sim::bench::fixture::fixture;
+use host_sim::bench::paper_table::paper_table;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
 use host_sim::runtime::signals;
@@ -63,7 +63,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
-    let table = fixture()?;
+    let table = paper_table()?;
     let mut result = FaultsResult {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: args.seed,

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::bench::tissue::Tissue;
+use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
 use host_sim::runtime::mode::RunMode;
@@ -26,7 +26,7 @@ pub(crate) struct PlantArgs {
     pub(crate) world: WorldArgs,
     /// Tissue of the simulation [default: the scene as it is]
     #[arg(long, value_enum)]
-    pub(crate) tissue: Option<Tissue>,
+    pub(crate) tissue: Option<TissueVariant>,
     /// Index of the attached paddle [default: the best dynamic one]
     #[arg(long, value_name = "K")]
     pub(crate) paddle: Option<u32>,
@@ -54,7 +54,7 @@ pub(crate) struct PlantArgs {
 pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     signals::install();
     PATIENCE.check(args.patience)?;
-    let scene = args.tissue.unwrap_or(Tissue::Inclusion).of(&args.world.scene()?);
+    let scene = args.tissue.unwrap_or(TissueVariant::Inclusion).of(&args.world.scene()?);
     let simulation = args.world.simulation(&scene)?;
     let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).collect();
     check_outputs(&inputs, &[("--json", args.json.as_deref())])?;

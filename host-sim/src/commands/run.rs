@@ -6,7 +6,7 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::{Comparison, ComparisonOptions, EncodedTable};
 use host_sim::bench::strategy::Extras;
-use host_sim::bench::tissue::Tissue;
+use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_run};
 use host_sim::report::summary::summary;
@@ -30,10 +30,10 @@ pub(crate) struct RunArgs {
     pub(crate) world: WorldArgs,
     /// Tissue of the simulation [default: both, and the inclusion with a table that does not know it]
     #[arg(long, value_enum)]
-    pub(crate) tissue: Option<Tissue>,
+    pub(crate) tissue: Option<TissueVariant>,
     /// Tissue that the planner and the table believe in [default: the simulation's]
     #[arg(long, value_enum)]
-    pub(crate) table_tissue: Option<Tissue>,
+    pub(crate) table_tissue: Option<TissueVariant>,
     /// Controller table to use instead of computing one
     #[arg(long, value_name = "FILE", conflicts_with = "table_tissue")]
     pub(crate) table: Option<PathBuf>,

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::Progress as _;
-use host_sim::bench::stability::behaviour::Resolution;
-use host_sim::bench::stability::simulate;
+use host_sim::bench::loop_stability::behaviour::Resolution;
+use host_sim::bench::loop_stability::simulate;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
-use host_sim::report::stability::{csv, summary};
-use host_sim::report::stability_chart::figure;
+use host_sim::report::loop_stability::{csv, summary};
+use host_sim::report::loop_stability_chart::figure;
 use model_offline::scene::Scene;
 
 use super::progress::Bar;

@@ -13,7 +13,7 @@ pub(super) fn strategies(case: &CaseResult) -> Vec<(&'static str, &'static str, 
     let all = &case.strategies;
     [
         ("none", "no paddle", &all.none),
-        ("static", "static", &all.fixture),
+        ("static", "static", &all.static_paddle),
         ("dynamic", "dynamic", &all.dynamic),
         ("free", "dynamic, free-run", &all.dynamic_free_run),
     ]

@@ -8,13 +8,13 @@ pub mod directory;
 mod embed;
 mod insertion;
 mod ledger;
+pub mod loop_stability;
+pub mod loop_stability_chart;
 pub mod paper;
 mod placement;
 mod scene;
 mod settings;
 mod slider;
-pub mod stability;
-pub mod stability_chart;
 mod style;
 pub mod summary;
 mod timing;
@@ -66,12 +66,15 @@ fn sentence(run: &RunResult) -> String {
         .iter()
         .zip(&paper)
         .map(|(placement, paper)| {
-            let (fixture, dynamic) = best(placement);
+            let (static_paddle, dynamic) = best(placement);
             let found = match paper {
-                Some((fixture, dynamic)) if !all_agree => format!(" (the paper: {fixture} and {dynamic})"),
+                Some((static_paddle, dynamic)) if !all_agree => format!(" (the paper: {static_paddle} and {dynamic})"),
                 _ => String::new(),
             };
-            format!("tissue {}: best static paddle {fixture}, best dynamic paddle {dynamic}{found}", placement.tissue)
+            format!(
+                "tissue {}: best static paddle {static_paddle}, best dynamic paddle {dynamic}{found}",
+                placement.tissue
+            )
         })
         .collect();
     let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
@@ -112,7 +115,7 @@ fn head(run: &RunResult) -> Markup {
             tbody { @for case in &run.cases { tr {
                 td { (case.tissue) }
                 td { (largest(case.strategies.none.as_ref())) }
-                td { (largest(case.strategies.fixture.as_ref())) }
+                td { (largest(case.strategies.static_paddle.as_ref())) }
                 td.best { (largest(dynamic(case))) }
                 td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td.left { (case.table_tissue) }

@@ -24,10 +24,10 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     for placement in &run.placements {
         let paper = match paper_optima(&run.scene, placement.tissue) {
             None => String::new(),
-            Some((fixture, dynamic)) => {
-                let agrees = (fixture, dynamic) == (placement.best_static, placement.best_dynamic);
+            Some((static_paddle, dynamic)) => {
+                let agrees = (static_paddle, dynamic) == (placement.best_static, placement.best_dynamic);
                 let verdict = if agrees { "same" } else { "DIFFERENT" };
-                format!("      paper: {fixture} and {dynamic}, {verdict}")
+                format!("      paper: {static_paddle} and {dynamic}, {verdict}")
             }
         };
         writeln!(
@@ -70,7 +70,7 @@ fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
         case.tissue.name(),
         case.table_tissue,
         error(strategies.none.as_ref()),
-        error(strategies.fixture.as_ref()),
+        error(strategies.static_paddle.as_ref()),
         error(dynamic),
     )?;
     match (case.improvement, dynamic) {

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::bench::result::*;
-use crate::bench::tissue::Tissue;
+use crate::bench::tissue_variant::TissueVariant;
 use crate::runtime::clock::Scheduling;
 use crate::runtime::durations::{Distribution, LoopTiming};
 use crate::runtime::ledger::{LedgerResult, StreamResult};
@@ -93,7 +93,7 @@ fn paddle_placement(index: u32) -> PaddlePlacement {
 }
 
 fn run(scene: &str) -> RunResult {
-    let placement = |tissue: Tissue| PlacementResult {
+    let placement = |tissue: TissueVariant| PlacementResult {
         tissue,
         nodes: 9,
         integration: EVIL.to_owned(),
@@ -102,7 +102,7 @@ fn run(scene: &str) -> RunResult {
         best_dynamic: 1,
         paddles: vec![paddle_placement(1), paddle_placement(2)],
     };
-    let case = |tissue: Tissue, table_tissue: &str| CaseResult {
+    let case = |tissue: TissueVariant, table_tissue: &str| CaseResult {
         tissue,
         table_tissue: table_tissue.to_owned(),
         table: TableResult {
@@ -118,7 +118,7 @@ fn run(scene: &str) -> RunResult {
         },
         strategies: Strategies {
             none: Some(strategy(RunMode::Lockstep, None, 2e-3)),
-            fixture: Some(strategy(RunMode::Lockstep, Some(2), 4e-4)),
+            static_paddle: Some(strategy(RunMode::Lockstep, Some(2), 4e-4)),
             dynamic: Some(strategy(RunMode::Lockstep, Some(1), 1e-5)),
             dynamic_free_run: Some(strategy(RunMode::FreeRun, Some(1), 1e-5)),
         },
@@ -159,8 +159,8 @@ fn run(scene: &str) -> RunResult {
             inclusions: vec![vec![[0.6, 0.6], [0.8, 0.6], [0.8, 0.8]]],
             nodes: rest(),
         },
-        placements: vec![placement(Tissue::Homogeneous), placement(Tissue::Inclusion)],
-        cases: vec![case(Tissue::Homogeneous, "homogeneous"), case(Tissue::Inclusion, EVIL)],
+        placements: vec![placement(TissueVariant::Homogeneous), placement(TissueVariant::Inclusion)],
+        cases: vec![case(TissueVariant::Homogeneous, "homogeneous"), case(TissueVariant::Inclusion, EVIL)],
         wall_s: 1.0,
         command: vec!["host-sim".to_owned(), EVIL.to_owned()],
         platform: EVIL.to_owned(),

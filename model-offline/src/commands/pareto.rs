@@ -6,7 +6,7 @@ use model_offline::output;
 use model_offline::placement::adaptive::profile_model;
 use model_offline::placement::discretise;
 use model_offline::scene::Scene;
-use model_offline::study::{pareto, table_pareto};
+use model_offline::study::{Extent, pareto, table_pareto};
 use std::path::PathBuf;
 
 /// Options of `pareto`.
@@ -28,7 +28,8 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), CliError> {
     let scene = args.common.over(args.scene.read()?)?;
     output::make_folder(&args.out)?;
     let bar = args.common.progress(1000);
-    let comparison = pareto::compare(&scene, args.quick, &|share| bar.set_position((1000.0 * share) as u64))?;
+    let comparison =
+        pareto::compare(&scene, Extent::of_flag(args.quick), &|share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
     let (csv, svg) = (args.out.join("pareto.csv"), args.out.join("pareto.svg"));
     output::write_whole(&csv, comparison.csv().as_bytes())?;

@@ -7,6 +7,7 @@ use model_offline::model::TissueModel;
 use model_offline::output;
 use model_offline::placement::best_dynamic;
 use model_offline::scene::Scene;
+use model_offline::study::Extent;
 use model_offline::study::stability;
 use std::path::PathBuf;
 
@@ -42,7 +43,7 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
         None => best_dynamic(&TissueModel::new(&scene.without_inclusions())?)?,
     };
     output::make_folder(&args.out)?;
-    let plan = stability::Plan::new(scene, args.quick);
+    let plan = stability::Plan::new(scene, Extent::of_flag(args.quick));
     let bar = args.common.progress(plan.runs() as u64);
     let result = plan.run(scene, paddle, args.common.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();

@@ -1,6 +1,7 @@
 //! Rules that integrate the weak form. Every rule is a list of points with a weight and the gradients of the shape
 //! functions there, so that assembly knows one loop only: `∫ W(F) dΩ ≈ Σ_q w_q W(I + Σ_I d_I ⊗ g_I(q))`.
 
+use super::method::{Basis, Consistency};
 use super::nodal_cells::NodalCell;
 use super::shape_functions::Wanted;
 use super::{ShapeError, ShapeFunctions, Stencil};
@@ -171,7 +172,7 @@ pub fn stabilised_conforming_nodal(
 /// second moment of the cell about its node: to second order this is NSNI's `W + ½ Σ_j (M_j/A) ∂_jF : 𝔸 : ∂_jF`, and it
 /// stays the derivative of an energy at finite strain.
 ///
-/// With `consistent`, the average of the gradient over the cell is replaced by SCNI's, which makes the rule
+/// [Corrected](Consistency::Corrected), the average of the gradient over the cell is replaced by SCNI's, which makes the rule
 /// variationally consistent to first order (patch test) while the gradient's variation keeps the stabilisation.
 ///
 /// # Errors
@@ -179,7 +180,7 @@ pub fn stabilised_conforming_nodal(
 pub fn naturally_stabilised_nodal(
     shape: &ShapeFunctions<'_, 2>,
     cells: &[NodalCell],
-    consistent: bool,
+    consistency: Consistency,
 ) -> Result<Quadrature<2>, ShapeError> {
     let mut rule = Quadrature::default();
     let mut average = CellAverage::new(shape);
@@ -192,7 +193,7 @@ pub fn naturally_stabilised_nodal(
         for (axis, stencil) in derivative.iter_mut().enumerate() {
             shape.evaluate(&x, node, &candidates, Wanted::implicit_gradient(axis), stencil)?;
         }
-        let mean = if consistent {
+        let mean = if consistency == Consistency::Corrected {
             average.compute(node, cell, &GAUSS_2)?;
             (average.nodes.clone(), average.gradients.clone())
         } else {
@@ -214,7 +215,7 @@ pub fn naturally_stabilised_nodal(
 /// Gauss points in triangular background cells: three per triangle (degree 2), or six (degree 4) for the quadratic
 /// basis.
 ///
-/// With `consistent`, the mean gradient over every triangle is shifted to its boundary average, which makes the rule
+/// [Corrected](Consistency::Corrected), the mean gradient over every triangle is shifted to its boundary average, which makes the rule
 /// variationally consistent to first order.
 ///
 /// # Errors
@@ -223,13 +224,16 @@ pub fn gauss(
     shape: &ShapeFunctions<'_, 2>,
     triangles: &[[u32; 3]],
     cells: &[NodalCell],
-    quadratic: bool,
-    consistent: bool,
+    basis: Basis,
+    consistency: Consistency,
 ) -> Result<Quadrature<2>, ShapeError> {
     let mut rule = Quadrature::default();
     let mut average = CellAverage::new(shape);
     let mut candidates = Vec::new();
-    let points: &[([f64; 3], f64)] = if quadratic { &TRIANGLE_6 } else { &TRIANGLE_3 };
+    let points: &[([f64; 3], f64)] = match basis {
+        Basis::Linear => &TRIANGLE_3,
+        Basis::Quadratic => &TRIANGLE_6,
+    };
     for (index, (triangle, cell)) in triangles.iter().zip(cells).enumerate() {
         let corners: Vec<Point2> = cell.corners();
         let node = triangle[0] as usize;
@@ -241,12 +245,12 @@ pub fn gauss(
             shape.evaluate(&x, node, &candidates, Wanted::GRADIENTS, &mut stencil)?;
             stencils.push(stencil);
         }
-        if consistent {
+        if consistency == Consistency::Corrected {
             average.compute(node, cell, &GAUSS_3)?;
         }
         // shift = boundary average − mean of the points.
         let (mut nodes, mut shift) = (average.nodes.clone(), average.gradients.clone());
-        if consistent {
+        if consistency == Consistency::Corrected {
             for (stencil, (_, weight)) in stencils.iter().zip(points) {
                 (nodes, shift) = add_scaled(&nodes, &shift, &stencil.nodes, &stencil.gradients, -weight);
             }

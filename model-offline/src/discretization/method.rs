@@ -3,68 +3,45 @@
 //!
 //! What an option is called in files, on the command line and in reports comes from one list, the enum itself.
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-use strum::{Display, EnumString, IntoStaticStr, VariantArray};
+use crate::choice::choice;
+use serde::Serialize;
 
-/// Integration rules of the weak form, and finite-element baselines.
-///
-/// # Example
-/// ```
-/// use model_offline::discretization::Integration;
-/// use strum::VariantArray as _;
-///
-/// assert_eq!("fem-t6".parse(), Ok(Integration::FemT6));
-/// assert_eq!(Integration::Scni.to_string(), "scni");
-/// assert!(Integration::VARIANTS.contains(&Integration::Nsni));
-/// ```
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Default,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-    Display,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[value(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Integration {
-    /// Direct nodal integration: the gradient at the node.
-    Dni,
-    /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell.
-    Scni,
-    /// SCNI with the variation of the gradient inside the nodal cell given energy by a constant matrix: as cheap, and
-    /// without modes that no interior cell feels. The default.
-    #[default]
-    ScniStabilised,
-    /// Modified SCNI: the law in every node–edge triangle of the nodal cells.
-    Mscni,
-    /// Naturally stabilised nodal integration: direct, plus the gradient's own variation over the cell.
-    Nsni,
-    /// Gauss points in the triangles of the nodal cells.
-    Gauss,
-    /// Linear triangles on the same nodes.
-    FemT3,
-    /// Quadratic triangles on the same nodes.
-    FemT6,
+choice! {
+    /// Integration rules of the weak form, and finite-element baselines.
+    ///
+    /// # Example
+    /// ```
+    /// use model_offline::discretization::Integration;
+    /// use strum::VariantArray as _;
+    ///
+    /// assert_eq!("fem-t6".parse(), Ok(Integration::FemT6));
+    /// assert_eq!(Integration::Scni.to_string(), "scni");
+    /// assert!(Integration::VARIANTS.contains(&Integration::Nsni));
+    /// ```
+    #[derive(Default)]
+    pub enum Integration {
+        /// Direct nodal integration: the gradient at the node.
+        Dni,
+        /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell.
+        Scni,
+        /// SCNI with the variation of the gradient inside the nodal cell given energy by a constant matrix: as cheap, and
+        /// without modes that no interior cell feels. The default.
+        #[default]
+        ScniStabilised,
+        /// Modified SCNI: the law in every node–edge triangle of the nodal cells.
+        Mscni,
+        /// Naturally stabilised nodal integration: direct, plus the gradient's own variation over the cell.
+        Nsni,
+        /// Gauss points in the triangles of the nodal cells.
+        Gauss,
+        /// Linear triangles on the same nodes.
+        FemT3,
+        /// Quadratic triangles on the same nodes.
+        FemT6,
+    }
 }
 
 impl Integration {
-    /// Its name in scene files and reports.
-    pub fn name(self) -> &'static str {
-        self.into()
-    }
-
     /// Whether it is a finite-element baseline: basis and support do not apply.
     pub fn is_element(self) -> bool {
         matches!(self, Self::FemT3 | Self::FemT6)
@@ -85,77 +62,49 @@ impl Integration {
     }
 }
 
-/// Monomials that the shape functions reproduce exactly.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Default,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-    Display,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Basis {
-    /// 1, x, y.
-    #[default]
-    Linear,
-    /// 1, x, y, x², xy, y².
-    Quadratic,
-}
-
-impl Basis {
-    /// Its name in scene files and reports.
-    pub fn name(self) -> &'static str {
-        self.into()
+choice! {
+    /// Monomials that the shape functions reproduce exactly.
+    #[derive(Default)]
+    pub enum Basis {
+        /// 1, x, y.
+        #[default]
+        Linear,
+        /// 1, x, y, x², xy, y².
+        Quadratic,
     }
 }
 
-/// How essential boundary conditions are imposed.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Default,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-    Display,
-    EnumString,
-    IntoStaticStr,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum Essential {
-    /// Nodal values are prescribed exactly (the paper's transformation method).
-    #[default]
-    Transformation,
-    /// Nitsche's method: weakly, with consistent boundary terms.
-    Nitsche,
+choice! {
+    /// How essential boundary conditions are imposed.
+    #[derive(Default)]
+    pub enum Essential {
+        /// Nodal values are prescribed exactly (the paper's transformation method).
+        #[default]
+        Transformation,
+        /// Nitsche's method: weakly, with consistent boundary terms.
+        Nitsche,
+    }
+}
+
+/// Whether the mean gradient of a rule over a cell is that of its boundary.
+///
+/// The weak form of a constant stress is ∮ Ψ_I n dΓ, so that only such a rule passes the patch test.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Consistency {
+    /// As the gradients are at the points.
+    Uncorrected,
+    /// Shifted to the boundary average over the cell: variationally consistent to first order.
+    Corrected,
 }
 
 /// How the displacement is approximated and the weak form integrated, wherever the nodes are.
 ///
 /// # Example
 /// ```
-/// use model_offline::discretization::{Basis, Integration, Method};
+/// use model_offline::discretization::{Basis, Consistency, Integration, Method};
 ///
 /// let method = Method { basis: Basis::Quadratic, support: 3.0, ..Method::new(Integration::Gauss) };
-/// assert!(method.consistent);
+/// assert_eq!(method.consistency, Consistency::Corrected);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Method {
@@ -165,14 +114,19 @@ pub struct Method {
     pub basis: Basis,
     /// Kernel support over local spacing.
     pub support: f64,
-    /// Whether `nsni` and `gauss` are corrected to be variationally consistent; SCNI and the elements are by nature.
-    pub consistent: bool,
+    /// Whether `nsni` and `gauss` pass the patch test; SCNI and the elements do by nature.
+    pub consistency: Consistency,
 }
 
 impl Method {
     /// A rule with a linear basis and its default support.
     pub fn new(integration: Integration) -> Self {
-        Self { integration, basis: Basis::Linear, support: integration.default_support(), consistent: true }
+        Self {
+            integration,
+            basis: Basis::Linear,
+            support: integration.default_support(),
+            consistency: Consistency::Corrected,
+        }
     }
 
     /// Basis of the displacement itself: that of quadratic triangles is quadratic whatever the shape functions' is.

@@ -23,7 +23,7 @@ pub mod triangulation;
 
 pub use features::Features;
 pub use integration::Quadrature;
-pub use method::{Basis, Discretization, Essential, Integration, Method, Resolution};
+pub use method::{Basis, Consistency, Discretization, Essential, Integration, Method, Resolution};
 pub use nodal_cells::NodalCell;
 pub use node_cloud::NodeCloud;
 pub use planar::{DiscretizationError, Planar};

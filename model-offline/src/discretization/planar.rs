@@ -1,7 +1,7 @@
 //! A planar body discretised: nodes, cells and an integration rule, from nodes that are given.
 
 use super::finite_element::Elements;
-use super::method::{Basis, Integration, Method};
+use super::method::{Integration, Method};
 use super::nodal_cells::{Across, clipped_voronoi};
 use super::triangulation::{TriangulationError, triangulate};
 use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, Wanted, integration, subcells};
@@ -72,11 +72,8 @@ impl Planar {
         let shape = ShapeFunctions::new(&cloud, method.basis);
         let rule = match method.integration {
             Integration::Dni => integration::direct_nodal(&shape, &cells)?,
-            Integration::Nsni => integration::naturally_stabilised_nodal(&shape, &cells, method.consistent)?,
-            Integration::Gauss => {
-                let quadratic = method.basis == Basis::Quadratic;
-                integration::gauss(&shape, &triangles, &cells, quadratic, method.consistent)?
-            }
+            Integration::Nsni => integration::naturally_stabilised_nodal(&shape, &cells, method.consistency)?,
+            Integration::Gauss => integration::gauss(&shape, &triangles, &cells, method.basis, method.consistency)?,
             Integration::ScniStabilised => subcells::scni_stabilised(&shape, &cells, subcells::STABILISATION)?,
             Integration::Mscni => subcells::modified_scni(&shape, &cells)?,
             Integration::Scni | Integration::FemT3 | Integration::FemT6 => {

@@ -28,7 +28,7 @@ pub fn summary(table: &Table<f64, 2>) -> String {
     let mut out = format!(
         "paddle {} · {} tissue · {} knots, depth {:.4} to {:.4}\nscene {}\n\
          limits: displacement {:.4}, rate {:.4} per s, needle speed {:.4} per s; loop gain {:.4} (delay {} samples, model error {:.2})\n\n\
-            depth   paddle path            J⁻¹n norm   axial target   fixture orthogonal\n",
+            depth   paddle path            J⁻¹n norm   axial target  static orthogonal\n",
         table.paddle.index,
         table.tissue,
         table.knots.len(),

@@ -59,7 +59,7 @@ pub struct Scene {
     /// The point to hold still.
     pub target: Point2,
     /// The paddle positions to choose from.
-    pub paddles: Vec<Paddle>,
+    pub paddles: Vec<PaddlePosition>,
     /// Limits of the paddle's actuator.
     pub actuator: Actuator,
     /// How fine and by which method the tissue is modelled.
@@ -104,7 +104,7 @@ impl Needle {
 
 /// A paddle position.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Paddle {
+pub struct PaddlePosition {
     /// Its name in tables and reports.
     pub index: u32,
     /// The two ends, both on the boundary.

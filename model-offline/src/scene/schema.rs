@@ -1,13 +1,13 @@
 //! The scene file as it is written: the public contract, field for field. Validation turns it into a
 //! [`Scene`](super::Scene).
 
+use crate::choice::choice;
 use crate::discretization::{Basis, Essential, Integration};
 use crate::material::MaterialSection;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::ops::Range;
-use strum::{Display, EnumString, VariantArray};
 
 /// A value together with where it stands in the file, so that an error can point at it.
 #[derive(Debug, Clone, Deserialize)]
@@ -218,56 +218,26 @@ pub struct DiscretizationSection {
     pub essential: Essential,
 }
 
-/// What stands in for the tissue in a simulation.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-    Display,
-    EnumString,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum PlantModel {
-    /// The full nonlinear model, solved anew at every step.
-    Full,
-    /// The reduced nonlinear model, with the full one where it does not hold.
-    Reduced,
-    /// The linear model, statically condensed.
-    Condensed,
+choice! {
+    /// What stands in for the tissue in a simulation.
+    pub enum PlantModel {
+        /// The full nonlinear model, solved anew at every step.
+        Full,
+        /// The reduced nonlinear model, with the full one where it does not hold.
+        Reduced,
+        /// The linear model, statically condensed.
+        Condensed,
+    }
 }
 
-/// Number type of a table's payload.
-#[derive(
-    Debug,
-    Clone,
-    Copy,
-    PartialEq,
-    Eq,
-    Hash,
-    Deserialize,
-    Serialize,
-    JsonSchema,
-    clap::ValueEnum,
-    Display,
-    EnumString,
-    VariantArray,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum TableScalar {
-    /// Single precision.
-    F32,
-    /// Double precision.
-    F64,
+choice! {
+    /// Number type of a table's payload.
+    pub enum TableScalar {
+        /// Single precision.
+        F32,
+        /// Double precision.
+        F64,
+    }
 }
 
 /// What a fit to a tolerance has chosen besides the discretization.

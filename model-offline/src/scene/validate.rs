@@ -3,7 +3,7 @@
 use super::error::{SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
-use super::{Actuator, Inclusion, Needle, Paddle, Scene};
+use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene};
 use crate::discretization::{Discretization, Method, Resolution};
 use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
@@ -225,7 +225,7 @@ impl Validator<'_> {
         Ok(())
     }
 
-    fn paddles(&self, around: &Surroundings<'_>) -> Checked<Vec<Paddle>> {
+    fn paddles(&self, around: &Surroundings<'_>) -> Checked<Vec<PaddlePosition>> {
         let Surroundings { outline, immobile, needle, tolerance } = *around;
         if self.file.paddle.is_empty() {
             return Err(self.error(
@@ -234,7 +234,7 @@ impl Validator<'_> {
                 "add at least one [[paddle]] with an index and a segment on the boundary",
             ));
         }
-        let mut paddles: Vec<Paddle> = Vec::new();
+        let mut paddles: Vec<PaddlePosition> = Vec::new();
         for located in &self.file.paddle {
             let section = located.get();
             let span = section.segment.span();
@@ -268,7 +268,7 @@ impl Validator<'_> {
                     "tissue cannot follow both: move the paddle or the contact",
                 ));
             }
-            paddles.push(Paddle { index: section.index, segment });
+            paddles.push(PaddlePosition { index: section.index, segment });
         }
         Ok(paddles)
     }

@@ -1,5 +1,6 @@
 //! The discretizations that are worth comparing on a scene, and what one of them costs and misses.
 
+use super::extent::Extent;
 use crate::discretization::{Basis, Discretization, Integration, Method, Resolution};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::adaptive::Reference;
@@ -63,18 +64,18 @@ pub fn base_spacing(scene: &Scene) -> f64 {
 }
 
 /// Families of discretizations that differ in the nodes only, each from coarse to fine.
-pub fn families(scene: &Scene, quick: bool) -> Vec<Vec<Discretization>> {
+pub fn families(scene: &Scene, extent: Extent) -> Vec<Vec<Discretization>> {
     let base = base_spacing(scene);
     let uniform: Vec<Resolution> =
-        [1.0, 0.5, 0.25, 0.125].iter().take(if quick { 2 } else { 4 }).map(|s| Resolution::Spacing(base * s)).collect();
-    let graded: Vec<Resolution> = (-2..=if quick { 1 } else { 4 }).map(Resolution::Level).collect();
+        [1.0, 0.5, 0.25, 0.125].iter().take(extent.choose(4, 2)).map(|s| Resolution::Spacing(base * s)).collect();
+    let graded: Vec<Resolution> = (-2..=extent.choose(4, 1)).map(Resolution::Level).collect();
     let mut families = Vec::new();
     for &integration in Integration::VARIANTS {
-        let shapes: &[(Basis, f64)] = match (integration.is_element(), quick) {
+        let shapes: &[(Basis, f64)] = match (integration.is_element(), extent) {
             (true, _) => &[(Basis::Linear, 2.0)],
-            (false, true) => &[(Basis::Linear, 1.5), (Basis::Linear, 2.0)],
+            (false, Extent::Quick) => &[(Basis::Linear, 1.5), (Basis::Linear, 2.0)],
             // Two nodes either way are not enough for a quadratic basis everywhere: shown, not left out.
-            (false, false) => &[
+            (false, Extent::Full) => &[
                 (Basis::Linear, 1.2),
                 (Basis::Linear, 1.5),
                 (Basis::Linear, 2.0),

@@ -9,6 +9,7 @@
 //!    rounding does.
 
 use super::candidates::{Measured, families, measure};
+use super::extent::Extent;
 use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
 use super::measurement::Linearity;
 use crate::discretization::{Basis, Discretization, Integration, Resolution};
@@ -181,7 +182,7 @@ pub fn discretization(
     let mut best_wall = f64::INFINITY;
     let mut best_error = f64::INFINITY;
     // Elements first: they are cheapest, so that dearer families are given up early.
-    let mut families = families(scene, false);
+    let mut families = families(scene, Extent::Full);
     families.sort_by_key(|family| !family.first().is_some_and(|d| d.method.integration.is_element()));
     for family in families {
         for candidate in family {

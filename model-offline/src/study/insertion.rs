@@ -1,6 +1,7 @@
 //! Finite depth: the insertion by every method and law, and what one tick of it costs a simulator.
 
 use super::candidates::base_spacing;
+use super::extent::Extent;
 use super::measurement::{Job, Linearity, ModelKind, Point};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::material::{Law, Material};
@@ -104,22 +105,21 @@ fn build(scene: &Scene, discretization: Discretization) -> Result<TissueModel, M
 }
 
 /// Runs the insertion with each method, by the nonlinear law and by the linear one.
-pub(super) fn insertion_points(scene: &Scene, quick: bool) -> Result<Insertion, ModelError> {
-    let finest = if quick { 1 } else { 2 };
+pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertion, ModelError> {
+    let finest = extent.choose(2, 1);
     let model = build(scene, fine(scene, finest))?;
     let (reference, coarser) = (profile(&model)?, profile(&build(scene, fine(scene, finest - 1))?)?);
     let open = profile_distance(&coarser, &reference);
     let base = base_spacing(scene);
-    let nodes: &[Resolution] = if quick {
-        &[Resolution::Spacing(base), Resolution::Level(-2)]
-    } else {
-        &[
+    let nodes: &[Resolution] = match extent {
+        Extent::Quick => &[Resolution::Spacing(base), Resolution::Level(-2)],
+        Extent::Full => &[
             Resolution::Spacing(base),
             Resolution::Spacing(0.5 * base),
             Resolution::Level(-2),
             Resolution::Level(-1),
             Resolution::Level(0),
-        ]
+        ],
     };
     let mut points = Vec::new();
     for &integration in Integration::VARIANTS {
@@ -148,11 +148,11 @@ pub(super) fn insertion_points(scene: &Scene, quick: bool) -> Result<Insertion, 
 }
 
 /// Times one tick of a simulated insertion with each kind of plant.
-pub(super) fn step_points(scene: &Scene, quick: bool, reference: &Profile) -> Result<Vec<Point>, ModelError> {
+pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) -> Result<Vec<Point>, ModelError> {
     let base = base_spacing(scene);
     let mut candidates =
         vec![scene.discretization.with(Resolution::Spacing(base), Method::new(Integration::Scni)), fine(scene, -2)];
-    if !quick {
+    if extent == Extent::Full {
         candidates.push(fine(scene, 0));
     }
     let mut points = Vec::new();
@@ -160,7 +160,7 @@ pub(super) fn step_points(scene: &Scene, quick: bool, reference: &Profile) -> Re
         let model = build(scene, candidate)?;
         let paddle = best_dynamic(&model)?;
         let reference = vec![reference[paddle].clone()];
-        let ticks = if quick { 200 } else { TICKS };
+        let ticks = extent.choose(TICKS, 200);
         let mut body = model.body(Some(paddle), TICK_SETTINGS)?;
         let full = time_ticks(scene, ticks, |depth| -> Result<_, Failure> {
             body.drive(depth, Vector2::zeros())?;

@@ -1,5 +1,7 @@
 //! Studies of the methods themselves: which is fast, which is accurate, and where each stops working.
+
 pub mod candidates;
+pub mod extent;
 pub mod fit;
 pub mod insertion;
 mod looks;
@@ -9,3 +11,5 @@ mod pareto_chart;
 pub mod stability;
 pub mod sweep;
 pub mod table_pareto;
+
+pub use extent::Extent;

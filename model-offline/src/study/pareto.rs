@@ -8,6 +8,7 @@
 //! - `step`: one tick of a simulator: the full, the reduced and the condensed model, against the same fine insertion.
 
 use super::candidates::{families, measure};
+use super::extent::Extent;
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
 use super::measurement::{Job, Linearity, Point};
 use crate::discretization::Discretization;
@@ -42,10 +43,10 @@ pub struct Pareto {
 ///
 /// # Errors
 /// [`ModelError`] when not even the reference can be computed.
-pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Pareto, ModelError> {
-    let reference = Reference::compute(scene, if quick { 4.0 * REFERENCE_SHARE } else { REFERENCE_SHARE })?;
-    let families = families(scene, quick);
-    let longest = if quick { LONGEST_QUICK_S } else { LONGEST_S };
+pub fn compare(scene: &Scene, extent: Extent, progress: &dyn Fn(f64)) -> Result<Pareto, ModelError> {
+    let reference = Reference::compute(scene, extent.choose(REFERENCE_SHARE, 4.0 * REFERENCE_SHARE))?;
+    let families = families(scene, extent);
+    let longest = extent.choose(LONGEST_S, LONGEST_QUICK_S);
     let mut points = Vec::new();
     for (i, family) in families.iter().enumerate() {
         progress(0.8 * i as f64 / families.len() as f64);
@@ -59,9 +60,9 @@ pub fn compare(scene: &Scene, quick: bool, progress: &dyn Fn(f64)) -> Result<Par
         }
     }
     let (scene, barrier) = with_mesh_limit(scene)?;
-    let insertion = insertion_points(&scene, quick)?;
+    let insertion = insertion_points(&scene, extent)?;
     progress(0.9);
-    let steps = step_points(&scene, quick, &insertion.reference)?;
+    let steps = step_points(&scene, extent, &insertion.reference)?;
     let (open, nodes) = (insertion.open, insertion.reference_nodes);
     points.extend(insertion.points);
     points.extend(steps);
@@ -164,7 +165,7 @@ mod tests {
     #[test]
     fn a_quick_comparison_shows_every_method_and_hides_no_failure() {
         let scene = Scene::bundled("paper").unwrap().without_inclusions();
-        let pareto = compare(&scene, true, &|_| {}).unwrap();
+        let pareto = compare(&scene, Extent::Quick, &|_| {}).unwrap();
         for &rule in Integration::VARIANTS {
             assert!(
                 pareto.points.iter().any(|p| p.discretization.method.integration == rule && p.job == Job::Placement)

@@ -118,14 +118,14 @@ impl Sweep {
     /// Best paddles, mesh by mesh.
     pub fn table(&self) -> String {
         let mut out =
-            format!("{:<8} {:<16} {:>7} {:>13} {:>14}\n", "method", "mesh", "nodes", "best fixture", "best actuator");
+            format!("{:<8} {:<16} {:>7} {:>13} {:>14}\n", "method", "mesh", "nodes", "best static", "best dynamic");
         for (rule, mesh, nodes, responses) in self.rows() {
             let (best_static, best_dynamic) = self.optima(responses);
             let _ = writeln!(out, "{rule:<8} {mesh:<16} {nodes:>7} {best_static:>13} {best_dynamic:>14}");
         }
         let _ = writeln!(
             out,
-            "\nbest fixture by |orthogonal target displacement per depth| at small depth; the limit is good to {:.2} %",
+            "\nbest static paddle by |orthogonal target displacement per depth| at small depth; the limit is good to {:.2} %",
             100.0 * self.reference.open
         );
         out

@@ -273,7 +273,7 @@ mod tests {
             points.iter().find(|p| p.knots == knots && p.scalar == scalar).unwrap().max_error
         };
         // The path is cubic between knots with its slopes, and feedback removes what is left: already two knots hold the
-        // target a hundred times better than the best fixture does (0.00037).
+        // target a hundred times better than the best static paddle does (0.00037).
         assert!(KNOTS.iter().all(|k| error(*k, TableScalar::F64) < 3.7e-6), "{points:?}");
         assert!(
             KNOTS.iter().all(|k| (error(*k, TableScalar::F32) - error(*k, TableScalar::F64)).abs()

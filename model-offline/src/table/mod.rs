@@ -7,7 +7,7 @@ use firmware::contract::{
     CONDITION_LIMIT, Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity,
     condition_number,
 };
-use firmware::stability::default_gain;
+use firmware::loop_stability::default_gain;
 use nalgebra::{Matrix2, Vector2};
 
 /// How a table is made.

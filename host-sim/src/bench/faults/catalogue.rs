@@ -103,11 +103,11 @@ impl Row {
 mod tests {
     use super::*;
     use crate::bench::faults::evidence::Verdict;
-    use crate::bench::fixture::fixture;
+    use crate::bench::paper_table::paper_table;
 
     #[test]
     fn every_lockstep_row_holds_for_several_seeds() {
-        let table = fixture().unwrap();
+        let table = paper_table().unwrap();
         for (place, row) in ROWS.iter().enumerate() {
             assert_eq!(row.id as usize, place + 1, "rows are in order");
             if !matches!(row.method, Method::Lockstep(_)) {

@@ -143,11 +143,11 @@ fn mix(hash: u64, value: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::fixture::fixture;
+    use crate::bench::paper_table::paper_table;
 
     #[test]
     fn random_schedules_leave_nothing_unaccounted_and_repeat_bit_by_bit() {
-        let table = fixture().unwrap();
+        let table = paper_table().unwrap();
         let first = composed(&table, 1, 200, &|| {}).unwrap();
         assert_eq!((first.failures.as_slice(), first.unaccounted), (&[] as &[String], 0));
         assert!(first.modes.iter().all(|ticks| *ticks > 0), "every mode occurs: {:?}", first.modes);

@@ -26,7 +26,7 @@ use self::partner::{Partner, Running};
 use self::peer::Transport;
 use self::stimulus::Stimulus;
 use super::error::SimError;
-use super::fixture::fixture;
+use super::paper_table::paper_table;
 use crate::record::error::FileError;
 use crate::runtime::clock::{Scheduling, now_ns, release_real_time, request_real_time_at};
 use crate::runtime::durations::{Distribution, Durations, LoopTiming};
@@ -107,7 +107,7 @@ pub fn loop_settings(rate: f64) -> LoopSettings {
 /// # Errors
 /// [`SimError`].
 pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
-    let table = fixture()?;
+    let table = paper_table()?;
     let folder = tempfile::tempdir().map_err(RuntimeError::Spawn)?;
     let table_file = folder.path().join("controller.table");
     std::fs::write(&table_file, to_bytes(&table)?).map_err(FileError::write(&table_file))?;

@@ -19,6 +19,7 @@ use crate::discretization::Resolution;
 use crate::model::ModelError;
 use crate::parallel;
 use crate::scene::Scene;
+use crate::study::extent::Extent;
 use law_limit::{Lateral, limit_stretch};
 use plan::{Entry, Setting};
 use probe::Outcome;
@@ -79,8 +80,8 @@ pub struct Plan {
 
 impl Plan {
     /// What the study of a scene will run. Empty when the scene's resolution is not a spacing.
-    pub fn new(scene: &Scene, quick: bool) -> Self {
-        let entries = plan::entries(scene, quick);
+    pub fn new(scene: &Scene, extent: Extent) -> Self {
+        let entries = plan::entries(scene, extent);
         let mut settings: Vec<Setting> = Vec::new();
         for entry in &entries {
             if !settings.contains(&entry.setting) {

@@ -2,6 +2,7 @@
 
 use crate::discretization::{Integration, Method, Resolution};
 use crate::scene::Scene;
+use crate::study::extent::Extent;
 use strum::VariantArray as _;
 
 /// Everything that decides a run.
@@ -156,11 +157,12 @@ impl Values {
     }
 }
 
-/// Every row of the study of a scene, in the order of the files. `quick` takes fewer values; the full study repeats
+/// Every row of the study of a scene, in the order of the files. Quick, it takes fewer values; in full it
+///  repeats
 /// every sweep but that of the spacing at half the scene's spacing.
-pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
+pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
     let Resolution::Spacing(spacing) = scene.discretization.resolution else { return Vec::new() };
-    let factors: &[f64] = if quick { &[2.0, 1.0, 0.5] } else { &[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25] };
+    let factors = extent.choose(&[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25] as &[f64], &[2.0, 1.0, 0.5]);
     let mut entries = Vec::new();
     for &integration in Integration::VARIANTS {
         for factor in factors {
@@ -168,10 +170,9 @@ pub fn entries(scene: &Scene, quick: bool) -> Vec<Entry> {
             let setting = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
             entries.push(Entry { parameter: Parameter::Spacing, value: setting.spacing, setting });
         }
-        if quick {
-            sweeps(scene, base(scene, integration, spacing), &Values::few(), &mut entries);
-        } else {
-            sweeps(scene, base(scene, integration, spacing), &Values::full(), &mut entries);
+        let values = extent.choose(Values::full(), Values::few());
+        sweeps(scene, base(scene, integration, spacing), &values, &mut entries);
+        if extent == Extent::Full {
             sweeps(scene, base(scene, integration, 0.5 * spacing), &Values::few(), &mut entries);
         }
     }

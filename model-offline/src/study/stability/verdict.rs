@@ -121,7 +121,7 @@ pub(super) fn limit_of(study: &Stability, setting: &Setting) -> Option<f64> {
 pub fn summary(study: &Stability) -> String {
     let scene = &study.scene;
     let mut out = format!(
-        "{} · paddle {} as a fixture · needle driven to {} at most, twice the scene's depth · {} runs in {} rows\n\n",
+        "{} · paddle {} static · needle driven to {} at most, twice the scene's depth · {} runs in {} rows\n\n",
         scene.name,
         study.paddle,
         f64::from(super::probe::BEYOND) * scene.needle.depth,

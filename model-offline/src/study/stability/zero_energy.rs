@@ -6,7 +6,7 @@ use super::probe;
 use crate::discretization::finite_element::Elements;
 use crate::discretization::triangulation::triangulate;
 use crate::discretization::{
-    DiscretizationError, Integration, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration,
+    Basis, Consistency, DiscretizationError, Integration, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration,
 };
 use crate::geometry::Point2;
 use crate::material::{Material as _, Tensor4};
@@ -137,7 +137,7 @@ fn accurate_rule(
     let shape = ShapeFunctions::new(&cloud, setting.method.basis);
     let triangles = triangulate(nodes, &scene.outline, &[]).map_err(DiscretizationError::from)?;
     let cells = Elements::linear(nodes.to_vec(), triangles.clone()).cells();
-    Ok((integration::gauss(&shape, &triangles, &cells, true, false)?, cells))
+    Ok((integration::gauss(&shape, &triangles, &cells, Basis::Quadratic, Consistency::Uncorrected)?, cells))
 }
 
 /// K_IJ = Σ_q w_q g_I · A · g_J, and the rule's stabilisation, over the points of the cells that are wanted, 2 × 2 blocks.

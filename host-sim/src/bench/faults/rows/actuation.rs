@@ -2,7 +2,7 @@
 
 use firmware::contract::{MAX_TABLE_BYTES, Table, encode};
 use firmware::detection::{FOLLOWING_FRACTION, FOLLOWING_SAMPLES, FROZEN_TRAVEL};
-use firmware::{Faults, Mode, Settings, stability};
+use firmware::{Faults, Mode, Settings, loop_stability};
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::{FOR_EVER, Trial, comes_back, stays_safe_until_rearmed};
@@ -158,7 +158,7 @@ pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Resul
     };
     let mut seen = Vec::new();
     for delay in 0..=10 {
-        let limit = stability::gain_limit(0.0, delay);
+        let limit = loop_stability::gain_limit(0.0, delay);
         let below = growth(delay, 0.0, Some(0.9 * limit))?;
         // A gain of 2 is the largest that the settings admit, and the limit without delay.
         let above = if delay == 0 { f64::INFINITY } else { growth(delay, 0.0, Some((1.1 * limit).min(2.0)))? };

@@ -12,7 +12,7 @@ const CHECKSUM: usize = 4;
 
 fn encoded(table: &Table<f64, 2>) -> Result<Vec<u8>, SimError> {
     let mut bytes = vec![0; MAX_TABLE_BYTES];
-    let length = encode(table, &mut bytes).map_err(|source| SimError::Table { path: "fixture".into(), source })?;
+    let length = encode(table, &mut bytes).map_err(|source| SimError::Table { path: "paper".into(), source })?;
     bytes.truncate(length);
     Ok(bytes)
 }
@@ -95,13 +95,13 @@ pub(crate) fn mismatches(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
         evidence.require(found == Some(expected), || format!("{found:?} instead of {expected:?}"));
     }
     for units in [["mm", "1"], ["1", "kPa"]] {
-        let found = crate::bench::comparison::check_units(trial.table, "fixture".as_ref(), &units.map(str::to_owned));
+        let found = crate::bench::comparison::check_units(trial.table, "paper".as_ref(), &units.map(str::to_owned));
         evidence.injected += 1;
         evidence.detected += u64::from(found.is_err());
         evidence.require(matches!(found, Err(SimError::TableUnits { .. })), || format!("units {units:?}: {found:?}"));
     }
     let same = [trial.table.units.length.as_str(), trial.table.units.stress.as_str()].map(str::to_owned);
-    evidence.require(crate::bench::comparison::check_units(trial.table, "fixture".as_ref(), &same).is_ok(), || {
+    evidence.require(crate::bench::comparison::check_units(trial.table, "paper".as_ref(), &same).is_ok(), || {
         "the right units are refused".to_owned()
     });
     Ok(())
@@ -112,7 +112,7 @@ fn forged(trial: &Trial<'_>, change: impl FnOnce(&mut Table<f64, 2>)) -> Result<
     let mut table = trial.table.clone();
     change(&mut table);
     let payload = postcard::to_stdvec(&table)
-        .map_err(|_| SimError::Table { path: "fixture".into(), source: TableError::Payload })?;
+        .map_err(|_| SimError::Table { path: "paper".into(), source: TableError::Payload })?;
     let mut bytes = encoded(trial.table)?[..HEADER].to_vec();
     bytes[48..52].copy_from_slice(&(payload.len() as u32).to_le_bytes());
     bytes.extend(payload);

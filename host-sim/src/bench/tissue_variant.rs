@@ -7,14 +7,14 @@ use serde::{Deserialize, Serialize};
 /// Which tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
-pub enum Tissue {
+pub enum TissueVariant {
     /// The scene without its inclusions.
     Homogeneous,
     /// The scene as it is.
     Inclusion,
 }
 
-impl Tissue {
+impl TissueVariant {
     /// Both.
     pub const ALL: [Self; 2] = [Self::Homogeneous, Self::Inclusion];
 
@@ -35,7 +35,7 @@ impl Tissue {
     }
 }
 
-impl std::fmt::Display for Tissue {
+impl std::fmt::Display for TissueVariant {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(self.name())
     }

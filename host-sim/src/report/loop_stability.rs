@@ -2,14 +2,14 @@
 
 use std::fmt::Write as _;
 
-use firmware::stability::gain_limit;
+use firmware::loop_stability::gain_limit;
 
-use crate::bench::stability::StabilityResult;
-use crate::bench::stability::behaviour::Behaviour;
-use crate::bench::stability::cells::{Boundary, DELAYS};
-use crate::bench::stability::mismatch::Mismatch;
-use crate::bench::stability::rate_limit::{self, Cell, Law};
-use crate::bench::tissue::Tissue;
+use crate::bench::loop_stability::StabilityResult;
+use crate::bench::loop_stability::behaviour::Behaviour;
+use crate::bench::loop_stability::cells::{Boundary, DELAYS};
+use crate::bench::loop_stability::mismatch::Mismatch;
+use crate::bench::loop_stability::rate_limit::{self, Cell, Law};
+use crate::bench::tissue_variant::TissueVariant;
 use crate::record::export::csv::table;
 
 /// Columns of the three parts; those that do not belong to a part are empty.
@@ -127,8 +127,8 @@ pub fn summary(result: &StabilityResult) -> String {
         out.push('\n');
     }
     for (table, what) in [
-        (Tissue::Homogeneous, "table without the inclusion on tissue with it"),
-        (Tissue::Inclusion, "table with the inclusion on tissue without it"),
+        (TissueVariant::Homogeneous, "table without the inclusion on tissue with it"),
+        (TissueVariant::Inclusion, "table with the inclusion on tissue without it"),
     ] {
         let rows: Vec<&Mismatch> = result.mismatches.iter().filter(|m| m.table == table).collect();
         let Some(first) = rows.first() else { continue };

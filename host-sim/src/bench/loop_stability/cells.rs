@@ -1,7 +1,7 @@
 //! Gain × delay × Jacobian error: a linear, noise-free plant under the controller's own law, cell by cell.
 
 use firmware::law::Direction;
-use firmware::stability::gain_limit;
+use firmware::loop_stability::gain_limit;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::behaviour::{Behaviour, Resolution};

@@ -2,7 +2,7 @@
 //! stability margin, and the simulated loop.
 
 use firmware::contract::{Knot, Table};
-use firmware::stability::gain_limit;
+use firmware::loop_stability::gain_limit;
 use model_offline::model::ModelError;
 use model_offline::parallel;
 use model_offline::placement::discretise;
@@ -12,7 +12,7 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::behaviour::Behaviour;
 use super::cells::simulate;
-use crate::bench::tissue::Tissue;
+use crate::bench::tissue_variant::TissueVariant;
 
 /// One depth of one paddle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,9 +20,9 @@ pub struct Mismatch {
     /// Paddle index.
     pub paddle: u32,
     /// Tissue that the table was computed for.
-    pub table: Tissue,
+    pub table: TissueVariant,
     /// Tissue that it meets.
-    pub tissue: Tissue,
+    pub tissue: TissueVariant,
     /// Needle depth, length.
     pub depth: f64,
     /// The eigenvalue of J·Ĵ⁻¹ that leaves the smallest margin: size, and angle in degrees.
@@ -65,8 +65,8 @@ pub fn mismatches(scene: &Scene, knots: usize, threads: usize) -> Result<(Vec<Mi
     for (paddle, pair) in paddles.iter().zip(tables.chunks(2)) {
         match (&pair[0], &pair[1]) {
             (Ok(plain), Ok(included)) => {
-                rows.extend(along_depth([plain, included], [Tissue::Homogeneous, Tissue::Inclusion]));
-                rows.extend(along_depth([included, plain], [Tissue::Inclusion, Tissue::Homogeneous]));
+                rows.extend(along_depth([plain, included], [TissueVariant::Homogeneous, TissueVariant::Inclusion]));
+                rows.extend(along_depth([included, plain], [TissueVariant::Inclusion, TissueVariant::Homogeneous]));
             }
             (Err(error), _) | (_, Err(error)) => refused.push((paddle.index, error.clone())),
         }
@@ -74,11 +74,14 @@ pub fn mismatches(scene: &Scene, knots: usize, threads: usize) -> Result<(Vec<Mi
     Ok((rows, refused))
 }
 
-fn along_depth<'t>([table, truth]: [&'t Table<f64, 2>; 2], names: [Tissue; 2]) -> impl Iterator<Item = Mismatch> + 't {
+fn along_depth<'t>(
+    [table, truth]: [&'t Table<f64, 2>; 2],
+    names: [TissueVariant; 2],
+) -> impl Iterator<Item = Mismatch> + 't {
     table.knots.iter().zip(&truth.knots).map(move |(assumed, real)| compare(table, assumed, real, names))
 }
 
-fn compare(table: &Table<f64, 2>, assumed: &Knot<f64, 2>, real: &Knot<f64, 2>, names: [Tissue; 2]) -> Mismatch {
+fn compare(table: &Table<f64, 2>, assumed: &Knot<f64, 2>, real: &Knot<f64, 2>, names: [TissueVariant; 2]) -> Mismatch {
     let inverse = assumed.jacobian.try_inverse().unwrap_or_else(Matrix2::zeros);
     let product = real.jacobian * inverse;
     let n: Vector2<f64> = table.orthogonal;

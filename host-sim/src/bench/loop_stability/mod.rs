@@ -1,4 +1,4 @@
-//! Where the closed loop stops being stable: simulated beside the theory of [`firmware::stability`].
+//! Where the closed loop stops being stable: simulated beside the theory of [`firmware::loop_stability`].
 //!
 //! Three questions, each answered by simulation with the controller's own law and, where there is one, by theory:
 //! - [`cells`]: gain × delay × Jacobian error, for which the theory is exact;

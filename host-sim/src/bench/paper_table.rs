@@ -14,7 +14,7 @@ pub const PADDLE: u32 = 3;
 ///
 /// # Errors
 /// [`SimError::Scene`], [`SimError::Model`], [`SimError::TableBuild`].
-pub fn fixture() -> Result<Table<f64, 2>, SimError> {
+pub fn paper_table() -> Result<Table<f64, 2>, SimError> {
     let scene = Scene::read(std::path::Path::new("paper"))?;
     Ok(build(&TissueModel::new(&scene)?, PADDLE, &TableOptions::default())?)
 }

@@ -101,7 +101,7 @@ pub fn map(resolution: Resolution) -> Vec<Cell> {
     let mut cells = Vec::new();
     for law in [Law::Plain, Law::AntiWindup] {
         for delay in DELAYS {
-            let limit = firmware::stability::gain_limit(0.0, delay);
+            let limit = firmware::loop_stability::gain_limit(0.0, delay);
             for g in 0..gains {
                 for a in 0..amplitudes {
                     let (gain_share, amplitude) = (log(0.08, 1.6, gains, g), log(0.1, 100.0, amplitudes, a));
@@ -122,7 +122,7 @@ mod tests {
     fn small_errors_follow_linear_theory() {
         for law in [Law::Plain, Law::AntiWindup] {
             for delay in DELAYS {
-                let limit = firmware::stability::gain_limit(0.0, delay);
+                let limit = firmware::loop_stability::gain_limit(0.0, delay);
                 assert_eq!(simulate(law, delay, 0.95 * limit, 0.1).0, Behaviour::Settles, "{law:?} {delay}");
                 assert_ne!(simulate(law, delay, 1.05 * limit, 0.1).0, Behaviour::Settles, "{law:?} {delay}");
             }

@@ -1,16 +1,16 @@
 //! The closed loop's stability as a figure: theory beside simulation, tables on other tissue, and rate limits.
 
-use firmware::stability::gain_limit;
+use firmware::loop_stability::gain_limit;
 use model_offline::output::chart::number::number;
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
 
-use super::stability::simulated_limit;
-use crate::bench::stability::StabilityResult;
-use crate::bench::stability::behaviour::Behaviour;
-use crate::bench::stability::cells::{ANGLES, DELAYS};
-use crate::bench::stability::mismatch::Mismatch;
-use crate::bench::stability::rate_limit::{self, Law};
-use crate::bench::tissue::Tissue;
+use super::loop_stability::simulated_limit;
+use crate::bench::loop_stability::StabilityResult;
+use crate::bench::loop_stability::behaviour::Behaviour;
+use crate::bench::loop_stability::cells::{ANGLES, DELAYS};
+use crate::bench::loop_stability::mismatch::Mismatch;
+use crate::bench::loop_stability::rate_limit::{self, Law};
+use crate::bench::tissue_variant::TissueVariant;
 
 /// Delays and paddles, one after the other.
 const MARKERS: [Marker; 6] =
@@ -24,8 +24,8 @@ fn look(k: usize) -> (Colour, Marker) {
 pub fn figure(result: &StabilityResult) -> Figure {
     let mut panels = vec![boundary_panel(result)];
     if !result.mismatches.is_empty() {
-        panels.push(size_panel(result, Tissue::Homogeneous, "Table without the inclusion, tissue with it"));
-        panels.push(size_panel(result, Tissue::Inclusion, "Table with the inclusion, tissue without it"));
+        panels.push(size_panel(result, TissueVariant::Homogeneous, "Table without the inclusion, tissue with it"));
+        panels.push(size_panel(result, TissueVariant::Inclusion, "Table with the inclusion, tissue without it"));
         panels.push(margin_panel(result));
     }
     for law in [Law::Plain, Law::AntiWindup] {
@@ -74,7 +74,7 @@ fn boundary_panel(result: &StabilityResult) -> Panel {
 }
 
 /// One line per paddle for tables of one tissue on the other.
-fn by_paddle(result: &StabilityResult, table: Tissue, height: fn(&Mismatch) -> f64) -> Vec<Series> {
+fn by_paddle(result: &StabilityResult, table: TissueVariant, height: fn(&Mismatch) -> f64) -> Vec<Series> {
     let mut paddles: Vec<u32> = result.mismatches.iter().map(|m| m.paddle).collect();
     paddles.sort_unstable();
     paddles.dedup();
@@ -91,7 +91,7 @@ fn heights(series: &[Series]) -> impl Iterator<Item = f64> {
     series.iter().flat_map(|s| &s.points).map(|p| p.1).filter(|y| y.is_finite())
 }
 
-fn size_panel(result: &StabilityResult, table: Tissue, title: &str) -> Panel {
+fn size_panel(result: &StabilityResult, table: TissueVariant, title: &str) -> Panel {
     let series = by_paddle(result, table, |m| m.largest);
     let largest = heights(&series).fold(0.0, f64::max);
     let top = 1.15 * largest.max(result.lambda_max);
@@ -108,7 +108,7 @@ fn size_panel(result: &StabilityResult, table: Tissue, title: &str) -> Panel {
 }
 
 fn margin_panel(result: &StabilityResult) -> Panel {
-    let series = by_paddle(result, Tissue::Inclusion, |m| m.simulated_margin);
+    let series = by_paddle(result, TissueVariant::Inclusion, |m| m.simulated_margin);
     let least = heights(&series).fold(f64::INFINITY, f64::min);
     let top = 1.15 * heights(&series).fold(1.0, f64::max);
     Panel {
