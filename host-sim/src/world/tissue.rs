@@ -6,7 +6,7 @@ use model_offline::model::{Body, TissueModel};
 use model_offline::reduction::online::ReducedBody;
 use model_offline::reduction::{Condensed, TrainingOptions, train};
 use model_offline::scene::PlantModel;
-use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::solver::equilibrium::{LinearSolver, NewtonSettings};
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,6 +23,7 @@ const STEP_SETTINGS: NewtonSettings = NewtonSettings {
     line_search: true,
     require_stability: false,
     reuse_tangent: true,
+    linear_solver: LinearSolver::BySize,
 };
 
 /// Which model is asked for.

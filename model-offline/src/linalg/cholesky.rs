@@ -6,12 +6,15 @@ use crate::geometry::Point;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
-use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
+use std::sync::Arc;
 
+/// From this many nodes on, nodes are ordered and not unknowns: the same fill for a quarter of the time.
+const NODES_ORDERED: usize = 500;
 /// From this many nodes on, nested dissection is tried beside minimum degree, and the ordering with less fill is kept.
 /// Straight cuts win on evenly spaced nodes (SCNI, support 2, 5,741 nodes: 6.3 against 6.5 million entries; a tenth less
 /// time at 25,000 nodes), minimum degree wins by far on graded ones, where every straight cut runs through crowded nodes.
@@ -22,9 +25,65 @@ const DISSECTION_TRIED: usize = 3000;
 #[error("the matrix is not positive definite")]
 pub struct NotPositiveDefinite;
 
+/// Elimination order and sparsity of the Cholesky factors of a pattern: made once, shared by all matrices that have the
+/// pattern. Cheap to clone.
+#[derive(Debug, Clone)]
+pub struct SymbolicFactor {
+    symbolic: Arc<SymbolicCholesky<u32>>,
+}
+
+impl SymbolicFactor {
+    /// Orders and analyses a pattern of nodes at `positions`.
+    ///
+    /// # Panics
+    /// When memory for the analysis cannot be had.
+    pub fn new<const D: usize>(pattern: &Pattern, positions: &[Point<D>]) -> Self {
+        let symbolic = if pattern.blocks() < NODES_ORDERED {
+            analyse(pattern.symbolic(), SymmetricOrdering::Amd)
+        } else {
+            let d = pattern.dimension() as u32;
+            let forward: Vec<u32> =
+                order_nodes(pattern, positions).iter().flat_map(|i| (0..d).map(move |k| i * d + k)).collect();
+            analyse_ordered(pattern.symbolic(), &forward)
+        };
+        Self { symbolic: Arc::new(symbolic) }
+    }
+
+    /// Entries of a factor.
+    pub fn entries(&self) -> usize {
+        self.symbolic.len_val()
+    }
+}
+
+fn analyse(matrix: SymbolicSparseColMatRef<'_, u32>, ordering: SymmetricOrdering<'_, u32>) -> SymbolicCholesky<u32> {
+    factorize_symbolic_cholesky(matrix, Side::Lower, ordering, CholeskySymbolicParams::default())
+        .expect("memory for the symbolic factorisation")
+}
+
+/// `forward[k]` is eliminated k-th.
+fn analyse_ordered(matrix: SymbolicSparseColMatRef<'_, u32>, forward: &[u32]) -> SymbolicCholesky<u32> {
+    let mut inverse = vec![0_u32; forward.len()];
+    for (place, &u) in forward.iter().enumerate() {
+        inverse[u as usize] = place as u32;
+    }
+    analyse(matrix, SymmetricOrdering::Custom(PermRef::new_checked(forward, &inverse, forward.len())))
+}
+
+/// The elimination order of the nodes that fills less.
+fn order_nodes<const D: usize>(pattern: &Pattern, positions: &[Point<D>]) -> Vec<u32> {
+    let by_degree = analyse(pattern.symbolic_of_nodes(), SymmetricOrdering::Amd);
+    if pattern.blocks() >= DISSECTION_TRIED {
+        let cuts = nested_dissection(&pattern.graph(), positions);
+        if analyse_ordered(pattern.symbolic_of_nodes(), &cuts).len_val() < by_degree.len_val() {
+            return cuts;
+        }
+    }
+    by_degree.perm().map_or_else(|| (0..pattern.blocks() as u32).collect(), |order| order.arrays().0.to_vec())
+}
+
 /// Cholesky factor of a matrix with a fixed pattern, with all workspace it needs.
 pub struct SparseCholesky {
-    symbolic: SymbolicCholesky<u32>,
+    symbolic: Arc<SymbolicCholesky<u32>>,
     factor: Vec<f64>,
     workspace: MemBuffer,
     solve_workspace: MemBuffer,
@@ -37,37 +96,30 @@ impl std::fmt::Debug for SparseCholesky {
     }
 }
 
+impl Clone for SparseCholesky {
+    /// The same factor; workspace of its own.
+    fn clone(&self) -> Self {
+        let mut copy = Self::empty(&self.symbolic);
+        copy.factor.clone_from(&self.factor);
+        copy
+    }
+}
+
 impl SparseCholesky {
-    /// Orders and analyses a pattern of nodes at `positions`.
-    ///
-    /// # Panics
-    /// When memory for the analysis cannot be had.
-    pub fn analyse<const D: usize>(pattern: &Pattern, positions: &[Point<D>]) -> Self {
-        let analyse = |ordering: SymmetricOrdering<'_, u32>| {
-            factorize_symbolic_cholesky(pattern.symbolic(), Side::Lower, ordering, CholeskySymbolicParams::default())
-                .expect("memory for the symbolic factorisation")
-        };
-        let mut symbolic = analyse(SymmetricOrdering::Amd);
-        if pattern.unknowns() / pattern.dimension() >= DISSECTION_TRIED {
-            let d = pattern.dimension() as u32;
-            let order = nested_dissection(&pattern.graph(), positions);
-            let forward = order.iter().flat_map(|i| (0..d).map(move |k| i * d + k)).collect::<Vec<u32>>();
-            let mut inverse = vec![0_u32; forward.len()];
-            for (place, &u) in forward.iter().enumerate() {
-                inverse[u as usize] = place as u32;
-            }
-            let cuts = SymmetricOrdering::Custom(PermRef::new_checked(&forward, &inverse, forward.len()));
-            let dissected = analyse(cuts);
-            if dissected.len_val() < symbolic.len_val() {
-                symbolic = dissected;
-            }
-        }
-        let factor = vec![0.0; symbolic.len_val()];
+    /// Room for a factor of a pattern that was analysed.
+    pub fn new(analysed: &SymbolicFactor) -> Self {
+        let mut room = Self::empty(&analysed.symbolic);
+        room.factor = vec![0.0; analysed.entries()];
+        room
+    }
+
+    fn empty(symbolic: &Arc<SymbolicCholesky<u32>>) -> Self {
         let workspace = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()));
         let solve_workspace = MemBuffer::new(StackReq::EMPTY);
-        let mut analysed = Self { symbolic, factor, workspace, solve_workspace, solve_columns: 0 };
-        analysed.reserve_columns(1);
-        analysed
+        let symbolic = Arc::clone(symbolic);
+        let mut empty = Self { symbolic, factor: Vec::new(), workspace, solve_workspace, solve_columns: 0 };
+        empty.reserve_columns(1);
+        empty
     }
 
     fn reserve_columns(&mut self, columns: usize) {

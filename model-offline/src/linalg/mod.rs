@@ -4,5 +4,5 @@ pub mod cholesky;
 mod ordering;
 pub mod pattern;
 
-pub use cholesky::{NotPositiveDefinite, SparseCholesky};
+pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymbolicFactor};
 pub use pattern::Pattern;

@@ -137,6 +137,41 @@ impl Pattern {
         Graph { starts, neighbours }
     }
 
+    /// `out = A x` for the symmetric matrix with these values (lower triangle of D × D blocks, laid out by this pattern).
+    ///
+    /// # Panics
+    /// When D is not the pattern's dimension.
+    pub fn multiply<const D: usize>(&self, values: &[f64], x: &[f64], out: &mut [f64]) {
+        assert_eq!(D, self.dimension, "blocks of the pattern's own size");
+        out.fill(0.0);
+        for j in 0..self.blocks() {
+            let rows = &self.block_rows[self.block_starts[j] as usize + 1..self.block_starts[j + 1] as usize];
+            for k in 0..D {
+                let u = j * D + k;
+                let column = &values[self.column_starts[u] as usize..self.column_starts[u + 1] as usize];
+                let (diagonal, below) = column.split_at(D);
+                let mut sum = diagonal[k] * x[u];
+                for (r, a) in diagonal.iter().enumerate().skip(k + 1) {
+                    out[j * D + r] += a * x[u];
+                    sum += a * x[j * D + r];
+                }
+                for (&i, block) in rows.iter().zip(below.chunks_exact(D)) {
+                    let at = i as usize * D;
+                    for ((a, x_i), out) in block.iter().zip(&x[at..at + D]).zip(&mut out[at..at + D]) {
+                        *out += a * x[u];
+                        sum += a * x_i;
+                    }
+                }
+                out[u] += sum;
+            }
+        }
+    }
+
+    /// The lower triangle of the graph of nodes.
+    pub(super) fn symbolic_of_nodes(&self) -> SymbolicSparseColMatRef<'_, u32> {
+        SymbolicSparseColMatRef::new_checked(self.blocks(), self.blocks(), &self.block_starts, None, &self.block_rows)
+    }
+
     pub(super) fn symbolic(&self) -> SymbolicSparseColMatRef<'_, u32> {
         let n = self.unknowns();
         SymbolicSparseColMatRef::new_checked(n, n, &self.column_starts, None, &self.row_indices)

@@ -15,9 +15,10 @@ use crate::geometry::{Point2, distance_to_polyline};
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
 use crate::scene::Scene;
+use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Why a scene cannot be modelled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -87,6 +88,8 @@ pub struct TissueModel {
     spacing: f64,
     essential: EssentialBoundary,
     target: Stencil<2>,
+    /// Made when the first body needs it, and shared with all models on the same nodes.
+    analysis: Arc<OnceLock<Analysis>>,
 }
 
 /// Where essential boundary conditions are imposed: on nodes, or at boundary points by Nitsche's method.
@@ -127,6 +130,11 @@ impl<T> Groups<T> {
     fn with_paddle(&self, paddle: Option<usize>) -> impl Iterator<Item = &T> {
         let paddle = paddle.map_or(&[][..], |p| &self.paddles[p]);
         self.immobile.iter().chain(&self.needle).chain(paddle)
+    }
+
+    /// Everything that may be held.
+    fn all(&self) -> impl Iterator<Item = &T> + Clone {
+        self.immobile.iter().chain(&self.needle).chain(self.paddles.iter().flatten())
     }
 
     /// Two prescribed numbers per member, in the same order.
@@ -199,6 +207,7 @@ impl TissueModel {
             essential,
             target: planar.value_stencil(&scene.target)?,
             planar,
+            analysis: Arc::default(),
         })
     }
 
@@ -314,6 +323,23 @@ impl TissueModel {
         &self.target
     }
 
+    /// Sparsity and elimination order that serve every body of this model, whatever is held.
+    pub(crate) fn analysis(&self) -> &Analysis {
+        self.analysis.get_or_init(|| {
+            let (rule, positions) = (self.rule(), self.positions());
+            match &self.essential {
+                EssentialBoundary::Nodes(groups) => {
+                    let held = groups.all().chain([&self.target]).map(|stencil| stencil.nodes.as_slice());
+                    Analysis::new(rule, positions, held)
+                }
+                EssentialBoundary::Points(groups) => {
+                    let held = Nitsche::new(&self.planar, &self.tissue, groups.all().cloned());
+                    Analysis::new(rule, positions, held.node_lists().into_iter())
+                }
+            }
+        })
+    }
+
     /// Rule, tissue and nodes, for a solver.
     pub(crate) fn discrete_body(&self) -> DiscreteBody<'_, 2> {
         DiscreteBody {
@@ -331,13 +357,13 @@ impl TissueModel {
     pub fn body(&self, paddle: Option<usize>, settings: NewtonSettings) -> Result<Body<'_>, Failure> {
         let constraints =
             Constraints { rows: self.constrained_rows(paddle).unwrap_or_default(), weak: self.weakly_imposed(paddle) };
-        let equilibrium = Equilibrium::at_rest(self.discrete_body(), constraints, settings)?;
+        let equilibrium = Equilibrium::analysed(self.discrete_body(), self.analysis(), constraints, settings)?;
         Ok(Body { model: self, equilibrium, attached: paddle, depth: 0.0, paddle: Vector2::zeros() })
     }
 }
 
 /// A body in equilibrium with the needle at some depth and the paddle somewhere.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Body<'m> {
     model: &'m TissueModel,
     equilibrium: Equilibrium<2>,

@@ -2,9 +2,8 @@
 //! they differ only in which nodal values are constrained.
 
 use super::controllability::best_direction;
-use crate::linalg::Pattern;
 use crate::mechanics::ConstrainedRows;
-use crate::mechanics::assembly::{BlockPositions, State, internal_force, tangent};
+use crate::mechanics::assembly::{State, internal_force, tangent};
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::{ConstrainedSolver, Unknowns};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
@@ -83,16 +82,14 @@ pub(super) fn for_each_paddle(
         .map(|p| model.constrained_rows(Some(p)))
         .collect::<Option<_>>()
         .ok_or_else(|| ModelError::Unsupported("these responses need essential = \"transformation\"".into()))?;
-    let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(all.iter().flat_map(ConstrainedRows::node_lists));
-    let pattern = Pattern::new(2, model.nodes(), lists);
-    let blocks = BlockPositions::new(rule, &pattern);
+    let analysis = model.analysis();
     let (mut state, mut force) = (State::default(), vec![0.0; unknowns]);
     internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)
         .map_err(|_| singular("at rest"))?;
-    let mut at_rest = vec![0.0; pattern.entries()];
-    tangent(rule, model.tissue(), &state, &blocks, &mut at_rest);
+    let mut at_rest = vec![0.0; analysis.pattern().entries()];
+    tangent(rule, model.tissue(), &state, analysis.blocks(), &mut at_rest);
 
-    let mut solver = ConstrainedSolver::<2>::new(pattern, model.positions(), ConstrainedRows::default());
+    let mut solver = ConstrainedSolver::<2>::new(analysis, ConstrainedRows::default());
     let columns = RATES + if loads == Loads::OnTarget { 2 } else { 0 };
     let mut forces = vec![0.0; columns * unknowns];
     for (column, axis) in (RATES..columns).zip(0..2) {

@@ -85,7 +85,8 @@ fn retained_responses(
     paddle: Option<usize>,
     rows: ConstrainedRows,
 ) -> Result<Vec<Vec<f64>>, ModelError> {
-    let mut body = Equilibrium::at_rest(model.discrete_body(), rows, NewtonSettings::default())?;
+    let mut body =
+        Equilibrium::analysed(model.discrete_body(), model.analysis(), rows.into(), NewtonSettings::default())?;
     (0..controls(paddle) + 2)
         .map(|retained| {
             let mut unit = [0.0; 3];

@@ -10,7 +10,7 @@ use crate::mechanics::stabilisation;
 use crate::model::{ModelError, TissueModel};
 use crate::parallel;
 use crate::placement::controllability::best_direction;
-use crate::solver::equilibrium::NewtonSettings;
+use crate::solver::equilibrium::{LinearSolver, NewtonSettings};
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 use serde::Serialize;
 use std::sync::Arc;
@@ -30,6 +30,7 @@ const SNAPSHOT_SETTINGS: NewtonSettings = NewtonSettings {
     line_search: true,
     require_stability: true,
     reuse_tangent: false,
+    linear_solver: LinearSolver::BySize,
 };
 /// States that the model is tried on.
 const TRIALS: usize = 24;

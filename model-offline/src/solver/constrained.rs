@@ -14,20 +14,24 @@
 //! of Λ, for ρ large enough, so Cholesky detects lost stability; same sparsity as K plus the constrained stencils) and iterate
 //! on μ. The constraint error shrinks by about ρ⁻¹ K per round; a few rounds reach rounding error.
 
-use crate::geometry::Point;
+use super::analysis::Analysis;
+use super::conjugate_gradients::{Breakdown, Stop, conjugate_gradients, dot};
 use crate::linalg::{NotPositiveDefinite, Pattern, SparseCholesky};
 use crate::mechanics::ConstrainedRows;
+use std::sync::Arc;
 
 /// Penalty over the mean diagonal of the tangent. Large enough that two or three rounds of multipliers reach rounding
 /// error, small enough that the factor of K_ρ keeps its digits.
 const PENALTY: f64 = 1e4;
 /// Rounds of multipliers; each costs one back-substitution.
 const MAX_ROUNDS: usize = 12;
+/// More iterations than this cost as much as a factorisation.
+const MAX_ITERATIONS: u32 = 12;
 
 /// Solves tangent systems with constrained rows; see the module documentation.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct ConstrainedSolver<const D: usize> {
-    pattern: Pattern,
+    pattern: Arc<Pattern>,
     cholesky: SparseCholesky,
     constrained: ConstrainedRows,
     penalty: f64,
@@ -46,7 +50,16 @@ pub struct Unknowns<'a> {
     pub multipliers: &'a mut [f64],
 }
 
-#[derive(Debug, Default)]
+/// How well a system is solved that is not solved to rounding.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Accuracy {
+    /// Error over the solution, in the norm of energy.
+    pub relative: f64,
+    /// Largest violation of the constraints, length units.
+    pub violation: f64,
+}
+
+#[derive(Debug, Clone, Default)]
 struct Work {
     solution: Vec<f64>,
     weighted: Vec<f64>,
@@ -54,16 +67,15 @@ struct Work {
 }
 
 impl<const D: usize> ConstrainedSolver<D> {
-    /// Analyses the pattern of nodes at `positions`, which must cover the stencils of the constrained rows.
+    /// Solves systems of an analysed pattern, which must cover the stencils of the constrained rows.
     ///
     /// # Panics
     /// When the pattern misses a pair of a constrained stencil.
-    pub fn new(pattern: Pattern, positions: &[Point<D>], rows: ConstrainedRows) -> Self {
-        let cholesky = SparseCholesky::analyse(&pattern, positions);
+    pub fn new(analysis: &Analysis, rows: ConstrainedRows) -> Self {
         let mut solver = Self {
-            matrix: vec![0.0; pattern.entries()],
-            pattern,
-            cholesky,
+            matrix: vec![0.0; analysis.pattern.entries()],
+            pattern: Arc::clone(&analysis.pattern),
+            cholesky: SparseCholesky::new(&analysis.symbolic),
             constrained: ConstrainedRows::default(),
             penalty: 0.0,
             positions: Vec::new(),
@@ -105,18 +117,21 @@ impl<const D: usize> ConstrainedSolver<D> {
         self.cholesky.factor_entries()
     }
 
-    /// Zeroes the matrix and lets `assemble` add the tangent into it.
+    /// Zeroes the matrix and lets `assemble` add the tangent into it; adds the constrained rows' penalty, which the first
+    /// call fixes.
     pub fn assemble(&mut self, assemble: impl FnOnce(&Pattern, &mut [f64])) {
         self.matrix.fill(0.0);
         assemble(&self.pattern, &mut self.matrix);
+        self.penalise();
     }
 
-    /// Sets the matrix to a tangent assembled before.
+    /// Sets the matrix to a tangent assembled before, plus the penalty.
     ///
     /// # Panics
     /// When the tangent is not laid out by this pattern.
     pub fn load(&mut self, tangent: &[f64]) {
         self.matrix.copy_from_slice(tangent);
+        self.penalise();
     }
 
     /// Mean diagonal entry of the tangent at the first factorisation: force per displacement of a node.
@@ -129,11 +144,7 @@ impl<const D: usize> ConstrainedSolver<D> {
         (0..n).map(|u| self.matrix[self.pattern.diagonal_position(u)]).sum::<f64>() / n as f64
     }
 
-    /// Factorises the assembled tangent with the constrained rows' penalty. The penalty is fixed by the first call.
-    ///
-    /// # Errors
-    /// [`NotPositiveDefinite`] when the tangent is not, on the displacements that the prescribed values leave free.
-    pub fn factorise(&mut self) -> Result<(), NotPositiveDefinite> {
+    fn penalise(&mut self) {
         if self.penalty == 0.0 {
             self.penalty = PENALTY * self.mean_diagonal();
         }
@@ -151,6 +162,13 @@ impl<const D: usize> ConstrainedSolver<D> {
                 }
             }
         }
+    }
+
+    /// Factorises the assembled matrix.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`] when the tangent is not, on the displacements that the prescribed values leave free.
+    pub fn factorise(&mut self) -> Result<(), NotPositiveDefinite> {
         self.cholesky.factorise(&self.pattern, &self.matrix)
     }
 
@@ -172,27 +190,77 @@ impl<const D: usize> ConstrainedSolver<D> {
     /// # Panics
     /// When the lengths do not belong to the same number of right-hand sides.
     pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, solution: Unknowns<'_>) {
-        let Unknowns { x, multipliers: mu } = solution;
+        let columns = self.first_right_side(rhs, gap, &solution);
+        self.cholesky.solve(&mut self.work.solution, columns);
+        solution.x.copy_from_slice(&self.work.solution);
+        self.meet_constraints(gap, tolerance, solution);
+    }
+
+    /// The same for one right-hand side and the matrix assembled last, by conjugate gradients with the last factor as
+    /// preconditioner; returns the number of iterations. The preconditioner has the same penalty, so that it is exact on
+    /// the constraints: the multipliers' rounds go through it alone, and what that leaves of the first equation is second
+    /// order.
+    ///
+    /// # Errors
+    /// [`Breakdown`] where the matrix is seen not to be positive definite, or a factorisation would cost less.
+    pub(super) fn solve_by_iteration(
+        &mut self,
+        rhs: &[f64],
+        gap: &[f64],
+        accuracy: Accuracy,
+        solution: Unknowns<'_>,
+    ) -> Result<u32, Breakdown> {
+        self.first_right_side(rhs, gap, &solution);
+        let Self { work: Work { solution: residual, violation, .. }, cholesky, pattern, matrix, .. } = self;
+        solution.x.copy_from_slice(residual);
+        cholesky.solve(solution.x, 1);
+        let mut image = vec![0.0; residual.len()];
+        pattern.multiply::<D>(matrix, solution.x, &mut image);
+        // Energy of the solution without that of the penalty.
+        self.constrained.apply::<D>(solution.x, violation);
+        let energy = dot(solution.x, &image) - self.penalty * dot(violation, violation);
+        if energy.is_nan() || energy < 0.0 {
+            return Err(Breakdown::NegativeCurvature);
+        }
+        residual.iter_mut().zip(&image).for_each(|(r, i)| *r -= i);
+        let iterations = conjugate_gradients(
+            |x, out| pattern.multiply::<D>(matrix, x, out),
+            |r| cholesky.solve(r, 1),
+            residual,
+            solution.x,
+            Stop { goal: accuracy.relative * energy.sqrt(), iterations: MAX_ITERATIONS },
+        )?;
+        self.meet_constraints(gap, accuracy.violation, solution);
+        Ok(iterations)
+    }
+
+    /// Right side of the first round, `K_ρ x = rhs + Λᵀ (ρ gap − μ)`, into the workspace; returns how many columns it has.
+    fn first_right_side(&mut self, rhs: &[f64], gap: &[f64], solution: &Unknowns<'_>) -> usize {
         let (unknowns, rows) = (self.pattern.unknowns(), self.constrained.len() * D);
         let columns = rhs.len() / unknowns;
-        assert!(x.len() == rhs.len() && gap.len() == columns * rows && mu.len() == gap.len(), "one shape");
-        let Work { solution, weighted, violation } = &mut self.work;
-        solution.resize(rhs.len(), 0.0);
-        weighted.resize(gap.len(), 0.0);
+        let one_shape = solution.x.len() == rhs.len() && solution.multipliers.len() == gap.len();
+        assert!(one_shape && gap.len() == columns * rows, "one shape");
+        let Work { solution: right, weighted, violation } = &mut self.work;
+        right.clear();
+        right.extend_from_slice(rhs);
         violation.resize(gap.len(), 0.0);
-        // Where nothing is constrained there are no rows to walk through.
-        let by_column = |c: usize| (c * unknowns..(c + 1) * unknowns, c * rows..(c + 1) * rows);
+        weighted.clear();
+        weighted.extend(gap.iter().zip(solution.multipliers.iter()).map(|(g, m)| self.penalty * g - m));
+        for column in 0..columns {
+            // Where nothing is constrained there are no rows to walk through.
+            let (free, row) = (column * unknowns..(column + 1) * unknowns, column * rows..(column + 1) * rows);
+            self.constrained.add_transpose::<D>(&weighted[row], &mut right[free]);
+        }
+        columns
+    }
 
-        // First round: K_ρ x = rhs + Λᵀ (ρ gap − μ).
-        solution.copy_from_slice(rhs);
-        for ((w, g), m) in weighted.iter_mut().zip(gap).zip(mu.iter()) {
-            *w = self.penalty * g - m;
-        }
-        for (free, row) in (0..columns).map(by_column) {
-            self.constrained.add_transpose::<D>(&weighted[row], &mut solution[free]);
-        }
-        self.cholesky.solve(solution, columns);
-        x.copy_from_slice(solution);
+    /// Rounds of multipliers after the first, until the constraint is met to `tolerance`.
+    fn meet_constraints(&mut self, gap: &[f64], tolerance: f64, solution: Unknowns<'_>) {
+        let Unknowns { x, multipliers: mu } = solution;
+        let (unknowns, rows) = (self.pattern.unknowns(), self.constrained.len() * D);
+        let columns = x.len() / unknowns;
+        let Work { solution, weighted, violation } = &mut self.work;
+        let by_column = |c: usize| (c * unknowns..(c + 1) * unknowns, c * rows..(c + 1) * rows);
         let mut previous = f64::INFINITY;
         for _ in 0..MAX_ROUNDS {
             for (free, row) in (0..columns).map(by_column) {

@@ -4,16 +4,47 @@
 //! Loading is by prescribed displacement and dead loads, so an equilibrium is a stationary point of the potential energy over the
 //! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
 //! tangent is not positive definite is reported as lost stability, never passed off as an answer.
+//!
+//! Every converged state has a Cholesky factor, which proves that it is stable. On the way to the next state that factor is
+//! the preconditioner of conjugate gradients: tangents change little from one increment to the next, so that a few
+//! iterations, each the price of a back-substitution, replace a factorisation. Negative curvature on the way, or too many
+//! iterations, bring the factorisation back.
 
-use super::constrained::{ConstrainedSolver, Unknowns};
+use super::analysis::Analysis;
+use super::conjugate_gradients::dot;
+use super::constrained::{Accuracy, ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
-use crate::linalg::Pattern;
 use crate::mechanics::Tissue;
 use crate::mechanics::assembly::{self, BlockPositions, Inverted, State};
 use crate::mechanics::{Constraints, WeaklyImposed};
 use serde::Serialize;
 use std::sync::Arc;
+
+/// From this many nodes on, conjugate gradients with the last factor cost less than a factor per Newton iteration.
+const ITERATION_PAYS: usize = 500;
+/// Error of the linear solves by iteration, over their solution: no more, less where Newton's method is near its end, and
+/// never beyond rounding. Newton's method then takes the iterations that it takes with a factor.
+const LOOSEST: f64 = 1e-3;
+const TIGHTEST: f64 = 1e-9;
+/// Relative residual of the last Newton step times this is the error of the next linear solve.
+const FORCING: f64 = 0.01;
+
+/// Violation of the prescribed values, over the spacing, within which they are met.
+const FEASIBLE: f64 = 1e-10;
+
+/// How the linear systems of Newton's method are solved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LinearSolver {
+    /// By iteration where there are nodes enough for it to pay, else directly.
+    #[default]
+    BySize,
+    /// By a factor for every tangent.
+    Direct,
+    /// By conjugate gradients with the last factor as preconditioner; a tangent that is not positive definite, or far from
+    /// the last, gets a factor of its own, and so does every converged state.
+    Iterative,
+}
 
 /// Settings of Newton's method. The defaults are meant for everyone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,6 +63,8 @@ pub struct NewtonSettings {
     pub require_stability: bool,
     /// Keep the last factor while each iteration still gains a factor of four: cheap for small steps.
     pub reuse_tangent: bool,
+    /// How the linear systems are solved.
+    pub linear_solver: LinearSolver,
 }
 
 impl Default for NewtonSettings {
@@ -44,6 +77,7 @@ impl Default for NewtonSettings {
             line_search: true,
             require_stability: true,
             reuse_tangent: false,
+            linear_solver: LinearSolver::BySize,
         }
     }
 }
@@ -85,6 +119,8 @@ pub struct Effort {
     pub iterations: u32,
     /// Factorisations.
     pub factorisations: u32,
+    /// Iterations of conjugate gradients within them.
+    pub conjugate_gradients: u32,
     /// Times the increment was halved.
     pub cutbacks: u32,
 }
@@ -103,11 +139,11 @@ pub struct DiscreteBody<'a, const D: usize> {
 }
 
 /// A body in equilibrium, and the means to take it to the next.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Equilibrium<const D: usize> {
     rule: Arc<Quadrature<D>>,
     tissue: Tissue,
-    blocks: BlockPositions,
+    blocks: Arc<BlockPositions>,
     solver: ConstrainedSolver<D>,
     weak: Option<Arc<dyn WeaklyImposed>>,
     settings: NewtonSettings,
@@ -138,6 +174,19 @@ struct Configuration<const D: usize> {
     state: State<D>,
 }
 
+/// A step of Newton's method and what it is computed from.
+struct Step {
+    step: Vec<f64>,
+    /// Multipliers before the step, then after it.
+    multipliers: Vec<f64>,
+    rhs: Vec<f64>,
+    gap: Vec<f64>,
+    /// Whether the prescribed values are met already.
+    feasible: bool,
+    /// Whether the tangent was not positive definite.
+    indefinite: bool,
+}
+
 enum Attempt {
     Converged,
     Failed(FailureReason, String),
@@ -153,14 +202,29 @@ impl<const D: usize> Equilibrium<D> {
         constraints: impl Into<Constraints>,
         settings: NewtonSettings,
     ) -> Result<Self, Failure> {
+        let constraints = constraints.into();
+        let weak_lists = constraints.weak.as_ref().map_or_else(Vec::new, |w| w.node_lists());
+        let lists = constraints.rows.node_lists().chain(weak_lists.iter().copied());
+        let analysis = Analysis::new(&body.rule, body.positions, lists);
+        Self::analysed(body, &analysis, constraints, settings)
+    }
+
+    /// The same for a rule and nodes that were analysed before, with at least these constraints.
+    ///
+    /// # Errors
+    /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
+    ///
+    /// # Panics
+    /// When the analysis does not cover the constraints.
+    pub fn analysed(
+        body: DiscreteBody<'_, D>,
+        analysis: &Analysis,
+        constraints: Constraints,
+        settings: NewtonSettings,
+    ) -> Result<Self, Failure> {
         let DiscreteBody { rule, tissue, positions, spacing } = body;
-        let Constraints { rows, weak } = constraints.into();
+        let Constraints { rows, weak } = constraints;
         let nodes = positions.len();
-        let weak_lists = weak.as_ref().map_or_else(Vec::new, |w| w.node_lists());
-        let lists =
-            (0..rule.len()).map(|q| rule.point(q).nodes).chain(rows.node_lists()).chain(weak_lists.iter().copied());
-        let pattern = Pattern::new(D, nodes, lists);
-        let blocks = BlockPositions::new(&rule, &pattern);
         let at = Configuration {
             coefficients: vec![0.0; nodes * D],
             multipliers: vec![0.0; rows.len() * D],
@@ -170,12 +234,11 @@ impl<const D: usize> Equilibrium<D> {
             energy: 0.0,
             state: State::default(),
         };
-        let solver = ConstrainedSolver::new(pattern, positions, rows);
         let mut body = Self {
             rule,
             tissue,
-            blocks,
-            solver,
+            blocks: Arc::clone(&analysis.blocks),
+            solver: ConstrainedSolver::new(analysis, rows),
             weak,
             settings,
             spacing,
@@ -334,8 +397,8 @@ impl<const D: usize> Equilibrium<D> {
         Ok(())
     }
 
-    /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
-    fn refactorise(&mut self) -> bool {
+    /// Assembles the tangent at the current state.
+    fn assemble(&mut self) {
         let (rule, tissue, at, blocks, weak) = (&self.rule, &self.tissue, &self.at, &self.blocks, &self.weak);
         self.solver.assemble(|pattern, values| {
             assembly::tangent(rule, tissue, &at.state, blocks, values);
@@ -343,10 +406,83 @@ impl<const D: usize> Equilibrium<D> {
                 weak.add_tangent(tissue, &at.coefficients, pattern, values);
             }
         });
+    }
+
+    /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
+    fn refactorise(&mut self) -> bool {
+        self.assemble();
+        self.factorise()
+    }
+
+    fn factorise(&mut self) -> bool {
         self.effort.factorisations += 1;
         self.factor_is_current = self.solver.factorise().is_ok();
-        self.factor_exists |= self.factor_is_current;
+        // A failed factorisation has overwritten the last factor.
+        self.factor_exists = self.factor_is_current;
         self.factor_is_current
+    }
+
+    /// Whether a new tangent is first tried by conjugate gradients with the last factor.
+    fn iterates(&self) -> bool {
+        let pays = match self.settings.linear_solver {
+            LinearSolver::BySize => self.at.coefficients.len() >= ITERATION_PAYS * D,
+            LinearSolver::Direct => false,
+            LinearSolver::Iterative => true,
+        };
+        pays && self.factor_exists
+            && !self.factor_is_current
+            && !self.settings.reuse_tangent
+            && !self.tissue.is_linear()
+    }
+
+    /// Newton's step at the current state and the multipliers after it; `residual` is the relative one that the last step
+    /// left.
+    fn newton_step(&mut self, usable: bool, residual: f64, step: &mut Step) -> Result<(), Attempt> {
+        let Step { rhs, gap, .. } = step;
+        self.solver.constrained().apply::<D>(&self.at.coefficients, gap);
+        for (g, p) in gap.iter_mut().zip(&self.at.prescribed) {
+            *g = p - *g;
+        }
+        for (r, f) in rhs.iter_mut().zip(&self.at.force) {
+            *r = -f;
+        }
+        step.feasible = step.gap.iter().all(|g| g.abs() <= FEASIBLE * self.spacing);
+        self.effort.iterations += 1;
+        if !usable {
+            let iterates = self.iterates();
+            self.assemble();
+            if iterates && self.step_by_iteration(residual, step) {
+                return Ok(());
+            }
+            step.indefinite = !self.factorise();
+            if step.indefinite && !self.refactorise_shifted() {
+                let detail = "tangent indefinite, no shift helps".into();
+                return Err(Attempt::Failed(FailureReason::LostStability, detail));
+            }
+        }
+        let unknowns = Unknowns { x: &mut step.step, multipliers: &mut step.multipliers };
+        self.solver.solve(&step.rhs, &step.gap, 1e-13 * self.spacing, unknowns);
+        Ok(())
+    }
+
+    /// The step by conjugate gradients; false, with nothing changed, when the tangent needs a factor of its own.
+    fn step_by_iteration(&mut self, residual: f64, step: &mut Step) -> bool {
+        let accuracy = Accuracy {
+            relative: (FORCING * residual).clamp(TIGHTEST, LOOSEST),
+            violation: 0.1 * FEASIBLE * self.spacing,
+        };
+        let before = step.multipliers.clone();
+        let unknowns = Unknowns { x: &mut step.step, multipliers: &mut step.multipliers };
+        match self.solver.solve_by_iteration(&step.rhs, &step.gap, accuracy, unknowns) {
+            Ok(iterations) => {
+                self.effort.conjugate_gradients += iterations;
+                true
+            }
+            Err(_) => {
+                step.multipliers = before;
+                false
+            }
+        }
     }
 
     /// A factor to step with when the tangent is indefinite: shifted until it is positive definite, so that the step
@@ -371,54 +507,45 @@ impl<const D: usize> Equilibrium<D> {
         if loaded && self.evaluate().is_err() {
             return Attempt::Failed(FailureReason::ElementInverted, "before the first step".into());
         }
-        let (mut step, mut rhs) = (vec![0.0; n], vec![0.0; n]);
-        let mut gap = vec![0.0; self.at.multipliers.len()];
-        let mut mu = self.at.multipliers.clone();
+        let rows = self.at.multipliers.len();
+        let mut step = Step {
+            step: vec![0.0; n],
+            multipliers: self.at.multipliers.clone(),
+            rhs: vec![0.0; n],
+            gap: vec![0.0; rows],
+            feasible: false,
+            indefinite: false,
+        };
         let may_reuse = self.settings.reuse_tangent || self.tissue.is_linear();
         let mut factor_usable = self.factor_is_current || (may_reuse && self.factor_exists);
-        let mut indefinite = false;
         let mut last_residual = f64::INFINITY;
         self.residuals.clear();
         for iteration in 0..self.settings.max_iterations {
-            if !factor_usable {
-                indefinite = !self.refactorise();
-                if indefinite && !self.refactorise_shifted() {
-                    return Attempt::Failed(FailureReason::LostStability, "tangent indefinite, no shift helps".into());
-                }
+            if let Err(failed) = self.newton_step(factor_usable, last_residual, &mut step) {
+                return failed;
             }
-            self.solver.constrained().apply::<D>(&self.at.coefficients, &mut gap);
-            for (g, p) in gap.iter_mut().zip(&self.at.prescribed) {
-                *g = p - *g;
-            }
-            let feasible = gap.iter().all(|g| g.abs() <= 1e-10 * self.spacing);
-            for (r, f) in rhs.iter_mut().zip(&self.at.force) {
-                *r = -f;
-            }
-            let unknowns = Unknowns { x: &mut step, multipliers: &mut mu };
-            self.solver.solve(&rhs, &gap, 1e-13 * self.spacing, unknowns);
-            self.effort.iterations += 1;
-            let slope = dot(&step, &self.at.force);
-            match self.search(&step, feasible.then_some(slope)) {
+            let slope = dot(&step.step, &self.at.force);
+            match self.search(&step.step, step.feasible.then_some(slope)) {
                 Ok(()) => {}
                 Err((reason, detail)) => return Attempt::Failed(reason, detail),
             }
             self.factor_is_current = false;
-            let largest = step.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            let largest = step.step.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             if !largest.is_finite() {
                 return Attempt::Failed(FailureReason::NotConverged, "step is not a number".into());
             }
-            let residual = self.relative_residual(&mu);
+            let residual = self.relative_residual(&step.multipliers);
             self.residuals.push(residual);
             let linear = self.tissue.is_linear();
             if residual <= self.settings.residual_tolerance
                 && (linear || largest <= self.settings.step_tolerance * self.spacing || residual <= 1e-12)
             {
-                self.at.multipliers.copy_from_slice(&mu);
+                self.at.multipliers.copy_from_slice(&step.multipliers);
                 if linear {
                     self.factor_is_current = true;
                     return Attempt::Converged;
                 }
-                if self.settings.reuse_tangent && !indefinite {
+                if self.settings.reuse_tangent && !step.indefinite {
                     return Attempt::Converged;
                 }
                 if self.settings.require_stability && !self.refactorise() {
@@ -433,7 +560,7 @@ impl<const D: usize> Equilibrium<D> {
                 let detail = format!("residual {residual:.1e} after {} iterations", iteration + 1);
                 return Attempt::Failed(FailureReason::NotConverged, detail);
             }
-            factor_usable = linear || (may_reuse && !indefinite && residual < 0.25 * last_residual);
+            factor_usable = linear || (may_reuse && !step.indefinite && residual < 0.25 * last_residual);
             last_residual = residual;
         }
         Attempt::Failed(FailureReason::NotConverged, "no iterations allowed".into())
@@ -496,8 +623,4 @@ impl<const D: usize> Equilibrium<D> {
         let load = norm(&mut self.at.external.iter().copied());
         residual / holding.max(load).max(self.smallest_force)
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

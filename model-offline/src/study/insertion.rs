@@ -9,7 +9,7 @@ use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
 use crate::reduction::{Condensed, Invalid, TrainingOptions, train};
 use crate::scene::Scene;
-use crate::solver::equilibrium::{Failure, NewtonSettings};
+use crate::solver::equilibrium::{Failure, LinearSolver, NewtonSettings};
 use nalgebra::Vector2;
 use std::convert::Infallible;
 use std::time::Instant;
@@ -217,6 +217,7 @@ pub(super) const TICK_SETTINGS: NewtonSettings = NewtonSettings {
     line_search: true,
     require_stability: false,
     reuse_tangent: true,
+    linear_solver: LinearSolver::BySize,
 };
 
 fn best_dynamic(model: &TissueModel) -> Result<usize, ModelError> {

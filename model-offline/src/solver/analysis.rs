@@ -1,0 +1,43 @@
+//! What all bodies of one discretization share: sparsity of the tangent, where its blocks go, and the elimination order.
+
+use crate::discretization::Quadrature;
+use crate::geometry::Point;
+use crate::linalg::{Pattern, SymbolicFactor};
+use crate::mechanics::assembly::BlockPositions;
+use std::sync::Arc;
+
+/// Made once for the nodes and the rule of a body, with whatever may be constrained on it. Cheap to clone.
+#[derive(Debug, Clone)]
+pub struct Analysis {
+    pub(super) pattern: Arc<Pattern>,
+    pub(super) blocks: Arc<BlockPositions>,
+    pub(super) symbolic: SymbolicFactor,
+}
+
+impl Analysis {
+    /// Analyses the tangent of a rule on nodes at `positions`, of which the node lists `constrained` (each ascending) are
+    /// coupled as well.
+    pub fn new<'a, const D: usize>(
+        rule: &'a Quadrature<D>,
+        positions: &[Point<D>],
+        constrained: impl Iterator<Item = &'a [u32]> + Clone,
+    ) -> Self {
+        let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(constrained);
+        let pattern = Pattern::new(D, positions.len(), lists);
+        Self {
+            blocks: Arc::new(BlockPositions::new(rule, &pattern)),
+            symbolic: SymbolicFactor::new(&pattern, positions),
+            pattern: Arc::new(pattern),
+        }
+    }
+
+    /// The sparsity of the tangent.
+    pub fn pattern(&self) -> &Pattern {
+        &self.pattern
+    }
+
+    /// Where the rule's blocks go.
+    pub fn blocks(&self) -> &BlockPositions {
+        &self.blocks
+    }
+}
