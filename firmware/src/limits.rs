@@ -60,7 +60,7 @@ impl<T: Scalar> Limits<T> {
     fn nearest_in_box<const D: usize>(&self, displacement: &SVector<T, D>) -> Option<SVector<T, D>> {
         let half_edge = self.max_displacement / T::of(D as f64).sqrt();
         let inside = displacement.map(|component| bounded(component, -half_edge, half_edge));
-        (inside != *displacement).then_some(inside)
+        (inside.as_slice() != displacement.as_slice()).then_some(inside)
     }
 
     /// The command that goes from `previous` towards `setpoint` as far as one tick allows; keeps the direction.

@@ -156,7 +156,7 @@ enum Labels {
 fn fill<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>, labels: Labels) -> Result<(), TableError> {
     let (header, payload) = split(bytes)?;
     if header.scalar != T::KIND {
-        return Err(TableError::ScalarKind { found: header.scalar.name(), expected: T::KIND.name() });
+        return Err(TableError::ScalarKind { found: header.scalar, expected: T::KIND });
     }
     if usize::from(header.dimension) != D {
         return Err(TableError::Dimension { found: header.dimension.into(), expected: D });

@@ -2,6 +2,9 @@
 
 use core::fmt;
 
+use super::Field;
+use crate::scalar::ScalarKind;
+
 /// Refusal of a controller table. Each variant says what was wrong; its `Display` also says what to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TableError {
@@ -44,9 +47,9 @@ pub enum TableError {
     /// Intact, but holds another scalar type than asked for.
     ScalarKind {
         /// Kind of the file.
-        found: &'static str,
+        found: ScalarKind,
         /// Kind asked for.
-        expected: &'static str,
+        expected: ScalarKind,
     },
     /// Intact, but for another dimension of space.
     Dimension {
@@ -72,17 +75,17 @@ pub enum TableError {
     /// A number is NaN or infinite.
     NotFinite {
         /// Field that holds it.
-        field: &'static str,
+        field: Field,
     },
     /// A number that must be positive is not.
     NotPositive {
         /// Field that holds it.
-        field: &'static str,
+        field: Field,
     },
     /// A direction is not a unit vector.
     NotUnit {
         /// Field that holds it.
-        field: &'static str,
+        field: Field,
     },
     /// The unit vector n is not orthogonal to the needle axis.
     NotOrthogonal,
@@ -115,7 +118,7 @@ pub enum TableError {
     /// A number is out of proportion with the rest of the table.
     Implausible {
         /// Field that holds it.
-        field: &'static str,
+        field: Field,
     },
     /// The output buffer cannot hold the table.
     BufferTooSmall {
@@ -182,6 +185,7 @@ impl fmt::Display for TableError {
                 write!(f, "checksum {computed:08x}, the file says {written:08x}; {REWRITE}")
             }
             Self::ScalarKind { found, expected } => {
+                let (found, expected) = (found.name(), expected.name());
                 write!(f, "the table holds {found}, this controller computes in {expected}: write it as {expected}")
             }
             Self::Dimension { found, expected } => {

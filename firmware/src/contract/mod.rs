@@ -9,6 +9,7 @@ pub mod error;
 #[cfg(test)]
 pub(crate) mod example;
 pub mod faults;
+mod field;
 pub mod format;
 pub mod frames;
 pub mod table;
@@ -18,6 +19,7 @@ pub(crate) use bounds::TableBounds;
 pub use codec::{Header, decode, decode_into, encode};
 pub use error::TableError;
 pub use faults::{Faults, Mode};
+pub use field::Field;
 pub use format::MAX_TABLE_BYTES;
 pub use frames::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 pub use table::{Gains, Knot, MAX_KNOTS, Paddle, Table, Units, Validity};

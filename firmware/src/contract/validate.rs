@@ -3,7 +3,7 @@
 use nalgebra::{SMatrix, SVector};
 
 use super::bounds::TableBounds;
-use super::{Knot, Table, TableError};
+use super::{Field, Knot, Table, TableError};
 use crate::scalar::Scalar;
 
 /// Largest admitted [`condition_number`] of a Jacobian. Past it, one part in a thousand of noise or model error along
@@ -47,23 +47,23 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     }
 
     fn validate_geometry(&self) -> Result<(), TableError> {
-        finite("target position", self.target_position.as_slice())?;
+        finite(Field::TargetPosition, self.target_position.as_slice())?;
         let [start, end] = &self.paddle.segment;
-        finite("paddle segment", start.as_slice())?;
-        finite("paddle segment", end.as_slice())?;
-        unit("needle axis", &self.needle_axis)?;
-        unit("orthogonal direction", &self.orthogonal)?;
+        finite(Field::PaddleSegment, start.as_slice())?;
+        finite(Field::PaddleSegment, end.as_slice())?;
+        unit(Field::NeedleAxis, &self.needle_axis)?;
+        unit(Field::OrthogonalDirection, &self.orthogonal)?;
         let cosine = self.needle_axis.dot(&self.orthogonal).to_f64();
         ensure(cosine.abs() <= T::UNIT_TOLERANCE, TableError::NotOrthogonal)
     }
 
     fn validate_limits(&self) -> Result<(), TableError> {
-        positive("paddle displacement limit", self.paddle.max_displacement)?;
-        positive("paddle rate limit", self.paddle.max_rate)?;
-        positive("valid paddle displacement", self.validity.paddle_displacement)?;
-        positive("needle speed limit", self.validity.needle_speed)?;
+        positive(Field::PaddleDisplacementLimit, self.paddle.max_displacement)?;
+        positive(Field::PaddleRateLimit, self.paddle.max_rate)?;
+        positive(Field::ValidPaddleDisplacement, self.validity.paddle_displacement)?;
+        positive(Field::NeedleSpeedLimit, self.validity.needle_speed)?;
         ensure(self.paddle.max_displacement <= self.validity.paddle_displacement, TableError::DisplacementRange)?;
-        finite("gains", &[self.gains.loop_gain, self.gains.lambda_max])?;
+        finite(Field::Gains, &[self.gains.loop_gain, self.gains.lambda_max])?;
         let gain = self.gains.loop_gain.to_f64();
         ensure(gain > 0.0 && gain < 1.0 && self.gains.lambda_max.to_f64() >= 1.0, TableError::Gains)
     }
@@ -73,7 +73,7 @@ impl<T: Scalar, const D: usize> Table<T, D> {
             return Err(TableError::TooFewKnots { found: 0 });
         };
         ensure(self.knots.len() >= 2, TableError::TooFewKnots { found: self.knots.len() })?;
-        finite("validity depth range", &[self.validity.depth_start, self.validity.depth_end])?;
+        finite(Field::ValidityDepthRange, &[self.validity.depth_start, self.validity.depth_end])?;
         for knot in &self.knots {
             knot.validate_finite()?;
         }
@@ -105,30 +105,30 @@ impl<T: Scalar, const D: usize> Table<T, D> {
         let reach = |end: &SVector<T, D>| (end - self.target_position).norm().to_f64();
         let [start, end] = &self.paddle.segment;
         let distance = reach(start).max(reach(end));
-        in_proportion("depth range", depth, ASPECT_LIMIT * distance)?;
-        in_proportion("distance from paddle to target", distance, ASPECT_LIMIT * depth)?;
+        in_proportion(Field::DepthRange, depth, ASPECT_LIMIT * distance)?;
+        in_proportion(Field::DistanceFromPaddleToTarget, distance, ASPECT_LIMIT * depth)?;
         let extent = LENGTH_MARGIN * (depth + distance);
-        in_proportion("valid paddle displacement", self.validity.paddle_displacement.to_f64(), extent)?;
+        in_proportion(Field::ValidPaddleDisplacement, self.validity.paddle_displacement.to_f64(), extent)?;
         let range = self.paddle.max_displacement.to_f64();
-        in_proportion("paddle rate limit", self.paddle.max_rate.to_f64(), CROSSINGS_PER_SECOND * range)?;
-        in_proportion("needle speed limit", self.validity.needle_speed.to_f64(), CROSSINGS_PER_SECOND * depth)?;
+        in_proportion(Field::PaddleRateLimit, self.paddle.max_rate.to_f64(), CROSSINGS_PER_SECOND * range)?;
+        in_proportion(Field::NeedleSpeedLimit, self.validity.needle_speed.to_f64(), CROSSINGS_PER_SECOND * depth)?;
         let bounds = TableBounds::of(self);
-        in_proportion("knot Jacobian", bounds.jacobian_norm, JACOBIAN_LIMIT)?;
-        in_proportion("target displacement", bounds.target_displacement, extent)?;
-        in_proportion("target displacement slope", bounds.target_slope, DRAG_LIMIT)?;
-        in_proportion("paddle path slope", HERMITE_LIFT * bounds.path_lift, range)
+        in_proportion(Field::KnotJacobian, bounds.jacobian_norm, JACOBIAN_LIMIT)?;
+        in_proportion(Field::TargetDisplacement, bounds.target_displacement, extent)?;
+        in_proportion(Field::TargetDisplacementSlope, bounds.target_slope, DRAG_LIMIT)?;
+        in_proportion(Field::PaddlePathSlope, HERMITE_LIFT * bounds.path_lift, range)
     }
 }
 
 impl<T: Scalar, const D: usize> Knot<T, D> {
     fn validate_finite(&self) -> Result<(), TableError> {
-        finite("knot depth", &[self.depth])?;
-        finite("knot Jacobian", self.jacobian.as_slice())?;
-        finite("knot paddle path", self.paddle_path.as_slice())?;
-        finite("knot paddle path slope", self.paddle_path_slope.as_slice())?;
-        finite("knot target displacement", self.target_displacement.as_slice())?;
-        finite("knot target displacement slope", self.target_displacement_slope.as_slice())?;
-        finite("knot static target displacement", self.static_target_displacement.as_slice())
+        finite(Field::KnotDepth, &[self.depth])?;
+        finite(Field::KnotJacobian, self.jacobian.as_slice())?;
+        finite(Field::KnotPaddlePath, self.paddle_path.as_slice())?;
+        finite(Field::KnotPaddlePathSlope, self.paddle_path_slope.as_slice())?;
+        finite(Field::KnotTargetDisplacement, self.target_displacement.as_slice())?;
+        finite(Field::KnotTargetDisplacementSlope, self.target_displacement_slope.as_slice())?;
+        finite(Field::KnotStaticTargetDisplacement, self.static_target_displacement.as_slice())
     }
 }
 
@@ -138,23 +138,23 @@ fn ensure(holds: bool, error: TableError) -> Result<(), TableError> {
 
 /// Not inlined: it is called a dozen times, and speed does not matter here.
 #[inline(never)]
-fn finite<T: Scalar>(field: &'static str, values: &[T]) -> Result<(), TableError> {
+fn finite<T: Scalar>(field: Field, values: &[T]) -> Result<(), TableError> {
     ensure(values.iter().all(|value| value.to_f64().is_finite()), TableError::NotFinite { field })
 }
 
 #[inline(never)]
-fn positive<T: Scalar>(field: &'static str, value: T) -> Result<(), TableError> {
+fn positive<T: Scalar>(field: Field, value: T) -> Result<(), TableError> {
     finite(field, &[value])?;
     ensure(value.to_f64() > 0.0, TableError::NotPositive { field })
 }
 
 /// Not a number is out of proportion, too: overflow on the way here.
 #[inline(never)]
-fn in_proportion(field: &'static str, value: f64, limit: f64) -> Result<(), TableError> {
+fn in_proportion(field: Field, value: f64, limit: f64) -> Result<(), TableError> {
     ensure(value <= limit, TableError::Implausible { field })
 }
 
-fn unit<T: Scalar, const D: usize>(field: &'static str, vector: &SVector<T, D>) -> Result<(), TableError> {
+fn unit<T: Scalar, const D: usize>(field: Field, vector: &SVector<T, D>) -> Result<(), TableError> {
     finite(field, vector.as_slice())?;
     ensure((vector.norm().to_f64() - 1.0).abs() <= T::UNIT_TOLERANCE, TableError::NotUnit { field })
 }

@@ -42,7 +42,8 @@ impl Clock {
     ) -> Option<u64> {
         let slack_ns = runtime.needle_age.safe_ns;
         let ticks = self.tick.map_or(1, |tick| inputs.tick.saturating_sub(tick));
-        let due_ns = ticks.saturating_mul(runtime.loop_period_ns);
+        // A product of 64 bits is a loop of its own on a microcontroller.
+        let due_ns = if ticks == 1 { runtime.loop_period_ns } else { ticks.saturating_mul(runtime.loop_period_ns) };
         let Some(time_ns) = self.time_ns else {
             let skipped = if due_ns <= slack_ns { ticks.saturating_sub(1) } else { 0 };
             self.believe(inputs, skipped, ledger, faults);

@@ -73,7 +73,8 @@ impl<T: Scalar> Controller<'_, T> {
         if limited.rate_limited {
             self.note_motion_underway(state, tick, step);
         }
-        state.gate.travel.paddle += step.norm().to_f64();
+        let [x, y] = &mut state.gate.travel.paddle;
+        (*x, *y) = (*x + step.x.abs().to_f64(), *y + step.y.abs().to_f64());
         state.integral = Some(integral);
         state.displacement = Some(limited.displacement);
     }

@@ -22,7 +22,7 @@ impl<T: Scalar> Controller<'_, T> {
         inputs: &Inputs,
         faults: &mut Faults,
     ) -> Option<Measurement> {
-        let checks = Checks { runtime: &self.runtime, now_ns: inputs.time_ns };
+        let checks = Checks::new(&self.runtime, inputs.time_ns);
         if let Some(sample) = &inputs.needle {
             self.read_needle(state, &checks, sample, faults);
         }
@@ -33,15 +33,14 @@ impl<T: Scalar> Controller<'_, T> {
     }
 
     fn read_needle(&self, state: &mut State<T>, checks: &Checks<'_, T>, sample: &NeedleSample, faults: &mut Faults) {
-        let (sample, previous) = (Measurement::from(sample), state.needle.accepted);
-        let checked = checks.needle(&sample, previous.as_ref(), &state.needle_monitor);
+        let (sample, previous) = (Measurement::from(sample), state.needle.accepted.as_ref());
+        let checked = checks.needle(&sample, previous, &state.needle_monitor);
+        let travelled = previous.map_or(0.0, |previous| (sample.values[0] - previous.values[0]).abs());
         if !state.needle.offer(&sample, checked.map(|_| ()), &mut state.ledger.needle, faults) {
             return;
         }
         state.needle_monitor = checked.unwrap_or_default();
-        if let Some(previous) = previous {
-            state.gate.travel.needle += (sample.values[0] - previous.values[0]).abs();
-        }
+        state.gate.travel.needle += travelled;
     }
 
     fn read_target(
@@ -54,7 +53,7 @@ impl<T: Scalar> Controller<'_, T> {
         let is_visible = sample.is_visible();
         let (sample, previous) = (Measurement::from(sample), state.target.accepted);
         // Only a value like the one before it can be frozen.
-        let identical = previous.is_some_and(|previous| previous.values == sample.values);
+        let identical = sample.is_like(previous.as_ref());
         let (predicted, admitted) = if identical {
             (self.predicted_target(state), state.target_resolution.unseen_motion(self.runtime.target_range))
         } else {
@@ -64,7 +63,7 @@ impl<T: Scalar> Controller<'_, T> {
             let frozen = &state.target_frozen;
             checks
                 .target(&sample, previous.as_ref(), &state.gate)
-                .and_then(|()| frozen.check(&sample, previous.as_ref(), &predicted, admitted))
+                .and_then(|()| frozen.check(identical, &predicted, admitted))
         } else {
             Err(Discard::NotVisible)
         };
@@ -77,7 +76,7 @@ impl<T: Scalar> Controller<'_, T> {
         }
         state.target_lost = false;
         state.gate.accept();
-        state.target_frozen.accept(&sample, previous.as_ref(), &predicted);
+        state.target_frozen.accept(identical, &predicted);
         state.target_resolution.accept(&sample, previous.as_ref());
         Some(sample)
     }
@@ -92,15 +91,16 @@ impl<T: Scalar> Controller<'_, T> {
     fn read_paddle(&self, state: &mut State<T>, checks: &Checks<'_, T>, sample: &PaddleSample, faults: &mut Faults) {
         let runtime = &self.runtime;
         let identity = sample.paddle_index;
-        let (sample, previous) = (Measurement::from(sample), state.paddle.accepted);
+        let (sample, previous) = (Measurement::from(sample), state.paddle.accepted.as_ref());
+        let identical = sample.is_like(previous);
         let age = seconds(checks.now_ns.saturating_sub(sample.time_ns));
         let commanded = state.displacement.as_ref().map(to_frame);
-        let mut content = checks.paddle(&sample, previous.as_ref());
+        let mut content = checks.paddle(&sample, previous);
         if identity != runtime.paddle_index {
             content = Err(Discard::Identity);
         } else if let (Ok(()), Some(commanded)) = (content, &commanded) {
             let admitted = FROZEN_TRAVEL * runtime.limits.max_displacement.to_f64() + runtime.unseen_motion(age);
-            content = state.paddle_frozen.check(&sample, previous.as_ref(), commanded, admitted);
+            content = state.paddle_frozen.check(identical, commanded, admitted);
         }
         if !state.paddle.offer(&sample, content, &mut state.ledger.paddle, faults) {
             return;
@@ -109,7 +109,7 @@ impl<T: Scalar> Controller<'_, T> {
             self.adopt(state, checks, &sample, faults);
             return;
         };
-        state.paddle_frozen.accept(&sample, previous.as_ref(), &commanded);
+        state.paddle_frozen.accept(identical, &commanded);
         let follows = FollowingMonitor::follows(runtime, &sample.values, &commanded, age);
         if follows || state.armed {
             faults.set_if(Faults::FOLLOWING_ERROR, state.following.enter(follows));

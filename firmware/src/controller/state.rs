@@ -78,6 +78,7 @@ impl<T: Scalar> State<T> {
 
     /// Leaves SAFE after somebody has looked: accounts go on, everything else starts over, and the paddle's measured
     /// position is adopted once more. Does nothing in any other mode.
+    #[inline(never)] // The loop's stack does not carry the new state.
     pub fn rearm(&mut self) {
         if self.mode != Mode::Safe {
             return;

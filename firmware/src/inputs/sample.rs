@@ -11,6 +11,13 @@ pub(crate) struct Measurement {
     pub(crate) values: [f64; 2],
 }
 
+impl Measurement {
+    /// Whether the sample before it said the same.
+    pub(crate) fn is_like(&self, previous: Option<&Self>) -> bool {
+        previous.is_some_and(|previous| previous.values == self.values)
+    }
+}
+
 impl From<&NeedleSample> for Measurement {
     fn from(sample: &NeedleSample) -> Self {
         Self { sequence: sample.sequence, time_ns: sample.time_ns, values: [sample.depth, sample.velocity] }

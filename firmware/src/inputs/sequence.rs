@@ -58,6 +58,18 @@ impl SequenceTracker {
         self.enter_old(sequence, ledger)
     }
 
+    /// Enters the number that follows the newest one, as [`Self::register`] would; any other changes nothing.
+    pub(crate) fn advance(&mut self, sequence: u32, ledger: &mut StreamLedger) -> bool {
+        let follows = self.newest.is_some_and(|newest| sequence == newest.wrapping_add(1));
+        if follows {
+            self.newest = Some(sequence);
+            self.arrived = self.arrived << 1 | 1;
+            self.known += u32::from(self.known < WINDOW);
+            ledger.published += 1;
+        }
+        follows
+    }
+
     /// A delivery `behind` the newest: late if it fills a gap, which it then does.
     fn fill(&mut self, behind: u32, ledger: &mut StreamLedger) -> Arrival {
         if behind >= self.known {
@@ -141,6 +153,25 @@ mod tests {
         for gap in [1, 10, 1000] {
             let ledger = deliver(&[5, 6, 7 + gap, 8 + gap]);
             assert_eq!((ledger.lost, ledger.published), (u64::from(gap), 4 + u64::from(gap)));
+        }
+    }
+
+    #[test]
+    fn what_follows_is_entered_in_short_as_in_full() {
+        let (mut long, mut short) = (SequenceTracker::default(), SequenceTracker::default());
+        let (mut in_full, mut in_short) = (StreamLedger::default(), StreamLedger::default());
+        assert!(!short.advance(0, &mut in_short), "nothing to follow");
+        let start = u32::MAX - 40;
+        for tracker in [(&mut long, &mut in_full), (&mut short, &mut in_short)] {
+            tracker.0.register(start, tracker.1);
+        }
+        for i in 1..100 {
+            for other in [0, 2, 1 << 31] {
+                assert!(!short.advance(start.wrapping_add(i - 1 + other), &mut in_short), "{other} ahead");
+            }
+            long.register(start.wrapping_add(i), &mut in_full);
+            assert!(short.advance(start.wrapping_add(i), &mut in_short));
+            assert_eq!((short, in_short), (long, in_full), "number {i}");
         }
     }
 

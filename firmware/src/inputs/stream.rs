@@ -35,19 +35,25 @@ impl Stream {
         faults: &mut Faults,
     ) -> bool {
         ledger.delivered += 1;
+        // Nearly every sample: the next one, and good. The rest of this function would do the same, three times as slowly.
+        if content.is_ok() && self.head == self.arrivals.newest() && self.arrivals.advance(sample.sequence, ledger) {
+            return self.accept(sample, ledger);
+        }
         let ahead = |of: Option<u32>| of.map_or(1, |newest| sample.sequence.wrapping_sub(newest).cast_signed());
         let accepted = if ahead(self.head) > 0 && ahead(self.arrivals.newest()) <= SEQUENCE_JUMP {
             self.offer_next(sample.sequence, content, ledger, faults)
         } else {
             self.offer_contradiction(sample.sequence, content, ledger, faults)
         };
-        if accepted {
-            ledger.consumed += 1;
-            self.head = Some(sample.sequence);
-            self.accepted = Some(*sample);
-            self.contradiction = None;
-        }
-        accepted
+        accepted && self.accept(sample, ledger)
+    }
+
+    fn accept(&mut self, sample: &Measurement, ledger: &mut StreamLedger) -> bool {
+        ledger.consumed += 1;
+        self.head = Some(sample.sequence);
+        self.accepted = Some(*sample);
+        self.contradiction = None;
+        true
     }
 
     /// A number that follows those of the accepted samples.

@@ -136,7 +136,7 @@ fn a_sender_that_counts_anew_needs_consistent_numbers_and_good_content() {
 }
 
 fn checks_of(runtime: &Runtime<f64>) -> Checks<'_, f64> {
-    Checks { runtime, now_ns: 1000 * MS }
+    Checks::new(runtime, 1000 * MS)
 }
 
 fn at(time_ns: u64, values: [f64; 2]) -> Measurement {

@@ -23,6 +23,9 @@ pub const TABLE_BYTES: usize = 32 * 1024;
 pub const COUNTER_BITS: u32 = 24;
 const COUNTER_MASK: u32 = (1 << COUNTER_BITS) - 1;
 
+/// A reply as it is sent.
+type Answer<'a> = Reply<&'a Account>;
+
 /// What a microcontroller has to provide.
 pub trait Board {
     /// Rate of the counter, Hz; at least 65,536.
@@ -74,7 +77,7 @@ impl<T: Scalar> Memory<T> {
         let command =
             PaddleCommand { state: Mode::Safe as u32, faults: Faults::WATCHDOG.bits(), ..PaddleCommand::default() };
         self.line.writer.restart();
-        self.line.writer.encode(&Reply::Command { command, counts: 0 }).unwrap_or_default()
+        self.line.writer.encode(&Answer::Command { command, counts: 0 }).unwrap_or_default()
     }
 }
 
@@ -259,7 +262,7 @@ impl<T: Scalar> Run<'_, T> {
     fn step<B: Board>(&mut self, board: &mut B, line: &mut Line, tick: u64, time_ns: u64) {
         let inputs = Inputs { tick, time_ns, ..core::mem::take(&mut self.inbox) };
         let (command, counts) = timed_step(board, self.controller, self.state, &inputs);
-        line.send(board, &Reply::Command { command, counts });
+        line.send(board, &Answer::Command { command, counts });
     }
 
     /// The host's clock shows `time_ns` now. The first time, the next release is one period ahead.
@@ -279,7 +282,7 @@ impl<T: Scalar> Run<'_, T> {
             faults: self.state.faults(),
             stack_bytes: board.stack_bytes(),
         };
-        line.send(board, &Reply::Account(account));
+        line.send(board, &Answer::Account(&account));
     }
 }
 
@@ -373,7 +376,7 @@ impl Now {
 impl Line {
     /// Sends a reply. Every reply fits into a frame.
     #[inline(never)]
-    fn send<B: Board>(&mut self, board: &mut B, reply: &Reply) {
+    fn send<B: Board>(&mut self, board: &mut B, reply: &Answer<'_>) {
         for byte in self.writer.encode(reply).unwrap_or_default() {
             board.write(*byte);
         }
@@ -381,7 +384,7 @@ impl Line {
 
     #[inline(never)]
     fn send_hello<B: Board>(&mut self, board: &mut B, identity: Identity) {
-        self.send(board, &Reply::Hello(identity));
+        self.send(board, &Answer::Hello(identity));
     }
 
     /// Answers a host that starts.
@@ -392,19 +395,17 @@ impl Line {
 
     #[inline(never)]
     fn send_taken<B: Board>(&mut self, board: &mut B, bytes: u32) {
-        self.send(board, &Reply::Taken { bytes });
+        self.send(board, &Answer::Taken { bytes });
     }
 
     #[inline(never)]
     fn send_ready<B: Board>(&mut self, board: &mut B) {
-        // Not `&Reply::Ready`, which would be a constant of half a kilobyte: as large as the largest reply.
-        let ready = Reply::Ready;
-        self.send(board, &ready);
+        self.send(board, &Answer::Ready);
     }
 
     #[inline(never)]
     fn send_refusal<B: Board>(&mut self, board: &mut B, refusal: Refusal) {
-        self.send(board, &Reply::Refused(refusal));
+        self.send(board, &Answer::Refused(refusal));
     }
 
     /// Takes the bytes that have arrived, up to the end of a frame.

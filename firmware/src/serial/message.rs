@@ -62,10 +62,10 @@ pub enum Request<'a> {
     TestWatchdog,
 }
 
-/// Device to host.
+/// Device to host. The device sends `Reply<&Account>`, which is as many bytes on the line, and small on its stack.
 #[allow(clippy::large_enum_variant)] // Without an allocator there is nothing to box with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub enum Reply {
+pub enum Reply<A = Account> {
     /// Answers [`Request::Hello`]; sent by itself once after every start.
     Hello(Identity),
     /// So many bytes of the table are there.
@@ -85,7 +85,7 @@ pub enum Reply {
         counts: u32,
     },
     /// Answers [`Request::Account`].
-    Account(Account),
+    Account(A),
 }
 
 /// What releases the steps of a run.

@@ -4,7 +4,7 @@ use std::{string::ToString, vec::Vec};
 
 use nalgebra::Matrix2;
 
-use super::super::example;
+use super::super::{Field, example};
 use super::*;
 
 fn encoded<T: Scalar>(table: &Table<T, 2>) -> Vec<u8> {
@@ -115,7 +115,7 @@ fn header_refusals_are_typed() {
     assert_eq!(with(0, b'X'), TableError::NotATable);
     assert_eq!(with(8, 9), TableError::FormatVersion { found: 9 });
     assert_eq!(with(10, 5), TableError::UnknownScalar { found: 5 });
-    assert_eq!(with(10, 4), TableError::ScalarKind { found: "f32", expected: "f64" });
+    assert_eq!(with(10, 4), TableError::ScalarKind { found: ScalarKind::F32, expected: ScalarKind::F64 });
     assert_eq!(with(11, 3), TableError::Dimension { found: 3, expected: 2 });
     assert_eq!(with(12, 4), TableError::PaddleDof { found: 4, expected: 2 });
     assert_eq!(with(14, 1), TableError::Reserved);
@@ -148,15 +148,15 @@ fn invariants_are_checked_by_writer_and_reader() {
     assert_eq!(invariant(|t| t.knots.clear()), TooFewKnots { found: 0 });
     assert_eq!(invariant(|t| t.knots.swap(3, 4)), DepthOrder { knot: 4 });
     assert_eq!(invariant(|t| t.validity.depth_start = 0.01), DepthRange);
-    assert_eq!(invariant(|t| t.orthogonal.x = 1.1), NotUnit { field: "orthogonal direction" });
+    assert_eq!(invariant(|t| t.orthogonal.x = 1.1), NotUnit { field: Field::OrthogonalDirection });
     assert_eq!(invariant(|t| t.needle_axis = t.orthogonal), NotOrthogonal);
     assert_eq!(invariant(|t| t.paddle.max_displacement = 1e-5), PathBeyondLimit { knot: 1 });
     assert_eq!(invariant(|t| t.paddle.max_displacement = 1.0), DisplacementRange);
-    assert_eq!(invariant(|t| t.paddle.max_rate = 0.0), NotPositive { field: "paddle rate limit" });
+    assert_eq!(invariant(|t| t.paddle.max_rate = 0.0), NotPositive { field: Field::PaddleRateLimit });
     assert_eq!(invariant(|t| t.gains.loop_gain = 1.5), Gains);
     assert_eq!(invariant(|t| t.gains.lambda_max = 0.5), Gains);
     let nan = invariant(|t| t.knots[5].jacobian.m12 = f64::NAN);
-    assert_eq!(nan, NotFinite { field: "knot Jacobian" });
+    assert_eq!(nan, NotFinite { field: Field::KnotJacobian });
     for smallest in [0.0, 1e-12, 1e-6, 1e-4] {
         let jacobian = Matrix2::new(1.0, 0.0, 0.0, smallest);
         assert_eq!(invariant(|t| t.knots[2].jacobian = jacobian), IllConditioned { knot: 2 });

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::contract::{NeedleSample, PaddleSample};
+use crate::contract::{Field, NeedleSample, PaddleSample};
 use crate::detection::FOLLOWING_FRACTION;
 
 /// Largest paddle displacement, rate per second, and depth range of the table.
@@ -564,25 +564,25 @@ mod proportions {
         let field = |field| Err(TableError::Implausible { field });
         // 100 crossings per second; the paddle's range is 0.05, the table's depth 0.1.
         assert_eq!(refused(|t| t.paddle.max_rate = 4.99), Ok(()));
-        assert_eq!(refused(|t| t.paddle.max_rate = 5.01), field("paddle rate limit"));
+        assert_eq!(refused(|t| t.paddle.max_rate = 5.01), field(Field::PaddleRateLimit));
         assert_eq!(refused(|t| t.validity.needle_speed = 9.99), Ok(()));
-        assert_eq!(refused(|t| t.validity.needle_speed = 10.01), field("needle speed limit"));
+        assert_eq!(refused(|t| t.validity.needle_speed = 10.01), field(Field::NeedleSpeedLimit));
         // A slope of 33.75 over an interval of 0.01 lifts the path by 0.05.
         assert_eq!(refused(|t| t.knots[3].paddle_path_slope = Vector2::new(33.7, 0.0)), Ok(()));
-        assert_eq!(refused(|t| t.knots[3].paddle_path_slope = Vector2::new(33.8, 0.0)), field("paddle path slope"));
+        assert_eq!(refused(|t| t.knots[3].paddle_path_slope = Vector2::new(33.8, 0.0)), field(Field::PaddlePathSlope));
         assert_eq!(refused(|t| t.knots[3].target_displacement_slope = Vector2::new(0.0, 2.99)), Ok(()));
         let steep = refused(|t| t.knots[3].target_displacement_slope = Vector2::new(0.0, 3.01));
-        assert_eq!(steep, field("target displacement slope"));
+        assert_eq!(steep, field(Field::TargetDisplacementSlope));
         // ‖J‖ = 0.396.
         assert_eq!(refused(|t| t.knots[3].jacobian *= 252.0), Ok(()));
-        assert_eq!(refused(|t| t.knots[3].jacobian *= 253.0), field("knot Jacobian"));
+        assert_eq!(refused(|t| t.knots[3].jacobian *= 253.0), field(Field::KnotJacobian));
         // From (0.5, 0.5) to (0.1, 0.4) it is 0.412: ten times that and the depth are 5.12.
         assert_eq!(refused(|t| t.validity.paddle_displacement = 5.12), Ok(()));
-        assert_eq!(refused(|t| t.validity.paddle_displacement = 5.13), field("valid paddle displacement"));
+        assert_eq!(refused(|t| t.validity.paddle_displacement = 5.13), field(Field::ValidPaddleDisplacement));
         let far = |t: &mut Table<f64, 2>| t.target_position.x = 100.3;
-        assert_eq!(refused(far), field("distance from paddle to target"));
+        assert_eq!(refused(far), field(Field::DistanceFromPaddleToTarget));
         let near = |t: &mut Table<f64, 2>| t.paddle.segment = [t.target_position.add_scalar(5e-5); 2];
-        assert_eq!(refused(near), field("depth range"));
+        assert_eq!(refused(near), field(Field::DepthRange));
     }
 }
 

@@ -14,24 +14,16 @@ pub(crate) struct FrozenMonitor {
 }
 
 impl FrozenMonitor {
-    /// Refuses `sample` if it is one of many like `previous` although what it follows has moved further than
-    /// `admitted` without it.
-    pub(crate) fn check(
-        &self,
-        sample: &Measurement,
-        previous: Option<&Measurement>,
-        followed: &[f64; 2],
-        admitted: f64,
-    ) -> Result<(), Discard> {
-        let identical = previous.is_some_and(|previous| previous.values == sample.values);
+    /// Refuses a sample that is one of many [like the ones before](Measurement::is_like) although what it follows has
+    /// moved further than `admitted` without it.
+    pub(crate) fn check(&self, identical: bool, followed: &[f64; 2], admitted: f64) -> Result<(), Discard> {
         let frozen =
             identical && self.identical + 1 >= FROZEN_SAMPLES && !are_within(followed, &self.reference, admitted);
         if frozen { Err(Discard::Frozen) } else { Ok(()) }
     }
 
     /// Enters an accepted sample.
-    pub(crate) fn accept(&mut self, sample: &Measurement, previous: Option<&Measurement>, followed: &[f64; 2]) {
-        let identical = previous.is_some_and(|previous| previous.values == sample.values);
+    pub(crate) fn accept(&mut self, identical: bool, followed: &[f64; 2]) {
         if identical && self.identical > 0 {
             self.identical = self.identical.saturating_add(1);
         } else {

@@ -10,7 +10,17 @@ use crate::settings::Runtime;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Travel {
     pub(crate) needle: f64,
-    pub(crate) paddle: f64,
+    /// Along each axis: square roots are dear.
+    pub(crate) paddle: [f64; 2],
+}
+
+impl Travel {
+    /// How far apart two positions of the paddle since `before` are at most, length. Larger plus (√2 − 1) times smaller
+    /// component is the norm along the axes and between them, and at most 8 % more elsewhere.
+    fn paddle_since(&self, before: &Self) -> f64 {
+        let (x, y) = (self.paddle[0] - before.paddle[0], self.paddle[1] - before.paddle[1]);
+        x.max(y) + (core::f64::consts::SQRT_2 - 1.0) * x.min(y)
+    }
 }
 
 /// Accepted samples that are remembered; the motion since the oldest one may show in the newest measurement.
@@ -53,7 +63,7 @@ impl InnovationGate {
         let reach = (runtime.delay_samples as usize + 1).min(GATE_HISTORY - 1);
         let oldest = self.at_arrival(reach);
         let motion = runtime.target_slope * (self.travel.needle - oldest.needle)
-            + runtime.jacobian_norm * (self.travel.paddle - oldest.paddle);
+            + runtime.jacobian_norm * self.travel.paddle_since(&oldest);
         let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;
         let floor = if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR };
         let gate = noise + GATE_MOTION * motion + floor * runtime.target_range;

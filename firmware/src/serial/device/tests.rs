@@ -9,6 +9,7 @@ use crate::contract::example::table;
 use crate::contract::{MAX_TABLE_BYTES, encode};
 use crate::controller::plant::{MS, Plant};
 use crate::inputs::{Discard, Ledger, StreamLedger, TickLedger};
+use crate::scalar::ScalarKind;
 use crate::serial::LineLedger;
 
 /// A board whose line is closed once the host has nothing left to say.
@@ -160,7 +161,7 @@ fn requests_out_of_place_are_refused() {
         Refusal::Table { code: crate::contract::TableError::TooShort { bytes: 0 }.code() }
     );
     let single = encoded(&table().cast::<f32>());
-    let kind = crate::contract::TableError::ScalarKind { found: "f32", expected: "f64" };
+    let kind = crate::contract::TableError::ScalarKind { found: ScalarKind::F32, expected: ScalarKind::F64 };
     assert_eq!(refusal(&loading(&single, ClockSource::Frames)), Refusal::Table { code: kind.code() });
     let mut requests = loading(&bytes, ClockSource::Frames);
     requests.pop();
@@ -214,7 +215,7 @@ fn the_last_word_is_a_safe_command_that_moves_nothing() {
     let mut reader = FrameReader::new();
     let arrival = memory.last_word().iter().filter_map(|byte| reader.feed(*byte)).last();
     assert_eq!(arrival, Some(Frame::Start));
-    let Some(Reply::Command { command, .. }) = reader.message() else { panic!("no command") };
+    let Some(Reply::Command { command, .. }) = reader.message::<Reply>() else { panic!("no command") };
     assert_eq!((command.state, command.is_valid()), (Mode::Safe as u32, false));
     assert_eq!(command.faults, Faults::WATCHDOG.bits());
     assert!(memory.last_word().len() <= 64, "fits where an exception finds it");

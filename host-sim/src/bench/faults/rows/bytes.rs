@@ -1,5 +1,6 @@
 //! Rows 26 to 29: damaged, foreign and impossible tables.
 
+use firmware::ScalarKind;
 use firmware::contract::{MAX_TABLE_BYTES, Table, TableError, decode, encode};
 
 use super::Trial;
@@ -84,7 +85,7 @@ pub(crate) fn mismatches(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
         (with(0, b'X'), TableError::NotATable),
         (with(8, 2), TableError::FormatVersion { found: 2 }),
         (with(8, 0), TableError::FormatVersion { found: 0 }),
-        (with(10, 4), TableError::ScalarKind { found: "f32", expected: "f64" }),
+        (with(10, 4), TableError::ScalarKind { found: ScalarKind::F32, expected: ScalarKind::F64 }),
         (with(10, 7), TableError::UnknownScalar { found: 7 }),
         (with(11, 3), TableError::Dimension { found: 3, expected: 2 }),
         (with(12, 6), TableError::PaddleDof { found: 6, expected: 2 }),
