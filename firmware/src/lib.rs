@@ -21,7 +21,7 @@
 //! command         u ← towards f + w                  |u| ≤ u_max, |Δu| ≤ Δ_max on every tick
 //! ```
 //!
-//! The gain g follows from the delay of the loop, see [`stability`]; the limits and their anti-windup are in
+//! The gain g follows from the delay of the loop, see [`loop_stability`]; the limits and their anti-windup are in
 //! [`limits`].
 //!
 //! # Symbols and units

@@ -4,16 +4,20 @@ use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
 
-use firmware::contract::frames::TARGET_VISIBLE;
-use firmware::contract::{Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample};
-use firmware::contract::{Units, Validity};
+use firmware::contract::{PaddleCommand, Table, Validity};
 use firmware::scalar::ScalarKind;
 use firmware::serial::{Board, Memory, Refusal, Reply, Request, ResetCause, serve};
 use firmware::{Faults, Inputs, Mode, Settings};
+use host_sim::bench::faults::shuttle::ShuttleDrive;
+use host_sim::bench::faults::tissue::LinearTissue;
+use host_sim::bench::paper_table::paper_table;
 use host_sim::exchange::board::tamper::{Damage, Tamper};
 use host_sim::exchange::board::{BoardError, Device, Image, Processor, SerialLine};
 use host_sim::runtime::executor::encode_as;
-use nalgebra::{Matrix2, Vector2};
+use host_sim::world::actuator::{ActuatorModel, PaddleActuator};
+use host_sim::world::sensors::{Encoders, TargetSensor};
+use host_sim::world::{Sensors, World};
+use nalgebra::Vector2;
 
 const MS: u64 = 1_000_000;
 /// Long against a step, even on a busy machine; short for a test that loses some.
@@ -69,97 +73,45 @@ fn thread_device(back: Tamper) -> Device {
     Device::connect(line, ScalarKind::F64, None).unwrap()
 }
 
-fn jacobian() -> Matrix2<f64> {
-    Matrix2::new(0.30, 0.05, -0.04, 0.25)
-}
-
-/// Depth 0 to 0.1; without the paddle the target moves sideways by 0.02 per unit of depth.
 fn table() -> Table<f64, 2> {
-    let n = Vector2::new(1.0, 0.0);
-    let slope = -(jacobian().try_inverse().unwrap() * n) * 0.02;
-    let mut table = Table::empty();
-    table.units = Units::default();
-    table.paddle = Paddle {
-        index: 3,
-        segment: [Vector2::new(0.2, 0.3), Vector2::new(0.1, 0.4)],
-        max_displacement: 0.05,
-        max_rate: 0.1,
-    };
-    table.needle_axis = Vector2::new(0.0, -1.0);
-    table.orthogonal = n;
-    table.validity = Validity { depth_start: 0.0, depth_end: 0.1, paddle_displacement: 0.05, needle_speed: 0.2 };
-    table.gains = Gains { loop_gain: 0.25, delay_samples: 1, lambda_max: 1.0 };
-    for i in 0..=10 {
-        let depth = 0.01 * f64::from(i);
-        let axial = Vector2::new(0.0, -0.1 * depth);
-        table
-            .knots
-            .push(Knot {
-                depth,
-                jacobian: jacobian(),
-                paddle_path: slope * depth,
-                paddle_path_slope: slope,
-                target_displacement: axial,
-                target_displacement_slope: Vector2::new(0.0, -0.1),
-                static_target_displacement: axial + n * 0.02 * depth,
-            })
-            .unwrap();
-    }
-    table
+    paper_table().unwrap()
 }
 
 fn settings() -> Settings {
     Settings::new(MS, 20 * MS, 20 * MS)
 }
 
-/// Linear tissue under the needle and the paddle, measured; it pushes a little more than the table knows.
-#[derive(Default)]
-struct Plant {
+/// The simulated world on linear tissue, without noise, at the end of the line.
+struct Plant<'t> {
+    world: World<LinearTissue<'t>, ShuttleDrive>,
     tick: u64,
-    depth: f64,
-    paddle: Vector2<f64>,
-    pending: std::collections::VecDeque<TargetSample>,
-    targets: u32,
+    /// Orthogonal error that nothing would hold back, length.
+    uncontrolled: f64,
 }
 
-impl Plant {
-    const SPEED: f64 = 0.1;
-
-    fn error(&self) -> f64 {
-        (jacobian() * self.paddle).x + 0.025 * self.depth
+impl<'t> Plant<'t> {
+    fn new(table: &'t Table<f64, 2>) -> Self {
+        let Validity { depth_end, needle_speed, .. } = table.validity;
+        let drive = ShuttleDrive::new(table, depth_end, 0.5 * needle_speed, 1e-3);
+        let actuator = ActuatorModel { max_rate: table.paddle.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
+        // No sensor reads the same number twice.
+        let target = TargetSensor::new(20 * MS, 20 * MS, 1e-9, 1);
+        let sensors = Sensors { target, encoders: Encoders::new(table.paddle.index) };
+        let tissue = LinearTissue::new(table);
+        let uncontrolled = tissue.error(&tissue.target(depth_end, &Vector2::zeros())).abs();
+        Self { world: World::of(tissue, drive, PaddleActuator::new(actuator), sensors), tick: 0, uncontrolled }
     }
 
-    fn sense(&mut self) -> Inputs {
+    /// One period under `command`, if there is one: the error, length, and the inputs of the next step.
+    fn advance(&mut self, command: Option<&PaddleCommand>) -> (f64, Inputs) {
         let (tick, time_ns) = (self.tick, self.tick * MS);
-        if tick.is_multiple_of(20) {
-            let displacement = [self.error(), -0.1 * self.depth];
-            self.pending.push_back(TargetSample {
-                sequence: self.targets,
-                flags: TARGET_VISIBLE,
-                time_ns,
-                displacement,
-            });
-            self.targets += 1;
-        }
-        let arrived = self.pending.front().is_some_and(|sample| sample.time_ns + 20 * MS <= time_ns);
-        let velocity = if self.depth < 0.1 { Self::SPEED } else { 0.0 };
-        let sequence = tick as u32;
         self.tick += 1;
-        Inputs {
-            tick,
-            time_ns,
-            needle: Some(NeedleSample { sequence, reserved: 0, time_ns, depth: self.depth, velocity }),
-            target: if arrived { self.pending.pop_front() } else { None },
-            paddle: Some(PaddleSample { sequence, paddle_index: 3, time_ns, displacement: self.paddle.into() }),
-        }
-    }
-
-    /// Without a command the actuator keeps its position.
-    fn act(&mut self, command: Option<&PaddleCommand>) {
-        if let Some(command) = command.filter(|command| command.is_valid()) {
-            self.paddle = command.displacement.into();
-        }
-        self.depth = (self.depth + Self::SPEED * 1e-3).min(0.1);
+        self.world.act(command, time_ns, MS);
+        let truth = self.world.advance(tick, time_ns).unwrap();
+        let (needle, paddle) = self.world.encoders(time_ns);
+        let target = self.world.target_samples(&truth).last();
+        let error = self.world.tissue.error(&Vector2::from(truth.target)).abs();
+        (error, Inputs { tick, time_ns, needle: Some(needle), target, paddle: Some(paddle) })
     }
 }
 
@@ -172,45 +124,46 @@ struct BoardRun {
 }
 
 /// Runs the loop for so many ticks; both limits must hold on every command that arrives.
-fn drive(device: &mut Device, plant: &mut Plant, ticks: u64) -> BoardRun {
-    let table = table();
-    let step = table.paddle.max_rate * 1e-3;
-    let mut outcome = BoardRun { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
+fn drive(device: &mut Device, plant: &mut Plant<'_>, ticks: u64) -> BoardRun {
+    let paddle = plant.world.tissue.table().paddle.clone();
+    let step = paddle.max_rate * 1e-3;
+    let mut run = BoardRun { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
+    let mut answered = None;
     for _ in 0..ticks {
-        let inputs = plant.sense();
-        let answer = device.step(&inputs, PATIENCE).unwrap();
-        plant.act(answer.as_ref().map(|answer| &answer.command));
-        outcome.worst_error = outcome.worst_error.max(plant.error().abs());
-        let Some(answer) = answer else {
-            outcome.lost_ticks += 1;
+        let (error, inputs) = plant.advance(answered.as_ref());
+        run.worst_error = run.worst_error.max(error);
+        answered = device.step(&inputs, PATIENCE).unwrap().map(|answer| answer.command);
+        let Some(command) = answered else {
+            run.lost_ticks += 1;
             continue;
         };
-        let (command, last) = (answer.command, outcome.last);
+        let last = run.last;
         let moved = Vector2::from(command.displacement) - Vector2::from(last.displacement);
         let elapsed = command.sequence.wrapping_sub(last.sequence).max(1);
-        assert!(Vector2::from(command.displacement).norm() <= table.paddle.max_displacement * (1.0 + 1e-12));
+        assert!(Vector2::from(command.displacement).norm() <= paddle.max_displacement * (1.0 + 1e-12));
         if last.is_valid() {
             assert!(moved.norm() <= f64::from(elapsed) * step * (1.0 + 1e-9), "{last:?} → {command:?}");
         }
-        outcome.last = command;
+        run.last = command;
     }
-    outcome
+    run
 }
 
 #[test]
 fn a_damaged_line_costs_ticks_and_nothing_else() {
-    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let table = table();
+    let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     for (i, damage) in Damage::ALL.into_iter().enumerate() {
         let mut device = thread_device(Tamper::none());
         device.begin(&bytes, &settings()).unwrap();
-        let mut plant = Plant::default();
+        let mut plant = Plant::new(&table);
         assert_eq!(drive(&mut device, &mut plant, 100).last.state, Mode::Run as u32);
         device.set_tamper(Tamper::new(damage, 40, i as u64));
         let damaged = drive(&mut device, &mut plant, 300);
         device.set_tamper(Tamper::none());
         let healed = drive(&mut device, &mut plant, 200);
         assert_eq!(healed.last.state, Mode::Run as u32, "{damage:?}: {}", Faults::from_bits(healed.last.faults));
-        assert!(healed.worst_error < 1e-3, "{damage:?}: {}", healed.worst_error);
+        assert!(healed.worst_error < 0.2 * plant.uncontrolled, "{damage:?}: {}", healed.worst_error);
 
         let account = device.account().unwrap();
         assert_eq!(account.ledger.unaccounted(), 0, "{damage:?}");
@@ -235,25 +188,27 @@ fn a_damaged_line_costs_ticks_and_nothing_else() {
 
 #[test]
 fn lost_commands_leave_the_paddle_where_it_is() {
-    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let table = table();
+    let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     for damage in [Damage::CorruptByte, Damage::DropFrame, Damage::DoubleFrame] {
         // Rare enough, with this seed, that every answer to `begin` comes through.
         let mut device = thread_device(Tamper::new(damage, 60, 5));
         device.begin(&bytes, &settings()).unwrap();
-        let mut plant = Plant::default();
-        let outcome = drive(&mut device, &mut plant, 600);
-        assert_eq!(outcome.last.state, Mode::Run as u32, "{damage:?}");
-        assert!(outcome.worst_error < 2e-3, "{damage:?}: {}", outcome.worst_error);
-        assert_eq!(outcome.lost_ticks > 0, damage != Damage::DoubleFrame, "{damage:?}");
+        let mut plant = Plant::new(&table);
+        let run = drive(&mut device, &mut plant, 600);
+        assert_eq!(run.last.state, Mode::Run as u32, "{damage:?}");
+        assert!(run.worst_error < 0.2 * plant.uncontrolled, "{damage:?}: {}", run.worst_error);
+        assert_eq!(run.lost_ticks > 0, damage != Damage::DoubleFrame, "{damage:?}");
     }
 }
 
 #[test]
 fn a_silent_host_leads_to_hold_and_then_to_safe() {
-    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let table = table();
+    let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     let mut device = thread_device(Tamper::none());
     device.begin(&bytes, &settings()).unwrap();
-    let mut plant = Plant::default();
+    let mut plant = Plant::new(&table);
     let before = drive(&mut device, &mut plant, 100).last;
     let silent = |device: &mut Device, tick: u64| {
         let inputs = Inputs { tick, time_ns: tick * MS, ..Inputs::default() };
@@ -313,10 +268,11 @@ fn a_whole_insertion_on_the_cortex_m7_is_bit_identical() {
 #[test]
 fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
     let Some(image) = image(ScalarKind::F64) else { return };
-    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let table = table();
+    let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     let mut device = Device::emulate(&image).unwrap();
     device.begin(&bytes, &settings()).unwrap();
-    let mut plant = Plant::default();
+    let mut plant = Plant::new(&table);
     assert_eq!(drive(&mut device, &mut plant, 200).last.state, Mode::Run as u32);
 
     // In RUN a patient depends on it; in SAFE it may be tested.
@@ -336,10 +292,10 @@ fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
     assert_eq!(identity.reset, ResetCause::Watchdog);
 
     // Nothing but a new run makes it move, and the first valid command is the position of a paddle that has rested.
-    let inputs = plant.sense();
+    let (_, inputs) = plant.advance(None);
     assert_eq!(device.step(&inputs, PATIENCE).unwrap(), None, "samples are not answered without a run");
     device.begin(&bytes, &settings()).unwrap();
-    let measured = plant.paddle;
+    let measured = plant.world.actuator.position();
     let first = (0..10).map(|_| drive(&mut device, &mut plant, 1).last).find(PaddleCommand::is_valid).unwrap();
     assert_eq!(Vector2::from(first.displacement), measured);
     assert_eq!(first.state, Mode::Hold as u32);
@@ -349,10 +305,11 @@ fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
 #[test]
 fn a_stopped_board_skips_ticks_and_comes_back() {
     let Some(image) = image(ScalarKind::F64) else { return };
-    let bytes = encode_as(&table(), ScalarKind::F64).unwrap();
+    let table = table();
+    let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     let mut device = Device::emulate(&image).unwrap();
     device.begin(&bytes, &settings()).unwrap();
-    let mut plant = Plant::default();
+    let mut plant = Plant::new(&table);
     drive(&mut device, &mut plant, 200);
     let process = rustix::process::Pid::from_raw(device.process().unwrap() as i32).unwrap();
     rustix::process::kill_process(process, rustix::process::Signal::STOP).unwrap();

@@ -47,6 +47,15 @@ impl fmt::Display for Mode {
 }
 
 /// Bit set of fault codes; the values are part of the contract and never reused.
+///
+/// ```
+/// use firmware::Faults;
+///
+/// let seen = Faults::TARGET_LOST | Faults::NEEDLE_TOO_FAST;
+/// assert!(seen.contains(Faults::TARGET_LOST));
+/// assert_eq!(Faults::from_bits(seen.bits()), seen);
+/// assert_eq!(seen.to_string(), "NEEDLE_TOO_FAST | TARGET_LOST");
+/// ```
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Faults(u64);
 

@@ -82,6 +82,17 @@ pub struct Knot<T: Scalar, const D: usize> {
 }
 
 /// Controller table of one paddle; see the module documentation.
+///
+/// ```
+/// use firmware::decode;
+///
+/// let table = decode::<f64, 2>(&std::fs::read("tests/planar.table")?)?;
+/// let halfway = table.locate(0.5 * table.validity.depth_end).expect("a table has two knots at least");
+/// // The paddle's path leaves the target where it is, orthogonally to the needle.
+/// assert!(halfway.target_displacement().dot(&table.orthogonal).abs() < 1e-9);
+/// assert!(table.locate(2.0 * table.validity.depth_end).is_some_and(|beyond| beyond.clamped));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Table<T: Scalar, const D: usize> {

@@ -1,4 +1,4 @@
-//! What is tried and measured: strategies and whole comparisons, faults, timing, stability, boards.
+//! What is tried and measured: strategies and whole comparisons, faults, timing, stability, tables, boards.
 
 pub mod board;
 pub mod comparison;
@@ -9,5 +9,6 @@ pub mod loop_stability;
 pub mod paper_table;
 pub mod result;
 pub mod strategy;
+pub mod tables;
 pub mod timing;
 pub mod tissue_variant;

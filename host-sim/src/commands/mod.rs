@@ -12,6 +12,7 @@ mod report;
 mod run;
 mod schema;
 mod stability;
+mod tables;
 mod timing;
 mod timing_peer;
 mod world_args;
@@ -32,6 +33,7 @@ use self::report::{ReportArgs, report};
 use self::run::{RunArgs, run};
 use self::schema::{Subject, schema};
 use self::stability::{StabilityArgs, stability};
+use self::tables::{TablesArgs, tables};
 use self::timing::{TimingArgs, timing};
 use self::timing_peer::{PeerArgs, timing_peer};
 
@@ -82,6 +84,9 @@ pub(crate) enum Command {
     /// Where the closed loop stops being stable: simulated beside theory
     #[command(after_help = "Example: host-sim stability --out stability --quick")]
     Stability(StabilityArgs),
+    /// Charts what a table's size is worth: closed-loop error and time of a step against knots and number type
+    #[command(after_help = "Example: host-sim tables --scene paper --tissue homogeneous --out charts")]
+    Tables(TablesArgs),
     /// Runs the controller again on recorded inputs and compares bit by bit
     #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
     Replay(ReplayArgs),
@@ -135,6 +140,7 @@ pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
         Command::TimingPeer(args) => timing_peer(&args),
         Command::Faults(args) => faults(&args),
         Command::Stability(args) => stability(&args),
+        Command::Tables(args) => tables(&args),
         Command::Replay(args) => replay(&args),
         Command::Board(args) => board(&args),
         Command::Export(args) => export(&args),

@@ -17,6 +17,7 @@ mod settings;
 mod slider;
 mod style;
 pub mod summary;
+pub mod tables;
 mod timing;
 pub mod timing_summary;
 mod view;

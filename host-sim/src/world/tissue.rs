@@ -1,9 +1,11 @@
 //! What answers for the tissue at every tick: the full model, a reduced one with the full one behind it, or the
 //! condensed linear one.
 
+use std::sync::Arc;
+
 use clap::ValueEnum;
 use model_offline::model::{Body, TissueModel};
-use model_offline::reduction::online::ReducedBody;
+use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, TrainingOptions, train};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::{LinearSolver, NewtonSettings};
@@ -138,7 +140,7 @@ impl<'m> TissuePlant<'m> {
                     account.model = PlantModel::Reduced;
                     account.modes = Some(report.modes);
                     account.points = Some([report.points, report.full_points]);
-                    Kind::Reduced { body: Box::new(reduced.body()), full: None, full_answers: false }
+                    return Ok(Self { account, ..Self::reduced(model, paddle, &reduced) });
                 }
                 Err(error) if choice == PlantChoice::Auto => {
                     account.first_fallback = Some(error.to_string());
@@ -148,6 +150,14 @@ impl<'m> TissuePlant<'m> {
             },
         };
         Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account })
+    }
+
+    /// Tissue at rest by a reduced model that has been trained on it with this paddle; the full one answers where the
+    /// reduced one does not hold.
+    pub fn reduced(model: &'m TissueModel, paddle: Option<usize>, trained: &Arc<ReducedModel>) -> Self {
+        let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
+        let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
+        Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account }
     }
 
     /// The coefficients behind the present state, where the model has them (the condensed one has not).

@@ -3,10 +3,7 @@
 use super::common::{Common, SceneArgs};
 use super::error::CliError;
 use model_offline::output;
-use model_offline::placement::adaptive::profile_model;
-use model_offline::placement::discretise;
-use model_offline::scene::Scene;
-use model_offline::study::{Extent, pareto, table_pareto};
+use model_offline::study::{Extent, pareto};
 use std::path::PathBuf;
 
 /// Options of `pareto`.
@@ -34,24 +31,9 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), CliError> {
     let (csv, svg) = (args.out.join("pareto.csv"), args.out.join("pareto.svg"));
     output::write_whole(&csv, comparison.csv().as_bytes())?;
     output::write_whole(&svg, comparison.svg(&scene.name, scene.tissue()).as_bytes())?;
-    let tables = tables(&scene, args)?;
     if !args.common.quiet {
-        print!("{}{tables}", comparison.table());
+        print!("{}", comparison.table());
         println!("{}\n{}", csv.display(), svg.display());
     }
     Ok(())
-}
-
-/// The comparison of tables, on the scene's own model; where the loop cannot be closed on it, says why and goes on.
-fn tables(scene: &Scene, args: &ParetoArgs) -> Result<String, CliError> {
-    let model = profile_model(&discretise(scene)?.0)?;
-    match table_pareto::compare_tables(&model, args.common.threads()) {
-        Ok(points) => {
-            output::write_whole(&args.out.join("pareto_table.csv"), table_pareto::csv(&points).as_bytes())?;
-            let svg = table_pareto::svg(&points, &scene.name);
-            output::write_whole(&args.out.join("pareto_table.svg"), svg.as_bytes())?;
-            Ok(table_pareto::table(&points))
-        }
-        Err(error) => Ok(format!("tables were not compared: {error}\n")),
-    }
 }

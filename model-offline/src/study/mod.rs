@@ -10,6 +10,5 @@ pub mod pareto;
 mod pareto_chart;
 pub mod stability;
 pub mod sweep;
-pub mod table_pareto;
 
 pub use extent::Extent;

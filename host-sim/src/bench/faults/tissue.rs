@@ -24,6 +24,11 @@ impl<'t> LinearTissue<'t> {
         Self { table, gain: 1.0, turn: Matrix2::identity(), push: 0.0 }
     }
 
+    /// The table that it follows.
+    pub fn table(&self) -> &'t Table<f64, 2> {
+        self.table
+    }
+
     /// Displacement of the target with the needle at `depth` and the paddle at `paddle`, lengths.
     pub fn target(&self, depth: f64, paddle: &Vector2<f64>) -> Vector2<f64> {
         let Some(at) = self.table.locate(depth) else {

@@ -69,26 +69,24 @@ impl Axis {
         let found = if found[0] > found[1] { [1.0, 1.0] } else { found };
         let mut label = self.quantity.clone();
         let mut unit = if self.unit == "1" { String::new() } else { self.unit.clone() };
-        let (range, ticks) = match (&self.names, self.scale) {
+        let (range, ticks, shift) = match (&self.names, self.scale) {
             (Some(names), _) => {
                 let ticks = names.iter().enumerate().map(|(i, name)| (i as f64, name.clone())).collect();
-                (given.unwrap_or([-0.5, 0.5]), ticks)
+                (given.unwrap_or([-0.5, 0.5]), ticks, 0)
             }
-            (None, Scale::Linear) => {
-                let (range, ticks, shift) = linear(given, found);
-                if shift != 0 {
-                    unit = format!("{} {unit}", power_of_ten(shift)).trim_end().to_owned();
-                }
-                (range, ticks)
-            }
+            (None, Scale::Linear) => linear(given, found),
             (None, Scale::Log) => {
                 let room = (found[1] / found[0]).powf(0.05).max(1.2);
                 // Doubles end where the room would pass their largest and least.
                 let ends = [(found[0] / room).max(f64::MIN_POSITIVE), (found[1] * room).min(f64::MAX)];
                 let range = given.unwrap_or(ends);
-                (range, log_ticks(range))
+                let (ticks, shift) = log_ticks(range);
+                (range, ticks, shift)
             }
         };
+        if shift != 0 {
+            unit = format!("{} {unit}", power_of_ten(shift)).trim_end().to_owned();
+        }
         if !unit.is_empty() {
             label = format!("{label} [{unit}]");
         }
@@ -161,8 +159,9 @@ fn linear(given: Option<[f64; 2]>, found: [f64; 2]) -> ([f64; 2], Vec<(f64, Stri
     (range, ticks, shift)
 }
 
-/// Powers of ten; with less than two decades also 2 and 5 times them, or all between. Long axes keep every second, third … power.
-fn log_ticks([low, high]: [f64; 2]) -> Vec<(f64, String)> {
+/// Ticks, and the power of ten taken out of their labels: powers of ten; with less than two decades also 2 and 5 times
+/// them, or all between. Long axes keep every second, third … power.
+fn log_ticks([low, high]: [f64; 2]) -> (Vec<(f64, String)>, i32) {
     let powers = (low.log10() - 1e-9).floor() as i32..=(high.log10() + 1e-9).ceil() as i32;
     let decades = high.log10() - low.log10();
     let stride = ((decades / 7.0).ceil() as i32).max(1);
@@ -175,7 +174,11 @@ fn log_ticks([low, high]: [f64; 2]) -> Vec<(f64, String)> {
     let all = [1, 2, 3, 4, 5, 6, 7, 8, 9];
     let ticks = if with(few).len() < 3 { with(&all) } else { with(few) };
     // So short that it may as well be linear.
-    if ticks.len() < 2 { linear(Some([low, high]), [low, high]).1 } else { ticks }
+    if ticks.len() >= 2 {
+        return (ticks, 0);
+    }
+    let (_, ticks, shift) = linear(Some([low, high]), [low, high]);
+    (ticks, shift)
 }
 
 fn log_label(factor: u32, power: i32) -> String {
@@ -223,6 +226,9 @@ mod tests {
         assert_eq!(labels(&log(1e-16, 1.0), &[]), ["10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1"]);
         assert_eq!(labels(&log(0.95e-6, 3.5e-6), &[]), ["10⁻⁶", "2·10⁻⁶", "3·10⁻⁶"]);
         assert_eq!(labels(&log(1.11, 1.19), &[]), ["1.12", "1.14", "1.16", "1.18"]);
+        let short = Axis::log("error", "mm").range(1.6e-6, 1.9e-6);
+        assert_eq!(settled(&short, &[]).label, "error [10⁻⁶ mm]");
+        assert_eq!(labels(&short, &[])[0], "1.6");
         assert!((settled(&log(1.0, 1000.0), &[]).fraction(10.0) - 1.0 / 3.0).abs() < 1e-12);
     }
 

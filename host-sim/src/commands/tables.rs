@@ -1,0 +1,60 @@
+//! `host-sim tables`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use host_sim::SimError;
+use host_sim::bench::comparison::Progress as _;
+use host_sim::bench::tables::{KNOTS, compare};
+use host_sim::bench::tissue_variant::TissueVariant;
+use host_sim::record::error::FileError;
+use host_sim::record::files::write_bytes;
+use host_sim::report::tables::{csv, figure, summary};
+use model_offline::placement::discretise;
+use model_offline::scene::Scene;
+
+use super::progress::Bar;
+use super::world_args::threads_within_reason;
+
+/// Options of `tables`.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct TablesArgs {
+    /// Folder for tables.csv and tables.svg; made when it is not there
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Scene file, or the name of a bundled scene [default: paper]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) scene: Option<PathBuf>,
+    /// Tissue of table and simulation
+    #[arg(long, value_enum, default_value = "inclusion")]
+    pub(crate) tissue: TissueVariant,
+    /// Threads to use [default: all]
+    #[arg(long)]
+    pub(crate) threads: Option<usize>,
+    /// No progress and no summary
+    #[arg(long)]
+    pub(crate) quiet: bool,
+}
+
+/// Tries every table and writes the files.
+///
+/// # Errors
+/// [`SimError`]: a bad scene, tissue that cannot be modelled or reduced, files that cannot be written.
+pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
+    let scene = args.tissue.of(&Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?);
+    std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
+    let all = || std::thread::available_parallelism().map_or(1, usize::from);
+    let threads = threads_within_reason(args.threads.unwrap_or_else(all));
+    let bar = Bar::new(args.quiet);
+    bar.begin(KNOTS.len() as u64);
+    let (model, _) = discretise(&scene)?;
+    let trials = compare(&model, threads, &|| bar.step())?;
+    bar.finish();
+    write_bytes(&args.out.join("tables.csv"), &csv(&trials))?;
+    let svg = figure(&trials, &scene.name, &scene.length_unit).svg();
+    write_bytes(&args.out.join("tables.svg"), svg.as_bytes())?;
+    if !args.quiet {
+        print!("{}", summary(&trials));
+    }
+    Ok(())
+}
