@@ -9,8 +9,13 @@
 //! waits; solving for the picture's nodes, JSON and sockets belong to threads of their own. In free-run nothing
 //! reaches back into the loop; in lockstep, where no clock is in the record, the page may hold time between two ticks.
 
+#[cfg(test)]
+mod attacks;
+mod events;
 mod insertions;
+mod limits;
 mod page;
+mod requests;
 mod server;
 mod shared;
 mod watch;

@@ -1,45 +1,40 @@
-//! A small web server on loopback: the page, its events, and its buttons.
+//! A small web server on loopback: who may come in, and how much of it.
+//!
+//! Everybody on this machine can connect, so everything is bounded before it is allocated: connections, header lines and
+//! bytes, bodies, and the time that each of them may take. Whoever is slower is dropped. One request per connection.
 
-use std::io::{Read as _, Write};
+use std::io::Read as _;
+use std::net::{Ipv4Addr, TcpListener};
+use std::pin::pin;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::task::Poll;
 use std::time::Duration;
 
+use hyper::server::conn::http1;
+use hyper::service::service_fn;
+use hyper_util::rt::{TokioIo, TokioTimer};
 use model_offline::output::table_text::hex;
-use serde::Deserialize;
-use tiny_http::{Header, Method, Request, Response, Server};
+use tokio::net::TcpStream;
 
-use super::page;
-use super::shared::{FRAME_NS, KnobOutOfRange, Knobs, Shared, ViewState};
+use super::limits::{Deadline, Gate, Place};
+use super::requests::answer;
+use super::shared::{Knobs, Shared};
 use super::watch::Watch;
 use crate::bench::error::SimError;
 use crate::runtime::error::RuntimeError;
 use crate::runtime::plant::observer::{ObservedInsertion, Observer, Spectator};
 
-/// Pages that may look on at the same time.
-const MAX_LOOKERS: usize = 4;
-/// No button sends more than this.
-const MAX_BODY: u64 = 4096;
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; connect-src 'self'; \
-                      img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+/// Header lines, and bytes of all of them together with the request line.
+const MAX_HEADERS: usize = 64;
+const MAX_HEADER_BYTES: usize = 16 * 1024;
+/// Time for the whole header.
+const HEADER_TIME: Duration = Duration::from_secs(2);
 
 /// A live view that is being served. It ends with the process.
 #[derive(Debug)]
 pub struct View {
     shared: Arc<Shared>,
     address: String,
-}
-
-/// What a button asks for.
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-enum PageRequest {
-    Pause(bool),
-    Step(u64),
-    Pace(u64),
-    Knobs(Knobs),
-    Restart,
-    Finish,
 }
 
 impl View {
@@ -49,21 +44,20 @@ impl View {
     /// [`SimError::View`] when the port is taken or there is no randomness for the token.
     pub fn start(port: u16, knobs: Knobs) -> Result<Self, SimError> {
         let token = token().map_err(|error| SimError::View(format!("no random token: {error}")))?;
-        let server = Server::http(("127.0.0.1", port))
-            .map_err(|error| SimError::View(format!("cannot listen on port {port} of 127.0.0.1: {error}")))?;
-        let port = server.server_addr().to_ip().map_or(port, |address| address.port());
+        let failed = |error| SimError::View(format!("cannot listen on port {port} of 127.0.0.1: {error}"));
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
+        listener.set_nonblocking(true).map_err(failed)?;
+        let port = listener.local_addr().map_err(failed)?.port();
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let shared = Arc::new(Shared::new(knobs));
-        let guard = Arc::new(Guard { token: token.clone(), port, lookers: AtomicUsize::new(0) });
-        let for_threads = Arc::clone(&shared);
+        let address = format!("http://127.0.0.1:{port}/{token}/");
+        let gate = Arc::new(Gate::new(token, port));
+        let for_thread = Arc::clone(&shared);
         std::thread::Builder::new()
             .name("view".to_owned())
-            .spawn(move || {
-                for request in server.incoming_requests() {
-                    answer(request, &guard, &for_threads);
-                }
-            })
+            .spawn(move || runtime.block_on(accept(listener, gate, for_thread)))
             .map_err(RuntimeError::Spawn)?;
-        Ok(Self { shared, address: format!("http://127.0.0.1:{port}/{token}/") })
+        Ok(Self { shared, address })
     }
 
     /// What the loop shares with it.
@@ -90,151 +84,39 @@ fn token() -> std::io::Result<String> {
     Ok(hex(&bytes))
 }
 
-/// Who may come in.
-#[derive(Debug)]
-struct Guard {
-    token: String,
-    port: u16,
-    lookers: AtomicUsize,
-}
-
-impl Guard {
-    /// The path after the token; none for other hosts, other origins, and a wrong token. A page elsewhere that rebinds
-    /// its name to 127.0.0.1 still sends its own name as Host.
-    fn path<'r>(&self, request: &'r Request) -> Option<&'r str> {
-        let value = |name: &'static str| {
-            let mut found = request.headers().iter().filter(move |header| header.field.equiv(name));
-            (found.next().map(|header| header.value.as_str()), found.next().is_some())
-        };
-        let hosts = [format!("127.0.0.1:{}", self.port), format!("localhost:{}", self.port)];
-        let (Some(host), false) = value("Host") else { return None };
-        if !hosts.iter().any(|known| known == host) {
-            return None;
-        }
-        if let (Some(origin), _) = value("Origin")
-            && origin.strip_prefix("http://") != Some(host)
-        {
-            return None;
-        }
-        request.url().strip_prefix('/')?.strip_prefix(self.token.as_str())?.strip_prefix('/')
-    }
-}
-
-fn header(name: &str, value: &str) -> Header {
-    Header::from_bytes(name, value).expect("ASCII")
-}
-
-fn plain(request: Request, status: u16, text: &str) {
-    // Whoever went away does not want an answer.
-    let _ = request.respond(Response::from_string(text).with_status_code(status));
-}
-
-fn answer(mut request: Request, guard: &Arc<Guard>, shared: &Arc<Shared>) {
-    let Some(path) = guard.path(&request).map(str::to_owned) else {
-        return plain(request, 403, "forbidden: open the address that host-sim printed, with its token\n");
-    };
-    match (request.method().clone(), path.as_str()) {
-        (Method::Get, "") => {
-            let response = Response::from_string(page::PAGE)
-                .with_header(header("Content-Type", "text/html; charset=utf-8"))
-                .with_header(header("Content-Security-Policy", POLICY))
-                .with_header(header("Cache-Control", "no-store"))
-                .with_header(header("X-Content-Type-Options", "nosniff"))
-                .with_header(header("Referrer-Policy", "no-referrer"));
-            let _ = request.respond(response);
-        }
-        (Method::Get, "events") => {
-            if guard.lookers.fetch_add(1, Ordering::AcqRel) >= MAX_LOOKERS {
-                guard.lookers.fetch_sub(1, Ordering::AcqRel);
-                return plain(request, 503, "too many pages look on already: close one\n");
-            }
-            let (for_thread, shared) = (Arc::clone(guard), Arc::clone(shared));
-            let started = std::thread::Builder::new().name("view-events".to_owned()).spawn(move || {
-                // A closed page ends with an error of its socket.
-                let _ = events(request, &shared);
-                for_thread.lookers.fetch_sub(1, Ordering::AcqRel);
-            });
-            if started.is_err() {
-                guard.lookers.fetch_sub(1, Ordering::AcqRel);
-            }
-        }
-        (Method::Post, "request") => {
-            let mut body = Vec::new();
-            if request.as_reader().take(MAX_BODY).read_to_end(&mut body).is_err() {
-                return plain(request, 400, "unreadable\n");
-            }
-            let outcome =
-                serde_json::from_slice(&body).map_err(Refusal::from).and_then(|request| grant(request, shared));
-            match outcome {
-                Ok(()) => plain(request, 204, ""),
-                Err(reason) => plain(request, 400, &format!("{reason}\n")),
-            }
-        }
-        _ => plain(request, 404, "not here\n"),
-    }
-}
-
-/// Why a button's request is not granted.
-#[derive(Debug, thiserror::Error)]
-enum Refusal {
-    #[error(transparent)]
-    Unreadable(#[from] serde_json::Error),
-    #[error("{0} ticks; 1 to 1000 are possible")]
-    Steps(u64),
-    #[error("a pace of {0}; at most 100000 thousandths")]
-    Pace(u64),
-    #[error(transparent)]
-    Knob(#[from] KnobOutOfRange),
-}
-
-fn grant(request: PageRequest, shared: &Shared) -> Result<(), Refusal> {
-    match request {
-        PageRequest::Pause(paused) => shared.set_paused(paused),
-        PageRequest::Step(ticks) if (1..=1000).contains(&ticks) => shared.step(ticks),
-        PageRequest::Step(ticks) => return Err(Refusal::Steps(ticks)),
-        PageRequest::Pace(thousandths) if thousandths <= 100_000 => shared.set_pace(thousandths),
-        PageRequest::Pace(thousandths) => return Err(Refusal::Pace(thousandths)),
-        PageRequest::Knobs(knobs) => {
-            knobs.check()?;
-            shared.turn(knobs);
-        }
-        PageRequest::Restart => shared.restart(),
-        PageRequest::Finish => shared.finish(),
-    }
-    Ok(())
-}
-
-/// Server-sent events until the page goes away: `scene` at every new insertion, `frame` at every new state.
-fn events(request: Request, shared: &Shared) -> std::io::Result<()> {
-    let mut writer = request.into_writer();
-    writer.write_all(
-        b"HTTP/1.1 200 OK\r\nContent-Type: text/event-stream\r\nCache-Control: no-store\r\n\
-          X-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n",
-    )?;
-    let (mut insertion, mut number, mut idle) = (0, 0, 0);
+async fn accept(listener: TcpListener, gate: Arc<Gate>, shared: Arc<Shared>) {
+    let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
     loop {
-        match shared.newer(insertion, number) {
-            Some(state) => {
-                if state.insertion != insertion {
-                    event(&mut writer, "scene", &page::scene(&state, shared))?;
-                }
-                event(&mut writer, "frame", &page::frame(&state, shared))?;
-                ViewState { insertion, number, .. } = state;
-                idle = 0;
-            }
-            None => {
-                idle += 1;
-                // A word now and then, so that a closed page is noticed.
-                if idle % 60 == 0 {
-                    event(&mut writer, "idle", &serde_json::json!({ "finished": shared.is_finished() }))?;
+        match listener.accept().await {
+            Ok((stream, _)) => {
+                // Beyond the limit: closed by being dropped.
+                if let Some(place) = gate.connect() {
+                    let (gate, shared) = (Arc::clone(&gate), Arc::clone(&shared));
+                    drop(tokio::spawn(connection(stream, gate, shared, place)));
                 }
             }
+            // No descriptor is left, or the other side has gone already.
+            Err(_) => tokio::time::sleep(Duration::from_millis(50)).await,
         }
-        std::thread::sleep(Duration::from_nanos(FRAME_NS / 2));
     }
 }
 
-fn event(writer: &mut dyn Write, name: &str, data: &serde_json::Value) -> std::io::Result<()> {
-    write!(writer, "event: {name}\ndata: {data}\n\n")?;
-    writer.flush()
+/// One connection, until it is answered or its time is over.
+async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, place: Place) {
+    let deadline = Arc::new(Deadline::new());
+    let for_answer = Arc::clone(&deadline);
+    let service =
+        service_fn(move |request| answer(request, Arc::clone(&gate), Arc::clone(&shared), Arc::clone(&for_answer)));
+    let mut http = http1::Builder::new();
+    http.timer(TokioTimer::new()).header_read_timeout(HEADER_TIME).keep_alive(false);
+    http.max_headers(MAX_HEADERS).max_buf_size(MAX_HEADER_BYTES);
+    let mut answered = pin!(http.serve_connection(TokioIo::new(stream), service));
+    let mut passed = pin!(deadline.passed());
+    // Whoever went away, or sends what is no request, does not want an answer.
+    std::future::poll_fn(|context| {
+        let over = answered.as_mut().poll(context).is_ready() || passed.as_mut().poll(context).is_ready();
+        if over { Poll::Ready(()) } else { Poll::Pending }
+    })
+    .await;
+    drop(place);
 }

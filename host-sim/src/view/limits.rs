@@ -1,0 +1,86 @@
+//! How many may be in, and for how long.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+/// Connections at a time; more are closed at once.
+pub(super) const MAX_CONNECTIONS: usize = 64;
+/// Pages that may look on at the same time.
+pub(super) const MAX_LOOKERS: usize = 4;
+/// Time of a connection without any progress.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Who may come in, and how many are in.
+#[derive(Debug)]
+pub(super) struct Gate {
+    pub(super) token: String,
+    pub(super) port: u16,
+    lookers: AtomicUsize,
+    connections: AtomicUsize,
+}
+
+/// A place that is free again when this is dropped.
+#[derive(Debug)]
+pub(super) struct Place {
+    gate: Arc<Gate>,
+    of: fn(&Gate) -> &AtomicUsize,
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        (self.of)(&self.gate).fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+impl Gate {
+    /// Opens for who knows the token.
+    pub(super) fn new(token: String, port: u16) -> Self {
+        Self { token, port, lookers: AtomicUsize::new(0), connections: AtomicUsize::new(0) }
+    }
+
+    fn take(self: &Arc<Self>, of: fn(&Self) -> &AtomicUsize, most: usize) -> Option<Place> {
+        let next = |taken: usize| (taken < most).then_some(taken + 1);
+        of(self).fetch_update(Ordering::AcqRel, Ordering::Acquire, next).ok()?;
+        Some(Place { gate: Arc::clone(self), of })
+    }
+
+    /// A place for a page that looks on, if there is one.
+    pub(super) fn look_on(self: &Arc<Self>) -> Option<Place> {
+        self.take(|gate| &gate.lookers, MAX_LOOKERS)
+    }
+
+    /// A place for a connection, if there is one.
+    pub(super) fn connect(self: &Arc<Self>) -> Option<Place> {
+        self.take(|gate| &gate.connections, MAX_CONNECTIONS)
+    }
+}
+
+/// When a connection is given up, unless something has happened by then.
+#[derive(Debug)]
+pub(super) struct Deadline(Mutex<Instant>);
+
+impl Deadline {
+    /// A connection begins.
+    pub(super) fn new() -> Self {
+        Self(Mutex::new(Instant::now() + PATIENCE))
+    }
+
+    /// The other side has taken what there was.
+    pub(super) fn extend(&self) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now() + PATIENCE;
+    }
+
+    /// Waits until it has passed.
+    pub(super) async fn passed(&self) {
+        loop {
+            let at = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            if Instant::now() >= at {
+                return;
+            }
+            tokio::time::sleep_until(at).await;
+        }
+    }
+}
