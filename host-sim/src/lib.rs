@@ -48,6 +48,7 @@
 pub mod bench;
 pub mod exchange;
 pub mod guide;
+pub mod process;
 pub mod record;
 pub mod report;
 pub mod runtime;

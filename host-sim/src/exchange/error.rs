@@ -28,6 +28,12 @@ pub enum LinkError {
         /// Where.
         path: PathBuf,
     },
+    /// The link was taken down and made anew by others in the meantime.
+    #[error("the link `{name}` was taken down by its last user just now; start again")]
+    Replaced {
+        /// Its name.
+        name: String,
+    },
     /// Shared memory is full.
     #[error("shared memory (/dev/shm) has {available} bytes left, the link needs {needed}: make room there")]
     Memory {

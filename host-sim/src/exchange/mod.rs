@@ -19,6 +19,6 @@ mod wire;
 
 pub use error::LinkError;
 pub use ports::{ControllerPorts, PlantPorts, ReceiveCounts};
-pub use space::{Departure, Space};
+pub use space::{Departure, Space, sweep};
 pub use stream::{Receiver, Sender};
 pub use wire::{ClockFrame, ClockKind, Frame, Wire};

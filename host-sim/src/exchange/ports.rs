@@ -10,7 +10,7 @@ use iceoryx2::service::Service;
 use serde::{Deserialize, Serialize};
 
 use super::error::LinkError;
-use super::space::Space;
+use super::space::{Presence, Space};
 use super::stream::{Receiver, Sender};
 use super::wire::{ClockFrame, Frame};
 
@@ -29,15 +29,19 @@ const BETWEEN_TRIALS: Duration = Duration::from_millis(20);
 
 /// Opens a side. Where a process that was killed still holds its place, or has left it half made, clears that and tries
 /// again, for a bounded time.
-fn patiently<S: Service, P>(space: &Space, open: impl Fn() -> Result<P, LinkError>) -> Result<P, LinkError> {
+fn patiently<S: Service, P>(space: &Space, open: impl Fn(Presence) -> Result<P, LinkError>) -> Result<P, LinkError> {
     space.check_room()?;
     let until = Instant::now() + DEAD_TIMEOUT;
     loop {
         // One at a time: whoever finds something half made knows that nobody is at it.
-        let lock = space.lock()?;
-        match open() {
-            Err(_) if Instant::now() < until && space.clear_if_dead::<S>()? => {
-                drop(lock);
+        let locked = space.lock()?;
+        let opened = {
+            let _owner_only = Space::owner_only();
+            open(space.enter(&locked)?)
+        };
+        match opened {
+            Err(_) if Instant::now() < until && space.clear_if_dead::<S>(&locked)? => {
+                drop(locked);
                 std::thread::sleep(BETWEEN_TRIALS);
             }
             Err(error) => return Err(error),
@@ -63,8 +67,9 @@ pub struct PlantPorts<S: Service> {
     /// Commands in.
     pub command: Receiver<S, PaddleCommand>,
     space: Space,
-    // Ports go before their node.
+    // Ports go before their node, and that before this process has left.
     _node: Node<S>,
+    _presence: Presence,
 }
 
 impl<S: Service> PlantPorts<S> {
@@ -73,7 +78,7 @@ impl<S: Service> PlantPorts<S> {
     /// # Errors
     /// [`LinkError`].
     pub fn open(space: &Space) -> Result<Self, LinkError> {
-        patiently::<S, _>(space, || {
+        patiently::<S, _>(space, |presence| {
             let node = node::<S>(space)?;
             Ok(Self {
                 command: Receiver::new(&node)?,
@@ -83,6 +88,7 @@ impl<S: Service> PlantPorts<S> {
                 clock: Sender::new(&node)?,
                 space: space.clone(),
                 _node: node,
+                _presence: presence,
             })
         })
     }
@@ -101,6 +107,7 @@ impl<S: Service> PlantPorts<S> {
     /// # Errors
     /// [`LinkError::Connect`].
     pub fn connect(&self) -> Result<(), LinkError> {
+        let _owner_only = Space::owner_only();
         self.needle.connect()?;
         self.target.connect()?;
         self.paddle.connect()?;
@@ -132,6 +139,7 @@ pub struct ControllerPorts<S: Service> {
     failed: Option<LinkError>,
     space: Space,
     _node: Node<S>,
+    _presence: Presence,
 }
 
 impl<S: Service> ControllerPorts<S> {
@@ -140,7 +148,7 @@ impl<S: Service> ControllerPorts<S> {
     /// # Errors
     /// [`LinkError`]; [`LinkError::Taken`] for a second controller.
     pub fn open(space: &Space) -> Result<Self, LinkError> {
-        patiently::<S, _>(space, || {
+        patiently::<S, _>(space, |presence| {
             let node = node::<S>(space)?;
             Ok(Self {
                 needle: Receiver::new(&node)?,
@@ -151,6 +159,7 @@ impl<S: Service> ControllerPorts<S> {
                 failed: None,
                 space: space.clone(),
                 _node: node,
+                _presence: presence,
             })
         })
     }
@@ -165,6 +174,7 @@ impl<S: Service> ControllerPorts<S> {
     /// # Errors
     /// [`LinkError::Connect`].
     pub fn connect(&self) -> Result<(), LinkError> {
+        let _owner_only = Space::owner_only();
         self.command.connect()?;
         self.space.secure()
     }

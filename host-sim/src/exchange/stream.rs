@@ -155,13 +155,15 @@ impl<S: Service, F: Frame> Receiver<S, F> {
         }))
     }
 
-    /// The newest frame that waits; the others are counted as superseded.
+    /// The newest frame of those that wait; the others are counted as superseded. At most a buffer full: a sender that is
+    /// faster than this reads would hold the loop up for ever.
     ///
     /// # Errors
     /// [`LinkError::Receive`].
     pub fn newest(&mut self) -> Result<Option<F>, LinkError> {
         let mut newest = None;
-        while let Some(frame) = self.oldest()? {
+        for _ in 0..BUFFERED_FRAMES {
+            let Some(frame) = self.oldest()? else { break };
             self.superseded += u64::from(newest.is_some());
             newest = Some(frame);
         }

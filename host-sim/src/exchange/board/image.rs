@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use firmware::scalar::ScalarKind;
 
 use super::error::BoardError;
+use crate::process::dies_with_parent;
 
 /// Rust target of the board.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
@@ -80,7 +81,8 @@ impl Image {
         // Apart from the host's: this may run while cargo holds the lock of that one.
         let directory = base.join(format!("board-{}", processor.name()));
         let name = format!("stillpoint-{}", scalar.name());
-        let output = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
+        let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+        cargo
             .current_dir(&workspace)
             .args(["build", "--quiet", "--locked", "-p", "firmware", "--features", "image", "--bin", &name])
             .args(["--profile", PROFILE, "--target", TARGET, "--target-dir"])
@@ -88,7 +90,8 @@ impl Image {
             .env_remove("RUSTFLAGS")
             .env_remove("CARGO_ENCODED_RUSTFLAGS")
             .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_RUSTFLAGS", processor.rustflags())
-            .stdin(Stdio::null())
+            .stdin(Stdio::null());
+        let output = dies_with_parent(&mut cargo)
             .output()
             .map_err(|source| BoardError::Io { what: "cannot run cargo to build the image", source })?;
         if !output.status.success() {

@@ -5,6 +5,7 @@ use std::process::{Child, Command, Stdio};
 
 use super::error::BoardError;
 use super::line::SerialLine;
+use crate::process::dies_with_parent;
 
 /// The emulator.
 pub const PROGRAM: &str = "qemu-system-arm";
@@ -35,14 +36,16 @@ impl Qemu {
         if !Self::is_installed() {
             return Err(BoardError::NoQemu { program: PROGRAM });
         }
-        let mut child = Command::new(PROGRAM)
+        let mut command = Command::new(PROGRAM);
+        command
             .args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-display", "none", "-monitor", "none"])
             .args(["-icount", &format!("shift={ICOUNT_SHIFT},sleep=off"), "-serial", "stdio"])
             .arg("-kernel")
             .arg(elf)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
+            .stderr(Stdio::null());
+        let mut child = dies_with_parent(&mut command)
             .spawn()
             .map_err(|source| BoardError::Io { what: "cannot start QEMU", source })?;
         let (Some(stdin), Some(stdout)) = (child.stdin.take(), child.stdout.take()) else {

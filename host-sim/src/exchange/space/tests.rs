@@ -1,0 +1,138 @@
+//! Places that everybody may write to, and what others may have put there.
+
+use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+use std::path::{Path, PathBuf};
+
+use iceoryx2::service::ipc;
+
+use super::*;
+use crate::exchange::{ControllerPorts, PlantPorts};
+
+/// Somebody else's number: only root can make files that are theirs.
+const NOBODY: u32 = 65_534;
+
+/// Named after this process, so that no sweep takes it.
+fn space(what: &str) -> Space {
+    Space::new(&format!("{RUN}{}-{what}", std::process::id())).unwrap()
+}
+
+fn mode(path: &Path) -> u32 {
+    path.symlink_metadata().unwrap().mode() & 0o777
+}
+
+/// A file of this user's that looks like one of the space's, for everybody to read.
+fn plant(path: PathBuf) -> PathBuf {
+    std::fs::write(&path, [0; 100]).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o644)).unwrap();
+    path
+}
+
+fn name_of_a_file(space: &Space, what: &str) -> PathBuf {
+    Path::new(files::SHARED_MEMORY).join(format!("{}{what}", files::prefix(&space.name, &space.key)))
+}
+
+#[test]
+fn rights_to_own_files_are_taken_away_and_links_are_not_followed() {
+    let space = space("links");
+    let folder = tempfile::tempdir().unwrap();
+    let own = plant(name_of_a_file(&space, "own"));
+    let elsewhere = plant(folder.path().join("not ours to change"));
+    let link = name_of_a_file(&space, "link");
+    symlink(&elsewhere, &link).unwrap();
+    space.secure().unwrap();
+    assert_eq!((mode(&own), mode(&elsewhere)), (0o600, 0o644));
+    space.leave::<ipc::Service>(Departure::First);
+    assert!(!own.exists() && link.symlink_metadata().is_err() && elsewhere.exists());
+}
+
+#[test]
+fn files_of_others_are_left_alone_and_stop_nobody() {
+    if !rustix::process::geteuid().is_root() {
+        return println!("skipped: only root can make files that belong to others");
+    }
+    let space = space("others");
+    let theirs = plant(name_of_a_file(&space, "theirs"));
+    std::fs::set_permissions(&theirs, std::fs::Permissions::from_mode(0o666)).unwrap();
+    std::os::unix::fs::chown(&theirs, Some(NOBODY), None).unwrap();
+    let ports = PlantPorts::<ipc::Service>::open(&space).unwrap();
+    assert_eq!(mode(&theirs), 0o666);
+    drop(ports);
+    space.leave::<ipc::Service>(Departure::First);
+    assert!(theirs.exists() && !space.root().exists());
+    std::fs::remove_file(theirs).unwrap();
+}
+
+#[test]
+fn a_squatted_directory_is_refused_and_a_link_to_one_is() {
+    let name = format!("test-squat-{}", std::process::id());
+    let folder = tempfile::tempdir().unwrap();
+    let place = files::root(&name);
+    symlink(folder.path(), &place).unwrap();
+    assert!(matches!(Space::new(&name), Err(LinkError::Foreign { .. })));
+    std::fs::remove_file(&place).unwrap();
+    std::fs::create_dir(&place).unwrap();
+    std::fs::set_permissions(&place, std::fs::Permissions::from_mode(0o777)).unwrap();
+    assert!(matches!(Space::new(&name), Err(LinkError::Foreign { .. })), "others may write to it");
+    std::fs::remove_dir(&place).unwrap();
+}
+
+#[test]
+fn names_of_runs_and_of_files_cannot_be_guessed() {
+    let [a, b] = [(); 2].map(|()| Space::unique().unwrap());
+    assert_ne!(a.name, b.name);
+    assert_ne!(a.key, b.key);
+    assert_eq!(a.key.len(), 16);
+    assert_eq!(Space::new(a.name()).unwrap().key, a.key, "the same on both sides");
+    for space in [a, b] {
+        space.leave::<ipc::Service>(Departure::First);
+        assert!(!space.root().exists());
+    }
+}
+
+#[test]
+fn what_the_transport_makes_belongs_to_the_user_alone() {
+    let space = space("modes");
+    let ports = PlantPorts::<ipc::Service>::open(&space).unwrap();
+    let traces = space.traces();
+    assert!(traces.len() > 1, "{traces:?}");
+    for path in traces {
+        assert_eq!(mode(&path) & 0o077, 0, "{}", path.display());
+    }
+    drop(ports);
+    space.leave::<ipc::Service>(Departure::First);
+}
+
+#[test]
+fn nobody_removes_a_space_that_somebody_is_in() {
+    // No process is in its name: only who has entered counts.
+    let space = Space::new(&format!("test-alive-{}", std::process::id())).unwrap();
+    let plant = PlantPorts::<ipc::Service>::open(&space).unwrap();
+    let controller = ControllerPorts::<ipc::Service>::open(&space).unwrap();
+    let before = space.traces();
+    drop(controller);
+    // Another user of the same name; whatever a listing tells it, somebody has entered.
+    let visitor = Space::new(space.name()).unwrap();
+    visitor.leave::<ipc::Service>(Departure::First);
+    let locked = visitor.lock().unwrap();
+    assert!(!files::is_empty(&visitor.root, &locked));
+    drop(locked);
+    assert!(!sweep().contains(&space.name), "swept while somebody is in it");
+    assert!(before.iter().filter(|path| path.exists()).count() > 1 && space.root().exists());
+    drop(plant);
+    space.leave::<ipc::Service>(Departure::First);
+    assert!(space.traces().is_empty());
+}
+
+#[test]
+fn what_the_dead_have_left_is_swept_and_what_the_living_have_is_not() {
+    // No process has this number: it is above what any kernel gives.
+    let dead = Space::new(&format!("{RUN}{}-test", i32::MAX)).unwrap();
+    let living = Space::unique().unwrap();
+    let [left, kept] = [&dead, &living].map(|space| plant(name_of_a_file(space, "memory")));
+    let swept = sweep();
+    assert!(swept.contains(&dead.name) && !swept.contains(&living.name), "{swept:?}");
+    assert!(!left.exists() && !dead.root().exists());
+    assert!(kept.exists() && living.root().exists());
+    living.leave::<ipc::Service>(Departure::First);
+    assert!(!kept.exists());
+}
