@@ -92,9 +92,11 @@ fn both_modes_account_for_everything() {
         assert!(pictures.join("scene.svg").is_file());
         assert_eq!(mode == "free-run", pictures.join("timing-histogram.svg").is_file());
         assert!(dynamic.frames.len() > 2, "the report's slider needs the body along the way");
-        // The pictures' states are solved once more: the last one is the run's own end.
+        // The pictures' states are solved once more in full: the last one is the run's own end. On a machine that is too
+        // busy for the full model in free-run the reduced one has run.
+        let close = if dynamic.plant.full_step_us.is_some() { 1e-3 } else { 1e-6 };
         let end = dynamic.frames.last().unwrap().nodes.iter().zip(&dynamic.deformed_nodes);
-        assert!(end.into_iter().all(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-6));
+        assert!(end.into_iter().all(|(a, b)| (a[0] - b[0]).hypot(a[1] - b[1]) < close), "{:?}", dynamic.plant);
     }
 }
 

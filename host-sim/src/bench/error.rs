@@ -170,7 +170,9 @@ fn is_input_of_a_run(error: &RuntimeError) -> bool {
     matches!(
         error,
         RuntimeError::Settings(_)
+            | RuntimeError::OtherScene
+            | RuntimeError::OtherUnits { .. }
             | RuntimeError::Link(LinkError::Name { .. })
-            | RuntimeError::World(WorldError::NoPaddle { .. })
+            | RuntimeError::World(WorldError::NoPaddle { .. } | WorldError::TooSlow { .. })
     )
 }

@@ -13,10 +13,12 @@ use host_sim::record::recording::stream::StreamRecorder;
 use host_sim::runtime::controller::ControlLoop;
 use host_sim::runtime::controller::process::{ControllerResult, Served, Service, serve};
 use host_sim::runtime::executor::{AnyTable, Hardware, on_emulated_board};
+use host_sim::runtime::introduction::Introduction;
 use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::names;
 use host_sim::runtime::signals;
 use host_sim::world::loop_settings::LoopSettings;
+use model_offline::output::table_text::hex;
 
 use super::outputs::check_outputs;
 use super::world_args::PATIENCE;
@@ -43,11 +45,11 @@ pub(crate) struct ControllerArgs {
     #[arg(long, default_value_t = 30.0, value_name = "S")]
     pub(crate) patience: f64,
     /// Process id of the plant that started this: accounts go to stdout, for it to read
-    #[arg(long, hide = true)]
+    #[arg(long, hide = true, value_parser = clap::value_parser!(i32).range(1..))]
     pub(crate) parent: Option<i32>,
     /// Ticks to keep room for
-    #[arg(long, hide = true, default_value_t = 100_000)]
-    pub(crate) capacity: usize,
+    #[arg(long, hide = true, default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(..=20_000_000))]
+    pub(crate) capacity: u32,
     /// Record every tick in this file while it happens
     #[arg(long, value_name = "FILE")]
     pub(crate) record: Option<PathBuf>,
@@ -65,6 +67,10 @@ pub(crate) struct ControllerArgs {
 /// [`SimError`].
 pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     signals::install();
+    // A plant that starts its controller has swept already.
+    if args.parent.is_none() {
+        super::sweep();
+    }
     args.loop_settings.check()?;
     PATIENCE.check(args.patience)?;
     check_outputs(&[&args.table], &[("--record", args.record.as_deref()), ("--json", args.json.as_deref())])?;
@@ -78,7 +84,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
         Hardware::Qemu => on_emulated_board(&bytes, &settings, timeout)?,
     };
     let header = Header { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
-    let mut control_loop = ControlLoop::new(executor, args.capacity);
+    let mut control_loop = ControlLoop::new(executor, args.capacity as usize);
     if let Some(path) = &args.record {
         control_loop = control_loop.recorded_by(Box::new(StreamRecorder::create(path, &header)?));
     }
@@ -86,7 +92,8 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
         control_loop = control_loop.with_panic_at(tick);
     }
     let parent = args.parent.and_then(rustix::process::Pid::from_raw);
-    let service = Service { mode: args.mode, loop_settings: args.loop_settings, timeout, parent };
+    let introduction = Introduction { scene_hash: hex(&table.scene_hash()), units: table.units() };
+    let service = Service { mode: args.mode, loop_settings: args.loop_settings, timeout, parent, introduction };
     let served = serve(control_loop, &Space::new(&args.link)?, &service)?;
     hand_in(args, served)
 }
@@ -105,8 +112,8 @@ fn hand_in(args: &ControllerArgs, served: Served) -> Result<(), SimError> {
     } else {
         let final_state = names::mode::name(accounts.final_state);
         println!(
-            "{} ticks, {} commands, final state {final_state}, faults seen: {}",
-            accounts.ticks.due, accounts.commands, accounts.faults
+            "{} ticks ({} without room in the record), {} commands, final state {final_state}, faults seen: {}",
+            accounts.ticks.due, accounts.not_kept, accounts.commands, accounts.faults
         );
     }
     Ok(())

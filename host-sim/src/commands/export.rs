@@ -40,7 +40,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
         said.push(written(path, &bytes)?);
     }
     if let Some(path) = &args.csv {
-        said.push(written(path, &csv::recording(&recording, &table.orthogonal))?);
+        said.push(written(path, &csv::recording(&recording, &table.orthogonal, table.units.length.as_str()))?);
     }
     println!("{} ticks, {}\n{}", recording.records.len(), recording.header.mode, said.join("\n"));
     Ok(())

@@ -53,13 +53,13 @@ const DEFAULT_SEEDS: u64 = 1000;
 /// [`SimError::Faults`] when something does not hold; everything is written nevertheless.
 pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     signals::install();
+    EFFORT.check(args.effort)?;
     if let Some(unknown) = args.only.iter().find(|id| !ROWS.iter().any(|row| row.id == **id)) {
         return Err(SimError::Usage(format!("--only {unknown}: the catalogue has rows 1 to {}", ROWS.len())));
     }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
     }
-    EFFORT.check(args.effort)?;
     let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
@@ -81,7 +81,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     let seeds = args.seeds.unwrap_or(default);
     if seeds > 0 {
         let started = Instant::now();
-        let sums = composed(&table, args.seed, seeds, &|| {})?;
+        let sums = signals::ends_at_once(|| composed(&table, args.seed, seeds, &|| {}))?;
         print_composed(&sums, started.elapsed().as_secs_f64());
         result.composed = Some(sums);
     }

@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use clap::{CommandFactory as _, Parser, Subcommand};
 use host_sim::SimError;
 use host_sim::record::error::FileError;
+use host_sim::runtime::signals;
 
 use self::board::{BoardArgs, board};
 use self::controller::{ControllerArgs, controller};
@@ -140,9 +141,15 @@ pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
         Command::TimingPeer(args) => timing_peer(&args),
         Command::Faults(args) => faults(&args),
         Command::Stability(args) => stability(&args),
-        Command::Tables(args) => tables(&args),
+        Command::Tables(args) => {
+            signals::install();
+            signals::ends_at_once(|| tables(&args))
+        }
         Command::Replay(args) => replay(&args),
-        Command::Board(args) => board(&args),
+        Command::Board(args) => {
+            signals::install();
+            signals::ends_at_once(|| board(&args))
+        }
         Command::Export(args) => export(&args),
         Command::Schema { of } => {
             println!("{:#}", schema(of));
@@ -154,6 +161,14 @@ pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
         }
         Command::Man { directory } => man(&directory),
         Command::Report(args) => report(&args),
+    }
+}
+
+/// Removes what runs that were killed have left in shared memory, and says so.
+fn sweep() {
+    let swept = host_sim::exchange::sweep();
+    if !swept.is_empty() {
+        eprintln!("Removed from shared memory what killed processes had left there: {}", swept.join(", "));
     }
 }
 

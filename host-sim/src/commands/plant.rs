@@ -10,10 +10,13 @@ use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
 use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::plant::PlantLoop;
-use host_sim::runtime::plant::process::{OnDeath, Visit, serve};
+use host_sim::runtime::plant::process::{Expected, OnDeath, Visit, serve};
 use host_sim::runtime::signals;
 use host_sim::world::World;
+use model_offline::model::TissueModel;
+use model_offline::output::table_text::hex;
 use model_offline::placement::{best_dynamic, discretise};
+use model_offline::scene::Scene;
 
 use super::outputs::check_outputs;
 use super::world_args::{PATIENCE, WorldArgs};
@@ -39,6 +42,9 @@ pub(crate) struct PlantArgs {
     /// Seconds of silence after which the controller is given up
     #[arg(long, default_value_t = 30.0, value_name = "S")]
     pub(crate) patience: f64,
+    /// Take a controller whose table is of another scene all the same
+    #[arg(long)]
+    pub(crate) allow_other_scene: bool,
     /// Go on when the controller dies, with the paddle where it is, and let the next one in; free-run only
     #[arg(long)]
     pub(crate) keep: bool,
@@ -53,23 +59,28 @@ pub(crate) struct PlantArgs {
 /// [`SimError`].
 pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     signals::install();
+    super::sweep();
     PATIENCE.check(args.patience)?;
-    let scene = args.tissue.unwrap_or(TissueVariant::Inclusion).of(&args.world.scene()?);
+    let whole = args.world.scene()?;
+    let scene = args.tissue.unwrap_or(TissueVariant::Inclusion).of(&whole);
     let simulation = args.world.simulation(&scene)?;
     let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).collect();
     check_outputs(&inputs, &[("--json", args.json.as_deref())])?;
-    let (model, _) = discretise(&scene)?;
-    let paddle = match args.paddle {
-        Some(index) => index,
-        None => best_dynamic(&model)?,
-    };
-    let world = World::new(&model, Some(paddle), &simulation)?;
+    let (model, paddle) = signals::ends_at_once(|| model_and_paddle(&scene, args.paddle))?;
+    let world = signals::ends_at_once(|| match args.mode {
+        RunMode::Lockstep => World::new(&model, Some(paddle), &simulation),
+        RunMode::FreeRun => World::in_time(&model, Some(paddle), &simulation),
+    })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let visit = Visit {
         mode: args.mode,
         loop_settings: simulation.loop_settings,
         timeout: Duration::from_secs_f64(args.patience),
         on_death: if args.keep { OnDeath::AwaitNext } else { OnDeath::Stop },
+        expected: (!args.allow_other_scene).then(|| Expected {
+            scene_hashes: TissueVariant::ALL.iter().map(|tissue| hex(&tissue.of(&whole).hash())).collect(),
+            units: [scene.length_unit.clone(), scene.stress_unit.clone()],
+        }),
     };
     let result = serve(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
     if let Some(path) = &args.json {
@@ -80,4 +91,14 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
         result.ticks, result.largest_error
     );
     Ok(())
+}
+
+/// The tissue, and the paddle that was asked for or is best.
+fn model_and_paddle(scene: &Scene, asked: Option<u32>) -> Result<(TissueModel, u32), SimError> {
+    let (model, _) = discretise(scene)?;
+    let paddle = match asked {
+        Some(index) => index,
+        None => best_dynamic(&model)?,
+    };
+    Ok((model, paddle))
 }

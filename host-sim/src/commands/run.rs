@@ -98,13 +98,15 @@ impl RunArgs {
 /// [`SimError`]; nothing is written then.
 pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     signals::install();
+    super::sweep();
     let scene = args.world.scene()?;
     let simulation = args.world.simulation(&scene)?;
     check_directory(&args.out)?;
     let inputs: Vec<&Path> = args.table.iter().chain(&args.world.scene).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json.as_deref(), &args.out)?;
     let bar = Bar::new(args.quiet);
-    let comparison = Comparison::prepare(scene, simulation, args.options()?, &bar)?;
+    let options = args.options()?;
+    let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &bar))?;
     let view = args.view.then(|| live_view(args, &simulation.loop_settings)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
     bar.finish();

@@ -11,6 +11,7 @@ use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::loop_stability::{csv, summary};
 use host_sim::report::loop_stability_chart::figure;
+use host_sim::runtime::signals;
 use model_offline::scene::Scene;
 
 use super::progress::Bar;
@@ -44,6 +45,7 @@ pub(crate) struct StabilityArgs {
 /// # Errors
 /// [`SimError`]: a bad scene, tissue that cannot be modelled, files that cannot be written.
 pub(crate) fn stability(args: &StabilityArgs) -> Result<(), SimError> {
+    signals::install();
     let scene = Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?;
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
     let bar = Bar::new(args.quiet);
@@ -51,7 +53,7 @@ pub(crate) fn stability(args: &StabilityArgs) -> Result<(), SimError> {
     let all = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads_within_reason(args.threads.unwrap_or_else(all));
     let resolution = if args.quick { Resolution::Quick } else { Resolution::Fine };
-    let result = simulate(&scene, resolution, threads, &|| bar.step())?;
+    let result = signals::ends_at_once(|| simulate(&scene, resolution, threads, &|| bar.step()))?;
     bar.finish();
     write_bytes(&args.out.join("closed_loop.csv"), &csv(&result))?;
     write_bytes(&args.out.join("closed_loop.svg"), figure(&result).svg().as_bytes())?;

@@ -51,6 +51,7 @@ pub(crate) struct TimingArgs {
 /// [`SimError`].
 pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     signals::install();
+    super::sweep();
     RATE.check(args.rate)?;
     SECONDS.check(args.seconds)?;
     let processors = std::thread::available_parallelism().map_or(1, usize::from);

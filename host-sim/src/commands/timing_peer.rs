@@ -28,7 +28,7 @@ pub(crate) struct PeerArgs {
     #[arg(long)]
     pub(crate) cpu: Option<usize>,
     /// Real-time priority to ask for
-    #[arg(long)]
+    #[arg(long, value_parser = clap::value_parser!(u8).range(0..=99))]
     pub(crate) priority: u8,
 }
 
@@ -38,12 +38,14 @@ pub(crate) struct PeerArgs {
 /// [`SimError`].
 pub(crate) fn timing_peer(args: &PeerArgs) -> Result<(), SimError> {
     signals::install();
+    let loop_settings = loop_settings(args.rate);
+    loop_settings.check()?;
     let table = read_table(&args.table)?.table;
     Ok(answer(&PeerOptions {
         transport: args.transport,
         link: &args.link,
         table: &table,
-        loop_settings: loop_settings(args.rate),
+        loop_settings,
         cpu: args.cpu,
         priority: args.priority,
     })?)

@@ -45,9 +45,9 @@ pub(crate) struct WorldArgs {
     /// Ticks that a command waits before the paddle acts
     #[arg(long, default_value_t = 0, value_name = "TICKS")]
     pub(crate) paddle_delay: u32,
-    /// What answers for the tissue at every tick
-    #[arg(long, value_enum, default_value_t)]
-    pub(crate) plant: PlantChoice,
+    /// What answers for the tissue at every tick [default: full; in free-run reduced where full cannot keep the period]
+    #[arg(long, value_enum)]
+    pub(crate) plant: Option<PlantChoice>,
     /// Part of its command that the paddle reaches
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub(crate) paddle_gain: f64,

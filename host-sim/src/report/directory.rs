@@ -1,5 +1,7 @@
 //! Files of a run: the directory appears whole, or not at all.
 
+use std::fs::File;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::{Attachments, pictures, render, render_with};
@@ -63,8 +65,9 @@ pub fn write_run(directory: &Path, result: &RunResult, artifacts: Vec<Artifact>)
     };
     for artifact in artifacts.iter().chain([&page, &summary]) {
         let path = new.join(&artifact.name);
-        std::fs::write(&path, &artifact.bytes).map_err(FileError::write(directory))?;
+        write_synced(&path, &artifact.bytes).map_err(FileError::write(directory))?;
     }
+    sync(&new).map_err(FileError::write(directory))?;
     let old = temporary.path().join("old");
     let replaced = directory.exists();
     if replaced {
@@ -76,7 +79,19 @@ pub fn write_run(directory: &Path, result: &RunResult, artifacts: Vec<Artifact>)
         }
         FileError::write(directory)(source)
     })?;
-    Ok(())
+    Ok(sync(parent).map_err(FileError::write(parent))?)
+}
+
+/// Writes a file and waits until the disk has it: a report that appears whole must be whole after a power cut as well.
+fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// Waits until the disk has a directory's names.
+fn sync(directory: &Path) -> std::io::Result<()> {
+    File::open(directory)?.sync_all()
 }
 
 /// Reads the result of a finished run.

@@ -59,12 +59,14 @@ pub(super) fn section(run: &RunResult) -> Markup {
             caption { span { "Ticks of the controller" } }
             thead { tr {
                 th { "controlled run" } th { "due" } th { "RUN" } th { "HOLD" } th { "SAFE" } th { "skipped" } th { "unaccounted" }
+                th { "not recorded" }
             } }
             tbody { @for (name, ledger) in &ledgers {
                 @let ticks = &ledger.ticks;
                 tr {
                     td { (name) }
-                    @for number in [ticks.due, ticks.run, ticks.hold, ticks.safe, ticks.skipped, ticks.unaccounted] {
+                    @for number in [ticks.due, ticks.run, ticks.hold, ticks.safe, ticks.skipped, ticks.unaccounted,
+                        ledger.not_recorded] {
                         td { (count(number)) }
                     }
                 }

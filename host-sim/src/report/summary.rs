@@ -7,6 +7,7 @@ use model_offline::scene::PlantModel;
 
 use super::paper::paper_optima;
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::runtime::durations::LoopTiming;
 use crate::runtime::names;
 
 /// The summary of a run that is at `directory`.
@@ -106,6 +107,9 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
             if let Some(error) = plant.error_at_end {
                 write!(text, ", {error:.1e} from the full model at the end")?;
             }
+            if let Some(full) = plant.full_step_us {
+                write!(text, "; the full model takes {full:.0} µs, too long for the period")?;
+            }
             if plant.fallbacks > 0 {
                 write!(text, "; the full model answered {} steps", plant.fallbacks)?;
             }
@@ -118,30 +122,37 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
     Ok(())
 }
 
+/// Both sides of a loop on the machine's clock: the counts first, then how late.
+fn write_free_run(text: &mut String, case: &CaseResult, free_run: &StrategyResult) -> std::fmt::Result {
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let sides = [("controller", &free_run.timing), ("plant", &free_run.plant_timing)];
+    let sides: Vec<_> = sides.into_iter().filter_map(|(side, timing)| Some((side, timing.as_ref()?))).collect();
+    let counts: Vec<_> = sides
+        .iter()
+        .map(|(side, timing)| {
+            let LoopTiming { ticks, deadline_misses, skipped, .. } = timing;
+            format!("{side} {ticks} ticks, {deadline_misses} deadline misses, {skipped} skipped")
+        })
+        .collect();
+    let state = names::mode::name(free_run.final_state);
+    writeln!(text, "  {}: {}; ended in {state}", case.tissue, counts.join("; "))?;
+    for (side, LoopTiming { release_lateness: lateness, scheduling, .. }) in sides {
+        let [p50, p99, max] = [lateness.p50_ns, lateness.p99_ns, lateness.max_ns].map(us);
+        let policy = &scheduling.policy;
+        writeln!(text, "    {side}: lateness p50 {p50:.0} µs, p99 {p99:.0} µs, max {max:.0} µs; {policy}")?;
+    }
+    Ok(())
+}
+
 fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {
     let strategies = || run.cases.iter().map(|case| &case.strategies);
-    let us = |ns: u64| ns as f64 * 1e-3;
     if strategies().any(|strategies| strategies.dynamic_free_run.is_some()) {
         writeln!(text, "\nFree-run at {} Hz, from the scheduled time", run.settings.rate_hz)?;
     }
     for case in &run.cases {
-        let free_run = case.strategies.dynamic_free_run.as_ref();
-        let Some(timing) = free_run.and_then(|strategy| strategy.timing.as_ref()) else {
-            continue;
-        };
-        let lateness = &timing.release_lateness;
-        writeln!(
-            text,
-            "  {}: {} ticks, lateness p50 {:.0} µs, p99 {:.0} µs, max {:.0} µs; {} deadline misses, {} skipped; {}",
-            case.tissue,
-            timing.ticks,
-            us(lateness.p50_ns),
-            us(lateness.p99_ns),
-            us(lateness.max_ns),
-            timing.deadline_misses,
-            timing.skipped,
-            timing.scheduling.policy,
-        )?;
+        if let Some(free_run) = &case.strategies.dynamic_free_run {
+            write_free_run(text, case, free_run)?;
+        }
     }
     let ledgers: Vec<_> = strategies()
         .flat_map(|strategies| [&strategies.dynamic, &strategies.dynamic_free_run])
@@ -150,9 +161,11 @@ fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {
         .collect();
     let ticks: u64 = ledgers.iter().map(|ledger| ledger.ticks.due).sum();
     let unaccounted: u64 = ledgers.iter().map(|ledger| ledger.unaccounted).sum();
+    let not_recorded: u64 = ledgers.iter().map(|ledger| ledger.not_recorded).sum();
     writeln!(
         text,
-        "Ledger of {} controlled runs: {ticks} ticks due, {unaccounted} ticks or samples unaccounted",
+        "Ledger of {} controlled runs: {ticks} ticks due, {unaccounted} ticks or samples unaccounted, {not_recorded} \
+         ticks not recorded",
         ledgers.len()
     )
 }

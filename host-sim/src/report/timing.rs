@@ -33,6 +33,16 @@ fn distributions(timing: &LoopTiming) -> [(&'static str, &Distribution); 3] {
     ]
 }
 
+/// The same, and the ages of what the actuator acted on: the plant knows them.
+fn all_distributions(timing: &LoopTiming) -> Vec<(&'static str, &Distribution)> {
+    let ages = [
+        ("age of needle and paddle samples at actuation", &timing.input_age),
+        ("age of the target sample at actuation", &timing.target_age),
+    ];
+    let ages = ages.into_iter().filter_map(|(what, of)| of.as_ref().map(|of| (what, of)));
+    distributions(timing).into_iter().chain(ages).collect()
+}
+
 fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3
 }
@@ -93,11 +103,13 @@ fn percentiles(run: &RunResult) -> Markup {
                 th { "loop" } th.left { "duration" } th { "ticks" } th { "min" } th { "mean" } th { "p50" } th { "p99" }
                 th { "p99.9" } th { "p99.99" } th { "max" }
             } }
-            tbody { @for (name, timing) in loops(run) { @for (what, of) in distributions(timing) {
+            tbody { @for (name, timing) in loops(run) { @for (what, of) in all_distributions(timing) {
                 tr {
                     td { (name) } td.left { (what) } td { (count(of.count)) } td { (number(us(of.min_ns), 3)) }
                     td { (number(of.mean_ns * 1e-3, 3)) }
-                    @for ns in [of.p50_ns, of.p99_ns, of.p999_ns, of.p9999_ns, of.max_ns] { td { (number(us(ns), 3)) } }
+                    @for ns in [Some(of.p50_ns), Some(of.p99_ns), Some(of.p999_ns), of.p9999_ns, Some(of.max_ns)] {
+                        td { @if let Some(ns) = ns { (number(us(ns), 3)) } @else { "–" } }
+                    }
                 }
             } } }
         } }
@@ -143,7 +155,9 @@ pub(super) fn section(run: &RunResult) -> Markup {
             p.quiet {
                 "Release lateness is start minus scheduled release, execution time end minus start, response time end \
                  minus scheduled release. A deadline miss is a response longer than the period. A period that had passed \
-                 already is skipped, never made up for. Both axes are logarithmic: one late tick in thousands is seen."
+                 already is skipped, never made up for; its release is a miss too, late until the next step: a stop is \
+                 in these figures from the first release that it swallowed. The 99.99th percentile needs 10,000 values. \
+                 Both axes are logarithmic: one late tick in thousands is seen."
             }
             p.notice {
                 "What this does not say: nothing here is a guarantee. It is a measurement on a general-purpose operating \

@@ -2,8 +2,10 @@
 
 use std::fmt::Write as _;
 
-use crate::bench::timing::TimingResult;
+use crate::bench::timing::{LeftRun, SweepResult, TimingResult};
 use crate::runtime::durations::{Distribution, LoopTiming};
+use crate::runtime::ledger::TickResult;
+use crate::runtime::names;
 
 fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3
@@ -26,12 +28,12 @@ fn cyclictest(number: usize, priority: u8, timing: &LoopTiming, last_ns: u64) ->
 }
 
 fn percentiles(what: &str, of: &Distribution) -> String {
+    let rare = of.p9999_ns.map_or_else(|| format!("{:>8}", "–"), |ns| format!("{:8.2}", us(ns)));
     format!(
-        "  {what:<34} p50 {:8.2}  p99 {:8.2}  p99.9 {:8.2}  p99.99 {:8.2}  max {:9.2} µs",
+        "  {what:<34} p50 {:8.2}  p99 {:8.2}  p99.9 {:8.2}  p99.99 {rare}  max {:9.2} µs",
         us(of.p50_ns),
         us(of.p99_ns),
         us(of.p999_ns),
-        us(of.p9999_ns),
         us(of.max_ns),
     )
 }
@@ -67,40 +69,70 @@ fn write_loops(text: &mut String, result: &TimingResult, priority: u8) -> std::f
     let loops = [("empty loop", &result.empty), ("controller", &result.controller), ("exchange", &result.exchange)];
     for (number, ((name, timing), more)) in loops.into_iter().zip(&result.blocks).enumerate() {
         writeln!(text, "{}  {name}", cyclictest(number, priority, timing, more.last_lateness_ns))?;
-        writeln!(text, "{}", percentiles("wake latency", &timing.release_lateness))?;
-        writeln!(text, "{}", percentiles("execution", &timing.execution_time))?;
-        if let Some(age) = &more.input_age {
-            writeln!(text, "{}", percentiles("input age at actuation", age))?;
-        }
-        writeln!(text, "{}", percentiles("end to end", more.end_to_end.as_ref().unwrap_or(&timing.response_time)))?;
+        write_loop(text, timing, more.input_age.as_ref())?;
         let disturbance = &more.disturbance;
         writeln!(
             text,
-            "  deadline misses {}, overruns {}, skipped {}; context switches {} voluntary, {} involuntary; steal {} ms; \
-             void blocks {} of {}",
-            timing.deadline_misses,
-            timing.overruns,
-            timing.skipped,
+            "  context switches {} voluntary, {} involuntary; steal {} ms; void blocks {} of {}",
             disturbance.voluntary_switches,
             disturbance.involuntary_switches,
             disturbance.steal_ms.map_or_else(|| "?".to_owned(), |steal| steal.to_string()),
             more.voided_blocks,
             more.blocks,
         )?;
+        for outside in &more.outside_run {
+            writeln!(text, "  outside of RUN:")?;
+            write_loop(text, outside, None)?;
+        }
     }
+    write_void(text, result)?;
     writeln!(text, "{}", ratio("median wake latency, controller / empty loop", &result.lateness_ratios))?;
     writeln!(text, "{}", ratio("median wake latency, exchange / empty loop", &result.exchange_lateness_ratios))?;
-    let ticks = &result.ledger;
+    write_ledger(text, "controller", &result.ledger)?;
+    write_ledger(text, "exchange", &result.exchange_ledger)
+}
+
+/// A loop's figures, labelled by the controller's mode.
+fn write_loop(text: &mut String, timing: &LoopTiming, input_age: Option<&Distribution>) -> std::fmt::Result {
+    let mode = timing.mode.map_or_else(String::new, |mode| format!("{}: ", mode.name()));
+    let label = |what: &str| format!("{mode}{what}");
+    writeln!(text, "{}", percentiles(&label("wake latency"), &timing.release_lateness))?;
+    writeln!(text, "{}", percentiles(&label("execution"), &timing.execution_time))?;
+    if let Some(age) = input_age {
+        writeln!(text, "{}", percentiles(&label("input age at actuation"), age))?;
+    }
+    writeln!(text, "{}", percentiles(&label("end to end"), &timing.response_time))?;
     writeln!(
         text,
-        "ledger: {} due = {} RUN + {} HOLD + {} SAFE + {} skipped, unaccounted {}",
+        "  {} {}, overruns {}, skipped {}",
+        label("deadline misses"),
+        timing.deadline_misses,
+        timing.overruns,
+        timing.skipped
+    )
+}
+
+/// Which rounds say nothing about RUN, and why.
+fn write_void(text: &mut String, result: &TimingResult) -> std::fmt::Result {
+    for left in &result.left_run {
+        let LeftRun { measurement, round, tick, mode, faults } = left;
+        let mode = names::mode::name(*mode);
+        writeln!(text, "VOID: {measurement}, round {round}: RUN ended in {mode} at release {tick}: {faults}")?;
+    }
+    Ok(())
+}
+
+fn write_ledger(text: &mut String, name: &str, ticks: &TickResult) -> std::fmt::Result {
+    writeln!(
+        text,
+        "ledger, {name}: {} due = {} RUN + {} HOLD + {} SAFE + {} skipped, unaccounted {}",
         ticks.due, ticks.run, ticks.hold, ticks.safe, ticks.skipped, ticks.unaccounted
     )
 }
 
 /// Steps and exchanges without a schedule, and the sweep.
 fn write_exchanges(text: &mut String, result: &TimingResult) -> std::fmt::Result {
-    writeln!(text, "back to back:")?;
+    writeln!(text, "back to back, in RUN:")?;
     writeln!(text, "{}", percentiles("clock read twice", &result.clock))?;
     writeln!(text, "{}", percentiles("step, with both clock readings", &result.step))?;
     writeln!(text, "sample published to command received, both sides polling:")?;
@@ -110,15 +142,19 @@ fn write_exchanges(text: &mut String, result: &TimingResult) -> std::fmt::Result
     }
     writeln!(text, "{}", ratio("medians, shared memory / bare iceoryx2", &result.link_over_bare))?;
     writeln!(text, "{}", ratio("medians, Unix socket / shared memory", &result.socket_over_link))?;
-    for (rate, ticks, misses, skipped) in &result.sweep {
-        writeln!(text, "sweep: {rate:6.0} Hz, {ticks:6} ticks: {misses} deadline misses, {skipped} skipped")?;
+    for SweepResult { rate_hz, ticks, deadline_misses } in &result.sweep {
+        writeln!(
+            text,
+            "sweep: {rate_hz:6.0} Hz, {:6} releases, {} in RUN: {deadline_misses} deadline misses, {} skipped",
+            ticks.due, ticks.run, ticks.skipped
+        )?;
     }
     if !result.sweep.is_empty() {
         // The highest one below which none was missed either.
-        let clean = result.sweep.iter().take_while(|(_, _, misses, skipped)| misses + skipped == 0).last();
-        match clean {
-            Some((rate, ..)) => writeln!(text, "highest rate without a missed deadline: {rate:.0} Hz")?,
-            None => writeln!(text, "no rate without a missed deadline")?,
+        let is_clean = |rate: &&SweepResult| rate.deadline_misses == 0 && rate.ticks.run == rate.ticks.due;
+        match result.sweep.iter().take_while(is_clean).last() {
+            Some(rate) => writeln!(text, "highest rate in RUN without a missed deadline: {:.0} Hz", rate.rate_hz)?,
+            None => writeln!(text, "no rate in RUN without a missed deadline")?,
         }
     }
     writeln!(text, "This describes this machine while it ran: no worst case, and nothing about hard real time.")

@@ -110,6 +110,7 @@ impl ControllerAccounts {
             paddle: stream(&self.paddle, paddle),
             command: command.result(self.commands),
             ticks: self.ticks,
+            not_recorded: self.not_kept,
             unaccounted: 0,
         };
         ledger.unaccounted = [&ledger.needle, &ledger.target, &ledger.paddle, &ledger.command]

@@ -76,6 +76,21 @@ pub enum RuntimeError {
         /// What it did.
         what: String,
     },
+    /// The controller's table is of another scene than the simulated one.
+    #[error("the controller's table was computed from another scene than the simulated one")]
+    #[diagnostic(help(
+        "give the controller a table of this scene, with the same [discretization], or insist with --allow-other-scene"
+    ))]
+    OtherScene,
+    /// The controller's table is in other units.
+    #[error("the controller's table is in {}, the scene in {}", found.join(" and "), expected.join(" and "))]
+    #[diagnostic(help("give the controller a table of this scene"))]
+    OtherUnits {
+        /// Units of length and stress in the table.
+        found: [String; 2],
+        /// Those of the scene.
+        expected: [String; 2],
+    },
     /// The user, or somebody else, asked for the end.
     #[error("stopped by {signal}; nothing was written")]
     Interrupted {

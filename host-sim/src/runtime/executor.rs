@@ -151,6 +151,15 @@ impl AnyTable {
         }
     }
 
+    /// Labels of its units of length and stress.
+    pub fn units(&self) -> [String; 2] {
+        let units = match self {
+            Self::F32(table) => &table.units,
+            Self::F64(table) => &table.units,
+        };
+        [units.length.as_str().to_owned(), units.stress.as_str().to_owned()]
+    }
+
     /// The controller in this process.
     ///
     /// # Errors

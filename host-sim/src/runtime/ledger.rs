@@ -16,6 +16,9 @@ pub struct LedgerResult {
     pub command: StreamResult,
     /// Ticks.
     pub ticks: TickResult,
+    /// Ticks that the controller ran and had no room for in its record: they are in no recording and no replay.
+    #[serde(default)]
+    pub not_recorded: u64,
     /// Sum of everything without an entry: 0.
     pub unaccounted: u64,
 }

@@ -2,11 +2,16 @@
 
 use std::sync::Arc;
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 
+use super::clock;
 use super::error::RuntimeError;
+
+/// Longest sleep without a look at signals, ns: one that comes between the look and the sleep waits no longer than this.
+const SLEEP_NS: u64 = 100_000_000;
 
 static RECEIVED: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
 
@@ -36,4 +41,53 @@ pub fn check() -> Result<(), RuntimeError> {
         _ => return Ok(()),
     };
     Err(RuntimeError::Interrupted { signal })
+}
+
+/// Sleeps until an absolute time of the steady clock, ns, or until a signal asks for the end.
+///
+/// # Errors
+/// [`RuntimeError::Interrupted`].
+pub fn sleep_until(time_ns: u64) -> Result<(), RuntimeError> {
+    check()?;
+    loop {
+        let now_ns = clock::now_ns();
+        if now_ns >= time_ns {
+            return Ok(());
+        }
+        clock::sleep_until(time_ns.min(now_ns + SLEEP_NS));
+        check()?;
+    }
+}
+
+/// How often a computation that looks at no signals is looked after.
+const BETWEEN_LOOKS: Duration = Duration::from_millis(50);
+
+/// Does something long that looks at no signal and leaves nothing to tidy up: a signal ends the process meanwhile, with
+/// exit code 1 and a word on stderr.
+pub fn ends_at_once<T>(work: impl FnOnce() -> T) -> T {
+    /// Tells the watcher, also when the work panics.
+    struct Done<'d>(&'d AtomicBool);
+    impl Drop for Done<'_> {
+        fn drop(&mut self) {
+            self.0.store(true, Ordering::Release);
+        }
+    }
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watcher = scope.spawn(|| {
+            while !done.load(Ordering::Acquire) {
+                if let Err(interrupted) = check() {
+                    eprintln!("Error: {interrupted}");
+                    std::process::exit(1);
+                }
+                std::thread::park_timeout(BETWEEN_LOOKS);
+            }
+        });
+        let finished = {
+            let _done = Done(&done);
+            work()
+        };
+        watcher.thread().unpark();
+        finished
+    })
 }

@@ -22,6 +22,22 @@ pub enum WorldError {
         /// Why.
         source: Failure,
     },
+    /// The tissue's step takes longer than the loop has time for.
+    #[error(
+        "the simulated tissue takes {step_us:.0} µs a step and cannot keep a period of {period_us:.0} µs: at most \
+         {rate_hz:.0} Hz"
+    )]
+    #[diagnostic(help(
+        "lower --rate, try --plant reduced or --plant condensed, or use --mode lockstep, which has no clock"
+    ))]
+    TooSlow {
+        /// Median duration of a step, µs.
+        step_us: f64,
+        /// Period of the loop, µs.
+        period_us: f64,
+        /// Highest rate that this tissue keeps, Hz.
+        rate_hz: f64,
+    },
     /// The reduced model that was asked for cannot be trained.
     #[error("no reduced model of the tissue: {0}")]
     #[diagnostic(help("use --plant full, or --plant auto to have the full model where no reduced one can be made"))]

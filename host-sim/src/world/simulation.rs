@@ -36,8 +36,9 @@ pub struct Simulation {
     pub actuator: ActuatorModel,
     /// Seed of the sensors' noise.
     pub seed: u64,
-    /// What answers for the tissue.
-    pub plant: PlantChoice,
+    /// What answers for the tissue; none: the full model, or the reduced one where the clock drives time and the full
+    /// one cannot keep the period.
+    pub plant: Option<PlantChoice>,
 }
 
 impl Simulation {
@@ -45,8 +46,8 @@ impl Simulation {
     pub fn new(scene: &Scene) -> Self {
         let actuator = ActuatorModel { max_rate: scene.actuator.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
         let loop_settings = LoopSettings::default();
-        let plant = PlantChoice::default();
-        Self { loop_settings, insertion_s: 0.0, duration_s: 0.0, depth: scene.needle.depth, actuator, seed: 1, plant }
+        let depth = scene.needle.depth;
+        Self { loop_settings, insertion_s: 0.0, duration_s: 0.0, depth, actuator, seed: 1, plant: None }
             .with_insertion(5.0)
     }
 

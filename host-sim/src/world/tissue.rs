@@ -59,6 +59,9 @@ pub struct PlantAccount {
     /// Why, the first time; or why there is no reduced model.
     #[serde(default)]
     pub first_fallback: Option<String>,
+    /// What a step of the full model takes, µs, where the reduced one stands in because that is too long.
+    #[serde(default)]
+    pub full_step_us: Option<f64>,
     /// Largest error of the target displacement that the reduced model estimated of itself, length.
     #[serde(default)]
     pub largest_estimate: Option<f64>,
@@ -76,6 +79,7 @@ impl Default for PlantAccount {
             points: None,
             fallbacks: 0,
             first_fallback: None,
+            full_step_us: None,
             largest_estimate: None,
             error_at_end: None,
         }
@@ -158,6 +162,23 @@ impl<'m> TissuePlant<'m> {
         let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
         let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
         Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account }
+    }
+
+    /// Notes that this model answers because the full one takes so long, µs a step.
+    pub fn stands_in_for_full(&mut self, full_step_us: f64) {
+        self.account.full_step_us = Some(full_step_us);
+    }
+
+    /// Does something with the tissue that is no part of the run: its account is as before, and it is at rest.
+    ///
+    /// # Errors
+    /// [`WorldError::Tissue`].
+    pub fn aside(&mut self, act: impl FnOnce(&mut Self) -> Result<(), WorldError>) -> Result<(), WorldError> {
+        let account = self.account.clone();
+        act(self)?;
+        self.step(0.0, Vector2::zeros())?;
+        self.account = account;
+        Ok(())
     }
 
     /// The coefficients behind the present state, where the model has them (the condensed one has not).

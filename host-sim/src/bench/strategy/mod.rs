@@ -183,7 +183,7 @@ impl<'a> Insertion<'a> {
         }
         let mut result = measure(model, &mut plant, RunMode::Lockstep, paddle, simulation.seed);
         let normal = model.scene().needle.orthogonal();
-        let series = csv::insertion(plant.truths(), &[], &normal, 0);
+        let series = csv::insertion(plant.truths(), &[], &normal, &model.scene().length_unit);
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         result.csv = Some(artifacts[0].name.clone());
         if extras.vtu {
@@ -198,8 +198,10 @@ impl<'a> Insertion<'a> {
     /// [`SimError`].
     pub fn controlled(&self, controller: &ControllerSetup<'_>) -> Result<Measured, SimError> {
         let Self { model, simulation, label, .. } = *self;
+        // Before there is anything to tidy up: a reduced model is trained here, which looks at no signal.
+        let plant = signals::ends_at_once(|| self.plant(controller))?;
         let space = Space::unique()?;
-        let outcome = self.in_space(controller, &space);
+        let outcome = self.in_space(controller, &space, plant);
         space.leave::<ipc::Service>(Departure::Last);
         let mut run = outcome?;
 
@@ -247,7 +249,7 @@ impl<'a> Insertion<'a> {
     ) -> Result<Vec<Artifact>, SimError> {
         let Self { model, label, extras, .. } = *self;
         let normal = model.scene().needle.orthogonal();
-        let series = csv::insertion(truths, &recording.records, &normal, started_ns);
+        let series = csv::insertion(truths, &recording.records, &normal, &model.scene().length_unit);
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         if extras.mcap {
             let name = label.file("mcap");
@@ -263,13 +265,28 @@ impl<'a> Insertion<'a> {
         Ok(artifacts)
     }
 
+    /// The simulated world before its first tick.
+    fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<'a>, SimError> {
+        let Self { model, simulation, .. } = *self;
+        let paddle = Some(controller.table.paddle.index);
+        let world = match controller.mode {
+            RunMode::Lockstep => World::new(model, paddle, simulation)?,
+            RunMode::FreeRun => World::in_time(model, paddle, simulation)?,
+        };
+        Ok(PlantLoop::new(world, simulation))
+    }
+
     /// Starts the controller, runs the insertion, and closes the accounts.
-    fn in_space(&self, controller: &ControllerSetup<'_>, space: &Space) -> Result<Finished<'a>, SimError> {
+    fn in_space(
+        &self,
+        controller: &ControllerSetup<'_>,
+        space: &Space,
+        mut plant: PlantLoop<'a>,
+    ) -> Result<Finished<'a>, SimError> {
         let Self { model, simulation, .. } = *self;
         let table = space.root().join("controller.table");
         std::fs::write(&table, controller.table_bytes).map_err(FileError::write(&table))?;
         let paddle = controller.table.paddle.index;
-        let mut plant = PlantLoop::new(World::new(model, Some(paddle), simulation)?, simulation);
         let mut ports = PlantPorts::<ipc::Service>::open(space)?;
         let mut peer = Peer::Child(self.start(controller, space, &table)?);
         let mut patience = Patience::new(PEER_TIMEOUT);
@@ -330,7 +347,8 @@ impl<'a> Insertion<'a> {
                 Ok((lockstep::run(plant, ports, peer, &pace, self.progress)?, None))
             }
             RunMode::FreeRun => {
-                let free_run = FreeRun { ports, peer, rate_hz, period_ns, succession: None };
+                let patience = PEER_TIMEOUT;
+                let free_run = FreeRun { ports, peer, rate_hz, period_ns, patience, succession: None };
                 let (account, timing) = free_run.run(plant, self.progress)?;
                 Ok((account, Some(timing)))
             }

@@ -7,24 +7,25 @@
 
 mod blocks;
 pub mod machine;
+mod own;
 mod partner;
 pub mod peer;
 mod stimulus;
 
 use std::path::PathBuf;
 
-use firmware::contract::{PaddleCommand, Table};
-use firmware::{Controller, Inputs, State};
+use firmware::Controller;
+use firmware::contract::Table;
 use model_offline::table::to_bytes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use self::blocks::BlockResult;
-use self::blocks::{Blocks, ratios};
+pub use self::blocks::{BlockResult, LeftRun};
+use self::blocks::{Blocks, Finished, Stamps, ratios};
 use self::machine::{Disturbance, pin, unpin};
+use self::own::Own;
 use self::partner::{Partner, Running};
 use self::peer::Transport;
-use self::stimulus::Stimulus;
 use super::error::SimError;
 use super::paper_table::paper_table;
 use crate::record::error::FileError;
@@ -41,6 +42,8 @@ const ROUNDS: u64 = 5;
 /// real-time threads to 95 % of each second never steps in.
 const STEPS: u64 = 200_000;
 const EXCHANGES: u64 = 20_000;
+/// Of these, between two looks at signals.
+const STEPS_PER_LOOK: u64 = 1024;
 /// Rates of the sweep, Hz, and how long each, s.
 const SWEEP_HZ: [f64; 7] = [100.0, 200.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0];
 const SWEEP_S: f64 = 2.0;
@@ -67,9 +70,9 @@ pub struct TimingOptions {
 pub struct TimingResult {
     /// The loop that does nothing. Its execution time is what reading the clock twice costs.
     pub empty: LoopTiming,
-    /// The loop with the controller's step.
+    /// The loop with the controller's step, in RUN.
     pub controller: LoopTiming,
-    /// The loop that publishes samples and waits for the command of a controller process.
+    /// The loop that publishes samples and waits for the command of a controller process, in RUN.
     pub exchange: LoopTiming,
     /// Median lateness of the controller's loop over that of the empty loop, block by block.
     pub lateness_ratios: Vec<f64>,
@@ -77,9 +80,15 @@ pub struct TimingResult {
     pub exchange_lateness_ratios: Vec<f64>,
     /// More about these loops, in this order.
     pub blocks: Vec<BlockResult>,
-    /// Ticks of the controller's ledger over all blocks.
+    /// Releases of the controller's loop over all blocks, by its mode.
     pub ledger: TickResult,
-    /// The controller's step back to back: warm caches, no sleep before it.
+    /// The same of the loop with the exchange.
+    #[serde(default)]
+    pub exchange_ledger: TickResult,
+    /// Rounds that are void because their controller did not stay in RUN.
+    #[serde(default)]
+    pub left_run: Vec<LeftRun>,
+    /// The controller's step back to back in RUN: warm caches, no sleep before it.
     pub step: Distribution,
     /// Reading the clock twice, back to back.
     pub clock: Distribution,
@@ -89,12 +98,23 @@ pub struct TimingResult {
     pub link_over_bare: Vec<f64>,
     /// Median of the Unix socket over that of the link, block by block.
     pub socket_over_link: Vec<f64>,
-    /// Rates of the sweep, Hz, with ticks, deadline misses and periods skipped.
-    pub sweep: Vec<(f64, u64, u64, u64)>,
+    /// Rates of the sweep.
+    pub sweep: Vec<SweepResult>,
     /// Time that the host took away from this machine, all processors, ms; none where the kernel does not say.
     pub steal_ms: Option<u64>,
     /// Whether threads stay on the processors that were asked for.
     pub pinned: bool,
+}
+
+/// One rate of the sweep.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SweepResult {
+    /// Rate, Hz.
+    pub rate_hz: f64,
+    /// Releases by the controller's mode.
+    pub ticks: TickResult,
+    /// Releases that were not answered within a period, in any mode.
+    pub deadline_misses: u64,
 }
 
 /// Settings of a loop at this rate: both processes of an exchange need the same.
@@ -107,7 +127,7 @@ pub fn loop_settings(rate: f64) -> LoopSettings {
 /// # Errors
 /// [`SimError`].
 pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
-    let table = paper_table()?;
+    let table = signals::ends_at_once(paper_table)?;
     let folder = tempfile::tempdir().map_err(RuntimeError::Spawn)?;
     let table_file = folder.path().join("controller.table");
     std::fs::write(&table_file, to_bytes(&table)?).map_err(FileError::write(&table_file))?;
@@ -144,52 +164,11 @@ struct Measurement<'t> {
     scheduling: Scheduling,
 }
 
-/// A controller in this thread, with its samples.
-struct Own {
-    stimulus: Stimulus,
-    state: State<f64>,
-    command: PaddleCommand,
-    /// Number of the first tick of this block: the ledger counts over all blocks.
-    offset: u64,
-    next: u64,
-}
-
-impl Own {
-    fn new(table: &Table<f64, 2>, loop_settings: &LoopSettings) -> Self {
-        let stimulus = Stimulus::new(table, loop_settings);
-        Self { stimulus, state: State::new(), command: PaddleCommand::default(), offset: 0, next: 0 }
-    }
-
-    /// A new block starts: numbers go on.
-    fn start_block(&mut self) {
-        self.offset = self.next;
-    }
-
-    /// What arrives for this tick.
-    fn inputs(&mut self, tick: u64, time_ns: u64) -> Inputs {
-        let samples = self.stimulus.samples(time_ns, self.command.displacement);
-        Inputs { tick, time_ns, needle: Some(samples.needle), target: samples.target, paddle: Some(samples.paddle) }
-    }
-
-    fn answer(&mut self, controller: &Controller<'_, f64>, inputs: &Inputs) {
-        self.command = controller.step(&mut self.state, std::hint::black_box(inputs));
-        std::hint::black_box(&self.command);
-    }
-
-    /// The release `tick` of the block: skipped ones are in the ledger.
-    fn step(&mut self, controller: &Controller<'_, f64>, tick: u64, time_ns: u64) -> blocks::Stamps {
-        let inputs = self.inputs(self.offset + tick, time_ns);
-        self.next = inputs.tick + 1;
-        self.answer(controller, &inputs);
-        None
-    }
-}
-
 impl Measurement<'_> {
     fn measure(&self) -> Result<TimingResult, SimError> {
         let mut result = TimingResult::default();
         self.periodic(&mut result)?;
-        (result.clock, result.step) = self.back_to_back();
+        self.back_to_back(&mut result)?;
         self.polled(&mut result)?;
         if self.options.sweep {
             result.sweep = SWEEP_HZ.into_iter().map(|rate| self.sweep(rate)).collect::<Result<_, _>>()?;
@@ -197,69 +176,73 @@ impl Measurement<'_> {
         Ok(result)
     }
 
-    /// One rate of the sweep: with ticks, deadline misses and periods skipped.
-    fn sweep(&self, rate: f64) -> Result<(f64, u64, u64, u64), SimError> {
-        let loop_settings = LoopSettings { rate, ..self.partner.loop_settings };
-        let mut own = Own::new(self.table, &loop_settings);
+    /// One rate of the sweep.
+    fn sweep(&self, rate_hz: f64) -> Result<SweepResult, SimError> {
+        let loop_settings = LoopSettings { rate: rate_hz, ..self.partner.loop_settings };
         let controller = Controller::new(self.table, &loop_settings.settings(self.table.validity.depth_end))?;
-        let mut blocks = Blocks::new(rate, (SWEEP_S * rate) as u64, &self.scheduling);
-        blocks.block(|tick, time_ns| Ok(own.step(&controller, tick, time_ns)))?;
-        let (timing, _) = blocks.finish();
-        Ok((rate, timing.ticks, timing.deadline_misses, timing.skipped))
+        let mut own = Own::in_run(&controller, self.table, &loop_settings)?;
+        let mut blocks = Blocks::new("sweep", rate_hz, (SWEEP_S * rate_hz) as u64, &self.scheduling);
+        blocks.block(|release| Ok(Stamps { answer: Some(own.step(release.tick)), exchanged_ns: None }))?;
+        let Finished { timing, more, ticks, .. } = blocks.finish();
+        let outside = more.outside_run.iter().map(|timing| timing.deadline_misses).sum::<u64>();
+        Ok(SweepResult { rate_hz, ticks, deadline_misses: timing.deadline_misses + outside })
     }
 
     /// Empty loop, controller, exchange, in turns.
     fn periodic(&self, result: &mut TimingResult) -> Result<(), SimError> {
         let Self { options, partner, .. } = self;
         let ticks = ((options.seconds * options.rate) as u64 / (3 * ROUNDS)).max(1);
-        let [mut empty, mut loaded, mut exchange] =
-            [(); 3].map(|()| Blocks::new(options.rate, ticks, &self.scheduling));
-        let mut own = Own::new(self.table, &partner.loop_settings);
+        let [mut empty, mut loaded, mut exchange] = ["empty loop", "controller", "exchange"]
+            .map(|name| Blocks::new(name, options.rate, ticks, &self.scheduling));
+        let mut not_in_ledger = 0;
         for _ in 0..ROUNDS {
-            empty.block(|_, _| Ok(None))?;
-            own.start_block();
-            loaded.block(|tick, time_ns| Ok(own.step(self.controller, tick, time_ns)))?;
-            let mut running = Running::start(partner, Transport::Link)?;
-            exchange.block(|_, _| running.once().map(Some))?;
+            empty.block(|_| Ok(Stamps::default()))?;
+            let mut own = Own::in_run(self.controller, self.table, &partner.loop_settings)?;
+            let mut started = 0;
+            loaded.block(|release| {
+                started = release.tick + 1;
+                Ok(Stamps { answer: Some(own.step(release.tick)), exchanged_ns: None })
+            })?;
+            let (ledger, before) = own.ledger();
+            not_in_ledger += ledger.unaccounted() + ledger.due.abs_diff(before + started);
+            let mut running = Running::in_run(partner, Transport::Link)?;
+            exchange.block(|release| running.release(release.tick))?;
         }
         result.lateness_ratios = ratios(&loaded.medians_ns, &empty.medians_ns);
         result.exchange_lateness_ratios = ratios(&exchange.medians_ns, &empty.medians_ns);
-        let ledger = own.state.ledger().ticks;
-        // Periods skipped after the last tick of a block are in the schedule only: no tick has come to tell the
-        // controller.
-        let skipped = loaded.skipped();
-        let told = ROUNDS * ticks + ledger.skipped;
-        result.ledger = TickResult {
-            due: ROUNDS * ticks + skipped,
-            run: ledger.run,
-            hold: ledger.hold,
-            safe: ledger.safe,
-            skipped,
-            unaccounted: ledger.unaccounted() + ledger.due.abs_diff(told),
-        };
+        let [empty, loaded, exchange] = [empty, loaded, exchange].map(Blocks::finish);
+        result.ledger = TickResult { unaccounted: loaded.ticks.unaccounted + not_in_ledger, ..loaded.ticks };
+        result.exchange_ledger = exchange.ticks;
         let timings = [&mut result.empty, &mut result.controller, &mut result.exchange];
         for (blocks, timing) in [empty, loaded, exchange].into_iter().zip(timings) {
-            let more;
-            (*timing, more) = blocks.finish();
-            result.blocks.push(more);
+            *timing = blocks.timing;
+            result.blocks.push(blocks.more);
+            result.left_run.extend(blocks.left_run);
         }
         Ok(())
     }
 
     /// Two readings of the clock with nothing between them, and with a step between them.
-    fn back_to_back(&self) -> (Distribution, Distribution) {
+    fn back_to_back(&self, result: &mut TimingResult) -> Result<(), SimError> {
         let (mut clock, mut step) = (Durations::default(), Durations::default());
-        let loop_settings = &self.partner.loop_settings;
-        let mut own = Own::new(self.table, loop_settings);
+        let mut own = Own::in_run(self.controller, self.table, &self.partner.loop_settings)?;
         for tick in 0..STEPS {
+            if tick.is_multiple_of(STEPS_PER_LOOK) {
+                signals::check()?;
+            }
             let start_ns = now_ns();
             clock.record(now_ns() - start_ns);
-            let inputs = own.inputs(tick, tick * loop_settings.period_ns());
+            let inputs = own.inputs(tick);
             let start_ns = now_ns();
-            own.answer(self.controller, &inputs);
+            own.answer(&inputs);
             step.record(now_ns() - start_ns);
+            if let Some(left) = LeftRun::found("step back to back", 1, tick, own.said()) {
+                result.left_run.push(left);
+                break;
+            }
         }
-        (clock.distribution(), step.distribution())
+        (result.clock, result.step) = (clock.distribution(), step.distribution());
+        Ok(())
     }
 
     /// The exchange with both sides polling: link, bare, socket, in turns.
@@ -267,21 +250,16 @@ impl Measurement<'_> {
         let transports = [Transport::Link, Transport::Bare, Transport::Socket];
         let mut all = transports.map(|_| Durations::default());
         let mut medians = transports.map(|_| Vec::new());
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             for ((transport, all), medians) in transports.into_iter().zip(&mut all).zip(&mut medians) {
-                signals::check()?;
-                let mut running = Running::start(&self.partner, transport)?;
+                let mut running = Running::in_run(&self.partner, transport)?;
                 let mut own = Durations::default();
-                // The first ones find cold caches on both sides.
-                for _ in 0..EXCHANGES / 10 {
-                    running.once()?;
-                }
-                for _ in 0..EXCHANGES {
-                    let (start_ns, end_ns) = running.once()?;
-                    own.record(end_ns - start_ns);
-                    all.record(end_ns - start_ns);
-                }
-                medians.push(Some(own.median_ns()));
+                let left_run = exchange_often(&mut running, round, |took_ns| {
+                    own.record(took_ns);
+                    all.record(took_ns);
+                })?;
+                medians.push(left_run.is_none().then(|| own.median_ns()));
+                result.left_run.extend(left_run);
             }
         }
         let [link, bare, socket] = medians;
@@ -290,4 +268,27 @@ impl Measurement<'_> {
         result.polled = all.map(|durations| durations.distribution());
         Ok(())
     }
+}
+
+/// Exchanges back to back, while the controller at the other end stays in RUN.
+fn exchange_often(
+    running: &mut Running,
+    round: u64,
+    mut record: impl FnMut(u64),
+) -> Result<Option<LeftRun>, RuntimeError> {
+    // The first ones find cold caches on both sides.
+    let cold = EXCHANGES / 10;
+    for tick in 0..cold + EXCHANGES {
+        if tick.is_multiple_of(STEPS_PER_LOOK) {
+            signals::check()?;
+        }
+        let stamps = running.exchange(tick)?;
+        if let Some(left) = stamps.answer.and_then(|answer| LeftRun::found(running.name(), round, tick, answer)) {
+            return Ok(Some(left));
+        }
+        if let (true, Some((start_ns, end_ns))) = (tick >= cold, stamps.exchanged_ns) {
+            record(end_ns - start_ns);
+        }
+    }
+    Ok(None)
 }

@@ -9,9 +9,12 @@ use std::time::{Duration, Instant};
 use firmware::contract::{PaddleCommand, Table};
 use iceoryx2::service::ipc;
 
+use super::blocks::{Answer, Stamps};
+use super::own::TICKS_TO_RUN;
 use super::peer::{Bare, DATAGRAM, Transport};
 use super::stimulus::{Samples, Stimulus};
 use crate::exchange::{Departure, PlantPorts, Space};
+use crate::process::dies_with_parent;
 use crate::runtime::child::describe_exit;
 use crate::runtime::clock::now_ns;
 use crate::runtime::error::{Role, RuntimeError};
@@ -20,6 +23,9 @@ use crate::world::loop_settings::LoopSettings;
 
 /// How long the other process may take to be there, and to answer.
 const TIMEOUT: Duration = Duration::from_secs(10);
+
+/// How long it may take to see that nobody is left.
+const LEAVE_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// What all exchanges have in common.
 #[derive(Clone, Debug)]
@@ -38,7 +44,12 @@ pub(super) struct Running {
     child: Child,
     space: Space,
     stimulus: Stimulus,
-    last: [f64; 2],
+    /// The last command; none over plain services, which have no controller.
+    last: Option<PaddleCommand>,
+    transport: Transport,
+    period_ns: u64,
+    /// Exchanges that led to RUN.
+    armed_after: u64,
 }
 
 enum Ends {
@@ -56,7 +67,8 @@ fn child(partner: &Partner<'_>, exchange: &str, space: &Space, stdin: Stdio) -> 
     if let Some(cpu) = partner.cpu {
         command.args(["--cpu", &cpu.to_string()]);
     }
-    command.stdin(stdin).stdout(Stdio::null()).spawn().map_err(RuntimeError::Spawn)
+    command.stdin(stdin).stdout(Stdio::null());
+    dies_with_parent(&mut command).spawn().map_err(RuntimeError::Spawn)
 }
 
 fn wait(child: &mut Child, ready: impl Fn() -> bool) -> Result<(), RuntimeError> {
@@ -75,8 +87,26 @@ fn wait(child: &mut Child, ready: impl Fn() -> bool) -> Result<(), RuntimeError>
 }
 
 impl Running {
-    /// Starts the other process and waits until it polls.
-    pub(super) fn start(partner: &Partner<'_>, transport: Transport) -> Result<Self, RuntimeError> {
+    /// Starts the other process, waits until it polls, and brings its controller to RUN.
+    pub(super) fn in_run(partner: &Partner<'_>, transport: Transport) -> Result<Self, RuntimeError> {
+        let mut running = Self::start(partner, transport)?;
+        if transport == Transport::Bare {
+            return Ok(running);
+        }
+        for tick in 0..TICKS_TO_RUN {
+            signals::check()?;
+            let stamps = running.at(tick)?;
+            if stamps.answer.is_some_and(Answer::is_run) {
+                running.armed_after = tick + 1;
+                running.stimulus.start_needle(running.armed_after * running.period_ns);
+                return Ok(running);
+            }
+        }
+        let answer = Answer::of(&running.last.unwrap_or_default());
+        Err(answer.never_armed(TICKS_TO_RUN, running.period_ns))
+    }
+
+    fn start(partner: &Partner<'_>, transport: Transport) -> Result<Self, RuntimeError> {
         let space = Space::unique()?;
         let stimulus = Stimulus::new(partner.table, &partner.loop_settings);
         let (ends, mut child) = match transport {
@@ -104,30 +134,54 @@ impl Running {
         }
         // It has to reach its polling loop.
         std::thread::sleep(Duration::from_millis(20));
-        Ok(Self { ends, child, space, stimulus, last: [0.0; 2] })
+        let period_ns = partner.loop_settings.period_ns();
+        Ok(Self { ends, child, space, stimulus, last: None, transport, period_ns, armed_after: 0 })
     }
 
-    /// One exchange; returns when the sample was published and when the command was received, ns.
-    pub(super) fn once(&mut self) -> Result<(u64, u64), RuntimeError> {
+    /// What is exchanged, for people.
+    pub(super) const fn name(&self) -> &'static str {
+        match self.transport {
+            Transport::Link => "exchange over shared memory",
+            Transport::Bare => "bare iceoryx2",
+            Transport::Socket => "exchange over a Unix socket",
+        }
+    }
+
+    /// The exchange of a release since RUN, skipped ones included: when its input was measured, and when the command
+    /// was there.
+    pub(super) fn release(&mut self, tick: u64) -> Result<Stamps, RuntimeError> {
         let measured_ns = now_ns();
-        let samples = self.stimulus.samples(measured_ns, self.last);
-        match &mut self.ends {
+        let stamps = self.exchange(tick)?;
+        Ok(Stamps { exchanged_ns: stamps.exchanged_ns.map(|(_, command_ns)| (measured_ns, command_ns)), ..stamps })
+    }
+
+    /// One exchange; says when the sample was published and when the command was received, ns.
+    pub(super) fn exchange(&mut self, tick: u64) -> Result<Stamps, RuntimeError> {
+        self.at(self.armed_after + tick)
+    }
+
+    fn at(&mut self, tick: u64) -> Result<Stamps, RuntimeError> {
+        let samples = self.stimulus.samples(tick * self.period_ns, self.last.unwrap_or_default().displacement);
+        let exchanged_ns = match &mut self.ends {
             Ends::Link(ports) => over_link(ports, &samples, &mut self.last),
-            Ends::Bare(bare) => over_bare(bare, measured_ns),
+            Ends::Bare(bare) => over_bare(bare, tick),
             Ends::Socket(socket) => over_socket(socket, &samples, &mut self.last),
             Ends::Closed => Err(silent()),
-        }
+        }?;
+        Ok(Stamps { answer: self.last.as_ref().map(Answer::of), exchanged_ns: Some(exchanged_ns) })
     }
 }
 
+/// Why no answer was waited for any longer.
 fn silent() -> RuntimeError {
-    RuntimeError::PeerSilent { peer: Role::TimingPeer, silent_s: TIMEOUT.as_secs_f64() }
+    let silent = RuntimeError::PeerSilent { peer: Role::TimingPeer, silent_s: TIMEOUT.as_secs_f64() };
+    signals::check().err().unwrap_or(silent)
 }
 
 fn over_link(
     ports: &mut PlantPorts<ipc::Service>,
     samples: &Samples,
-    last: &mut [f64; 2],
+    last: &mut Option<PaddleCommand>,
 ) -> Result<(u64, u64), RuntimeError> {
     // The needle is what the other side polls: it comes last, when all is there.
     ports.paddle.send(samples.paddle)?;
@@ -142,13 +196,13 @@ fn over_link(
         !matches!(outcome, Ok(None))
     });
     let end_ns = now_ns();
-    *last = outcome?.ok_or_else(silent)?.displacement;
+    *last = Some(outcome?.ok_or_else(silent)?);
     Ok((start_ns, end_ns))
 }
 
-fn over_bare(bare: &Bare, measured_ns: u64) -> Result<(u64, u64), RuntimeError> {
+fn over_bare(bare: &Bare, tick: u64) -> Result<(u64, u64), RuntimeError> {
     let start_ns = now_ns();
-    bare.send([measured_ns; 8])?;
+    bare.send([tick; 8])?;
     let mut outcome = Ok(None);
     spin(|| {
         outcome = bare.receive();
@@ -159,7 +213,11 @@ fn over_bare(bare: &Bare, measured_ns: u64) -> Result<(u64, u64), RuntimeError> 
     Ok((start_ns, end_ns))
 }
 
-fn over_socket(socket: &UnixDatagram, samples: &Samples, last: &mut [f64; 2]) -> Result<(u64, u64), RuntimeError> {
+fn over_socket(
+    socket: &UnixDatagram,
+    samples: &Samples,
+    last: &mut Option<PaddleCommand>,
+) -> Result<(u64, u64), RuntimeError> {
     let mut buffer = [0; DATAGRAM];
     let start_ns = now_ns();
     let datagram = (samples.needle, samples.target, samples.paddle);
@@ -173,7 +231,7 @@ fn over_socket(socket: &UnixDatagram, samples: &Samples, last: &mut [f64; 2]) ->
     });
     let command = length.and_then(|length| postcard::from_bytes::<PaddleCommand>(&answer[..length]).ok());
     let end_ns = now_ns();
-    *last = command.ok_or_else(silent)?.displacement;
+    *last = Some(command.ok_or_else(silent)?);
     Ok((start_ns, end_ns))
 }
 
@@ -184,7 +242,8 @@ impl Drop for Running {
         }
         self.ends = Ends::Closed;
         // It has seen by itself that nobody is left; an unreaped child would count as alive.
-        let until = Instant::now() + Duration::from_secs(2);
+        let patience = if signals::check().is_ok() { LEAVE_TIMEOUT } else { Duration::from_millis(100) };
+        let until = Instant::now() + patience;
         while !matches!(self.child.try_wait(), Ok(Some(_))) {
             if Instant::now() > until {
                 let _ = self.child.kill();
@@ -203,7 +262,10 @@ fn spin(mut done: impl FnMut() -> bool) {
     while !done() {
         std::hint::spin_loop();
         polls = polls.wrapping_add(1);
-        if polls.is_multiple_of(1 << 16) && since.get_or_insert_with(Instant::now).elapsed() > TIMEOUT {
+        if !polls.is_multiple_of(1 << 16) {
+            continue;
+        }
+        if signals::check().is_err() || since.get_or_insert_with(Instant::now).elapsed() > TIMEOUT {
             return;
         }
     }

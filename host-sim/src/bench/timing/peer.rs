@@ -64,7 +64,11 @@ pub(super) const DATAGRAM: usize = 256;
 /// [`RuntimeError`].
 pub fn answer(options: &PeerOptions<'_>) -> Result<(), RuntimeError> {
     let settings = options.loop_settings.settings(options.table.validity.depth_end);
-    let mut stepper = Stepper { controller: Controller::new(options.table, &settings)?, state: State::new(), tick: 0 };
+    let mut stepper = Stepper {
+        controller: Controller::new(options.table, &settings)?,
+        state: State::new(),
+        period_ns: options.loop_settings.period_ns(),
+    };
     if let Some(processor) = options.cpu {
         pin(processor);
     }
@@ -81,7 +85,7 @@ pub fn answer(options: &PeerOptions<'_>) -> Result<(), RuntimeError> {
 struct Stepper<'t> {
     controller: Controller<'t, f64>,
     state: State<f64>,
-    tick: u64,
+    period_ns: u64,
 }
 
 impl Stepper<'_> {
@@ -89,8 +93,9 @@ impl Stepper<'_> {
         &mut self,
         (needle, target, paddle): (NeedleSample, Option<TargetSample>, Option<PaddleSample>),
     ) -> PaddleCommand {
-        let inputs = Inputs { tick: self.tick, time_ns: needle.time_ns, needle: Some(needle), target, paddle };
-        self.tick += 1;
+        // Samples are measured at releases: their time says which, and skipped ones leave gaps.
+        let (tick, time_ns) = (needle.time_ns / self.period_ns, needle.time_ns);
+        let inputs = Inputs { tick, time_ns, needle: Some(needle), target, paddle };
         self.controller.step(&mut self.state, &inputs)
     }
 }

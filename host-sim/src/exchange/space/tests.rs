@@ -130,7 +130,8 @@ fn what_the_dead_have_left_is_swept_and_what_the_living_have_is_not() {
     let living = Space::unique().unwrap();
     let [left, kept] = [&dead, &living].map(|space| plant(name_of_a_file(space, "memory")));
     let swept = sweep();
-    assert!(swept.contains(&dead.name) && !swept.contains(&living.name), "{swept:?}");
+    // Another sweep of the same moment may have been first.
+    assert!(!swept.contains(&living.name), "{swept:?}");
     assert!(!left.exists() && !dead.root().exists());
     assert!(kept.exists() && living.root().exists());
     living.leave::<ipc::Service>(Departure::First);

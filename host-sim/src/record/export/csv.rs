@@ -7,95 +7,105 @@ use nalgebra::Vector2;
 use crate::record::recording::{Record, Recording};
 use crate::world::truth::Truth;
 
-/// What the plant saw of an insertion: one line per tick of the plant.
-const INSERTION: [&str; 14] = [
-    "time_s",
-    "tick",
-    "depth",
-    "target_x",
-    "target_y",
-    "orthogonal_error",
-    "paddle_x",
-    "paddle_y",
-    "command_x",
-    "command_y",
-    "measured_target_x",
-    "measured_target_y",
-    "state",
-    "faults",
+/// What the plant saw of an insertion: one line per tick of the plant. `{}` is the unit of length.
+const INSERTION: [&str; 16] = [
+    "time [s]",
+    "tick [1]",
+    "true_depth [{}]",
+    "true_target_x [{}]",
+    "true_target_y [{}]",
+    "true_orthogonal_error [{}]",
+    "true_paddle_x [{}]",
+    "true_paddle_y [{}]",
+    "command_x [{}]",
+    "command_y [{}]",
+    "measured_target_x [{}]",
+    "measured_target_y [{}]",
+    "measured_paddle_x [{}]",
+    "measured_paddle_y [{}]",
+    "state [name]",
+    "faults [names]",
 ];
 
 /// What is in a recording: one line per tick of the controller.
-const RECORDING: [&str; 16] = [
-    "time_s",
-    "tick",
-    "needle_depth",
-    "needle_velocity",
-    "target_x",
-    "target_y",
-    "paddle_x",
-    "paddle_y",
-    "command_x",
-    "command_y",
-    "state",
-    "faults",
-    "true_depth",
-    "true_target_x",
-    "true_target_y",
-    "true_orthogonal_error",
+const RECORDING: [&str; 18] = [
+    "time [s]",
+    "tick [1]",
+    "measured_depth [{}]",
+    "measured_needle_velocity [{}/s]",
+    "measured_target_x [{}]",
+    "measured_target_y [{}]",
+    "measured_paddle_x [{}]",
+    "measured_paddle_y [{}]",
+    "command_x [{}]",
+    "command_y [{}]",
+    "state [name]",
+    "faults [names]",
+    "true_depth [{}]",
+    "true_target_x [{}]",
+    "true_target_y [{}]",
+    "true_orthogonal_error [{}]",
+    "true_paddle_x [{}]",
+    "true_paddle_y [{}]",
 ];
 
-/// Time since the start of the needle, s; negative before.
-pub fn seconds_since(time_ns: u64, started_ns: u64) -> f64 {
-    (time_ns as i64 - started_ns as i64) as f64 * 1e-9
+/// Time from `start_ns`, s; negative before.
+pub fn seconds_since(time_ns: u64, start_ns: u64) -> f64 {
+    (i128::from(time_ns) - i128::from(start_ns)) as f64 * 1e-9
 }
 
-/// The truth along an insertion, with what the controller saw and said where there was one. `orthogonal` is n.
-pub fn insertion(truths: &[Truth], records: &[Record], orthogonal: &Vector2<f64>, started_ns: u64) -> Vec<u8> {
-    table(INSERTION, truths, |truth| {
+/// Time zero of every exported table of a run, ns: its first tick, the plant's where that is known. In lockstep that is
+/// also the zero of the samples' own times.
+fn zero_ns(records: &[Record]) -> u64 {
+    let first = records.first();
+    first.map_or(0, |record| record.truth.map_or(record.tick.inputs.time_ns, |truth| truth.time_ns))
+}
+
+/// The columns with this unit of length.
+fn columns<const N: usize>(columns: [&str; N], length: &str) -> [String; N] {
+    columns.map(|column| column.replace("{}", length))
+}
+
+/// The truth along an insertion, with what the controller saw and said where there was one. `orthogonal` is n, `length`
+/// the unit of lengths.
+pub fn insertion(truths: &[Truth], records: &[Record], orthogonal: &Vector2<f64>, length: &str) -> Vec<u8> {
+    let start_ns = truths.first().map_or(0, |truth| truth.time_ns);
+    table(columns(INSERTION, length), truths, |truth| {
         let tick = records
             .binary_search_by_key(&truth.tick, |record| record.tick.inputs.tick)
             .ok()
             .map(|found| &records[found].tick);
         let [x, y] = truth.target.map(text);
         let [px, py] = truth.paddle.map(text);
-        let [cx, cy] = pair(tick.map(|tick| tick.command.displacement));
+        let [cx, cy] = pair(tick.map(|tick| tick.command).filter(|c| c.is_valid()).map(|c| c.displacement));
         let [mx, my] = pair(tick.and_then(|tick| tick.inputs.target).map(|target| target.displacement));
+        let [mpx, mpy] = pair(tick.and_then(|tick| tick.inputs.paddle).map(|paddle| paddle.displacement));
         let [state, faults] =
             tick.map_or_else(Default::default, |tick| verdict(tick.command.state, tick.command.faults));
-        [
-            format!("{:.6}", seconds_since(truth.time_ns, started_ns)),
-            text(truth.tick),
-            text(truth.depth),
-            x,
-            y,
-            text(Vector2::from(truth.target).dot(orthogonal)),
-            px,
-            py,
-            cx,
-            cy,
-            mx,
-            my,
-            state,
-            faults,
-        ]
+        let error = text(Vector2::from(truth.target).dot(orthogonal));
+        let time = format!("{:.6}", seconds_since(truth.time_ns, start_ns));
+        let (tick, depth) = (text(truth.tick), text(truth.depth));
+        [time, tick, depth, x, y, error, px, py, cx, cy, mx, my, mpx, mpy, state, faults]
     })
 }
 
-/// One line per tick of the controller; empty where nothing arrived. `orthogonal` is n.
-pub fn recording(recording: &Recording, orthogonal: &Vector2<f64>) -> Vec<u8> {
-    let start_ns = recording.records.first().map_or(0, |record| record.tick.inputs.time_ns);
-    table(RECORDING, &recording.records, |record| {
+/// One line per tick of the controller; empty where nothing arrived. `orthogonal` is n, `length` the unit of lengths.
+pub fn recording(recording: &Recording, orthogonal: &Vector2<f64>, length: &str) -> Vec<u8> {
+    let start_ns = zero_ns(&recording.records);
+    table(columns(RECORDING, length), &recording.records, |record| {
         let (inputs, command) = (&record.tick.inputs, &record.tick.command);
         let [depth, velocity] = pair(inputs.needle.map(|sample| [sample.depth, sample.velocity]));
         let [tx, ty] = pair(inputs.target.map(|sample| sample.displacement));
         let [px, py] = pair(inputs.paddle.map(|sample| sample.displacement));
         let [cx, cy] = pair(command.is_valid().then_some(command.displacement));
         let [state, faults] = verdict(command.state, command.faults);
+        let true_depth = record.truth.map(|truth| text(truth.depth)).unwrap_or_default();
         let [true_x, true_y] = pair(record.truth.map(|truth| truth.target));
-        let error = record.truth.map(|truth| Vector2::from(truth.target).dot(orthogonal));
+        let error = record.truth.map(|truth| text(Vector2::from(truth.target).dot(orthogonal))).unwrap_or_default();
+        let [true_px, true_py] = pair(record.truth.map(|truth| truth.paddle));
+        let time = format!("{:.6}", seconds_since(inputs.time_ns, start_ns));
         [
-            format!("{:.6}", (inputs.time_ns - start_ns) as f64 * 1e-9),
+            time,
             text(inputs.tick),
             depth,
             velocity,
@@ -107,10 +117,12 @@ pub fn recording(recording: &Recording, orthogonal: &Vector2<f64>) -> Vec<u8> {
             cy,
             state,
             faults,
-            record.truth.map(|truth| text(truth.depth)).unwrap_or_default(),
+            true_depth,
             true_x,
             true_y,
-            error.map(text).unwrap_or_default(),
+            error,
+            true_px,
+            true_py,
         ]
     })
 }
@@ -131,7 +143,7 @@ fn verdict(state: u32, faults: u64) -> [String; 2] {
 
 /// A header and a line for each of `rows`.
 pub fn table<'r, R: 'r, const N: usize>(
-    header: [&str; N],
+    header: [impl AsRef<[u8]>; N],
     rows: impl IntoIterator<Item = &'r R>,
     line: impl Fn(&'r R) -> [String; N],
 ) -> Vec<u8> {
@@ -142,4 +154,60 @@ pub fn table<'r, R: 'r, const N: usize>(
         let _ = writer.write_record(line(row));
     }
     writer.into_inner().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use firmware::Settings;
+
+    use super::*;
+    use crate::record::recording::Header;
+    use crate::runtime::mode::RunMode;
+    use crate::runtime::tick::ControllerTick;
+
+    fn record(tick: u64, time_ns: u64, truth_ns: Option<u64>) -> Record {
+        let inputs = firmware::Inputs { tick, time_ns, ..Default::default() };
+        let truth = truth_ns.map(|time_ns| Truth { tick, time_ns, depth: 0.5, target: [1.0, 2.0], paddle: [3.0, 4.0] });
+        Record { tick: ControllerTick { inputs, ..Default::default() }, truth }
+    }
+
+    fn lines(bytes: &[u8]) -> Vec<Vec<String>> {
+        let text = std::str::from_utf8(bytes).unwrap();
+        text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    }
+
+    fn recorded(records: Vec<Record>) -> Vec<Vec<String>> {
+        let settings = Settings::new(1_000_000, 20_000_000, 0);
+        let header = Header { mode: RunMode::Lockstep, seed: 1, scene_hash: [0; 32], settings, table: vec![] };
+        lines(&recording(&Recording { header, records }, &Vector2::x(), "mm"))
+    }
+
+    #[test]
+    fn both_tables_of_a_run_have_one_time_and_one_name_for_one_thing() {
+        let at = |tick| 200 + tick * 1_000_000;
+        let records: Vec<_> = (0..5).map(|tick| record(tick, at(tick), Some(at(tick)))).collect();
+        let truths: Vec<_> = records.iter().filter_map(|record| record.truth).collect();
+        let plant = lines(&insertion(&truths, &records, &Vector2::x(), "mm"));
+        let controller = recorded(records);
+        for (column, name) in plant[0].iter().enumerate() {
+            assert!(name.contains('[') && name.ends_with(']'), "{name} has no unit");
+            let same = controller[0].iter().position(|other| other == name).unwrap();
+            for line in 1..plant.len() {
+                assert_eq!(plant[line][column], controller[line][same], "{name}");
+            }
+        }
+        // In free-run the controller's tick comes half a period after the plant's: same zero.
+        let later = recorded(vec![record(0, at(0) + 500_000, Some(at(0)))]);
+        assert_eq!(later[1][0], "0.000500");
+        let shared = plant[0].iter().filter(|name| controller[0].contains(name)).count();
+        assert_eq!(shared, 16, "{:?} {:?}", plant[0], controller[0]);
+        assert!(controller[0].iter().all(|name| name.contains('[')));
+    }
+
+    #[test]
+    fn time_that_runs_backwards_is_negative() {
+        let found = recorded(vec![record(0, u64::MAX, None), record(1, 0, None), record(2, 5, Some(1))]);
+        assert_eq!(found[1][0], "0.000000");
+        assert!(found[2][0].starts_with("-18446744073"), "{}", found[2][0]);
+    }
 }

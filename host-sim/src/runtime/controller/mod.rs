@@ -7,17 +7,17 @@ use std::time::Duration;
 
 use firmware::contract::PaddleCommand;
 use firmware::io::{CommandSink, SampleSource};
-use firmware::schedule::Schedule;
 use firmware::{Faults, Inputs, Mode};
 use iceoryx2::service::Service;
 
 use super::accounts::{ControllerAccounts, RecordAccount, SequenceSpan};
-use super::clock::{now_ns, release_real_time, request_real_time, sleep_until};
+use super::clock::{now_ns, release_real_time, request_real_time};
 use super::durations::{LoopDurations, LoopTiming};
 use super::error::{Role, RuntimeError};
 use super::executor::StepExecutor;
 use super::ledger::TickResult;
 use super::peer::{Patience, Peer};
+use super::periodic::PeriodicLoop;
 use super::signals;
 use super::tick::ControllerTick;
 use crate::exchange::{ClockKind, ControllerPorts, LinkError};
@@ -32,8 +32,8 @@ pub trait TickRecorder {
     fn finish(self: Box<Self>) -> RecordAccount;
 }
 
-/// Ticks in free-run between two looks at the peer and at signals.
-const TICKS_PER_LOOK: u64 = 16;
+/// Time in free-run between two looks at the plant, ns.
+const BETWEEN_LOOKS_NS: u64 = 16_000_000;
 /// Ticks that an orphaned controller stays in SAFE before it leaves: whoever watches the commands has seen it then.
 const TICKS_IN_SAFE: u64 = 20;
 
@@ -153,15 +153,18 @@ impl<'c> ControlLoop<'c> {
             }
         };
         let period_ns = loop_settings.period_ns();
-        let first_release_ns = start + period_ns / 2;
-        let mut schedule = Schedule::new(first_release_ns, period_ns);
+        let ahead_ns = start.saturating_sub(now_ns());
+        if u128::from(ahead_ns) > timeout.as_nanos() {
+            let what = format!("a start {:.1} s ahead, longer than --patience", ahead_ns as f64 * 1e-9);
+            return Err(RuntimeError::Protocol { peer: Role::Plant, what });
+        }
+        let mut periodic = PeriodicLoop::new(start.saturating_add(period_ns / 2), period_ns);
         let mut durations = LoopDurations::default();
         let scheduling = request_real_time();
-        let outcome = self.timed_ticks(ports, peer, &mut schedule, &mut durations);
+        let outcome = self.timed_ticks(ports, peer, &mut periodic, &mut durations);
         release_real_time();
-        let due = (schedule.next_release_ns() - first_release_ns) / period_ns;
-        self.scheduled = Some((due, schedule.skipped()));
-        self.timing = Some(durations.timing(loop_settings.rate, &schedule, &scheduling));
+        self.scheduled = Some((periodic.due(), periodic.skipped()));
+        self.timing = Some(durations.timing(loop_settings.rate, &periodic, &scheduling));
         outcome
     }
 
@@ -169,26 +172,24 @@ impl<'c> ControlLoop<'c> {
         &mut self,
         ports: &mut ControllerPorts<S>,
         peer: &mut Peer,
-        schedule: &mut Schedule,
+        periodic: &mut PeriodicLoop,
         durations: &mut LoopDurations,
     ) -> Result<(), RuntimeError> {
         let mut orphaned: Option<(RuntimeError, u64)> = None;
+        let mut next_look_ns = periodic.next_release_ns();
         loop {
-            sleep_until(schedule.next_release_ns());
+            periodic.wait()?;
             if let Some(frame) = ports.clock.oldest()?
                 && frame.kind() == Some(ClockKind::Stop)
             {
                 return Ok(());
             }
-            let start_ns = now_ns();
-            let release = schedule.begin(start_ns);
-            self.tick(ports, release.tick, start_ns)?;
-            let end_ns = now_ns();
-            schedule.finish(end_ns);
-            durations.record(release.release_ns, start_ns, end_ns);
+            let release = periodic.begin();
+            self.tick(ports, release.tick, periodic.start_ns())?;
+            durations.record(&periodic.finish());
             match &orphaned {
-                None if release.tick.is_multiple_of(TICKS_PER_LOOK) => {
-                    signals::check()?;
+                None if release.release_ns >= next_look_ns => {
+                    next_look_ns = release.release_ns + BETWEEN_LOOKS_NS;
                     // In RUN the samples are fresh: the plant lives.
                     if self.last.state != Mode::Run as u32 {
                         let alive = peer.check::<S>().and_then(|()| {

@@ -10,6 +10,7 @@ use super::ControlLoop;
 use crate::exchange::{ControllerPorts, Departure, Space};
 use crate::runtime::accounts::ControllerAccounts;
 use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::introduction::Introduction;
 use crate::runtime::mode::RunMode;
 use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::tick::ControllerTick;
@@ -26,7 +27,7 @@ pub struct ControllerResult {
 }
 
 /// How a controller serves a plant.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Service {
     /// What drives time.
     pub mode: RunMode,
@@ -36,6 +37,8 @@ pub struct Service {
     pub timeout: Duration,
     /// The plant's process, if it has started this one.
     pub parent: Option<Pid>,
+    /// What the table was computed from.
+    pub introduction: Introduction,
 }
 
 /// What is left when all is over.
@@ -63,6 +66,7 @@ fn serve_in(mut control_loop: ControlLoop<'_>, space: &Space, service: &Service)
     let elsewhere = || Peer::Elsewhere(Box::new(space.clone()), Role::Plant);
     let mut peer = service.parent.map_or_else(elsewhere, Peer::Parent);
     let mut ports = ControllerPorts::<ipc::Service>::open(space)?;
+    service.introduction.tell(space)?;
     let mut patience = Patience::new(service.timeout);
     while !ports.has_peer() {
         patience.wait::<ipc::Service>(&mut peer)?;

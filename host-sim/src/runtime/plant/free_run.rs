@@ -3,23 +3,24 @@
 //! The controller runs on the same clock half a period later (see [`crate::runtime::controller::ControlLoop::free_run`]): the
 //! plant's step takes a part of its period, and samples should be fresh when they are used.
 
+use std::time::Duration;
+
 use firmware::contract::PaddleCommand;
-use firmware::schedule::Schedule;
 use iceoryx2::service::Service;
 
 use super::PlantLoop;
 use crate::exchange::{ClockFrame, ClockKind, PlantPorts, Space};
 use crate::runtime::accounts::CommandAccount;
-use crate::runtime::clock::{now_ns, release_real_time, request_real_time, sleep_until};
+use crate::runtime::clock::{now_ns, release_real_time, request_real_time};
 use crate::runtime::durations::{LoopDurations, LoopTiming};
-use crate::runtime::error::RuntimeError;
+use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::peer::Peer;
-use crate::runtime::signals;
+use crate::runtime::periodic::PeriodicLoop;
 
 /// From the start frame to tick 0: time for the controller to fall asleep.
 const LEAD_NS: u64 = 20_000_000;
-/// Ticks between two looks at the controller and at signals.
-const TICKS_PER_LOOK: u64 = 16;
+/// Time between two looks at the controller, ns.
+const BETWEEN_LOOKS_NS: u64 = 16_000_000;
 
 /// Lets one controller follow another: when the present one dies, its place is cleared and the next one is let in.
 #[derive(Debug)]
@@ -55,9 +56,10 @@ impl<'s> Succession<'s> {
     /// Clears the place of a dead controller, and tells whoever is there that its first release is at `next_ns`. One
     /// that is already at work does not mind.
     fn look<S: Service>(&mut self, ports: &mut PlantPorts<S>, next_ns: u64) -> Result<(), RuntimeError> {
-        if self.silent_ticks == 0 || !self.silent_ticks.is_multiple_of(SILENT_TICKS) {
+        if self.silent_ticks < SILENT_TICKS {
             return Ok(());
         }
+        self.silent_ticks = 0;
         self.space.clear_dead::<S>();
         if ports.has_peer() {
             ports.connect()?;
@@ -78,6 +80,9 @@ pub struct FreeRun<'r, 's, S: Service> {
     pub rate_hz: f64,
     /// Its period, ns.
     pub period_ns: u64,
+    /// Silence before the needle starts after which the controller is given up. Once it has started, the run ends by
+    /// itself.
+    pub patience: Duration,
     /// Whether a controller that dies may be followed by another; else its death ends the run.
     pub succession: Option<&'r mut Succession<'s>>,
 }
@@ -95,32 +100,35 @@ impl<S: Service> FreeRun<'_, '_, S> {
         let mut durations = LoopDurations::default();
         let scheduling = request_real_time();
         let first_ns = now_ns() + LEAD_NS;
-        let mut schedule = Schedule::new(first_ns, self.period_ns);
+        let mut periodic = PeriodicLoop::new(first_ns, self.period_ns);
         let outcome = self
             .ports
             .clock
             .send(ClockFrame::new(ClockKind::Start, 0, first_ns))
             .map_err(RuntimeError::from)
-            .and_then(|()| self.ticks(plant, &mut schedule, &mut durations, progress));
+            .and_then(|()| self.ticks(plant, &mut periodic, &mut durations, progress));
         release_real_time();
         let account = outcome?;
         self.ports.clock.send(ClockFrame::new(ClockKind::Stop, 0, now_ns()))?;
-        Ok((account, durations.timing(self.rate_hz, &schedule, &scheduling)))
+        let [input_age, target_age] = plant.ages.distributions();
+        let timing = durations.timing(self.rate_hz, &periodic, &scheduling);
+        Ok((account, LoopTiming { input_age, target_age, ..timing }))
     }
 
     fn ticks(
         &mut self,
         plant: &mut PlantLoop<'_>,
-        schedule: &mut Schedule,
+        periodic: &mut PeriodicLoop,
         durations: &mut LoopDurations,
         progress: &dyn Fn(),
     ) -> Result<CommandAccount, RuntimeError> {
         let mut account = CommandAccount::default();
-        let mut previous_ns = schedule.next_release_ns();
+        let mut previous_ns = periodic.next_release_ns();
+        let mut next_look_ns = previous_ns;
+        let mut heard_ns = previous_ns;
         loop {
-            sleep_until(schedule.next_release_ns());
-            let start_ns = now_ns();
-            let release = schedule.begin(start_ns);
+            periodic.wait()?;
+            let release = periodic.begin();
             // The world's time is that of the releases: lateness of this loop is not motion of the needle.
             let time_ns = release.release_ns;
             if plant.is_over(time_ns) {
@@ -132,29 +140,36 @@ impl<S: Service> FreeRun<'_, '_, S> {
             }
             if let Some(command) = &command {
                 account.consume(command.sequence);
+                plant.ages.actuate(command, now_ns());
+                heard_ns = time_ns;
+            } else if plant.world().needle_started_ns().is_none() {
+                self.check_patience(time_ns - heard_ns)?;
             }
             plant.act(command.as_ref(), time_ns, time_ns - previous_ns)?;
             previous_ns = time_ns;
             plant.publish(release.tick, time_ns, self.ports)?;
-            let end_ns = now_ns();
-            schedule.finish(end_ns);
-            durations.record(release.release_ns, start_ns, end_ns);
+            durations.record(&periodic.finish());
             progress();
-            self.look(release.tick, schedule.next_release_ns())?;
+            if time_ns >= next_look_ns {
+                next_look_ns = time_ns + BETWEEN_LOOKS_NS;
+                self.look(periodic.next_release_ns())?;
+            }
         }
     }
 
-    /// Looks at signals and at the controller now and then.
-    fn look(&mut self, tick: u64, next_ns: u64) -> Result<(), RuntimeError> {
-        if tick.is_multiple_of(TICKS_PER_LOOK) {
-            signals::check()?;
-            if self.succession.is_none() {
-                self.peer.check::<S>()?;
-            }
+    /// Nothing has come for so long, ns, and the needle waits for it.
+    fn check_patience(&self, silent_ns: u64) -> Result<(), RuntimeError> {
+        if u128::from(silent_ns) <= self.patience.as_nanos() {
+            return Ok(());
         }
+        Err(RuntimeError::PeerSilent { peer: Role::Controller, silent_s: silent_ns as f64 * 1e-9 })
+    }
+
+    /// Looks what has become of the controller.
+    fn look(&mut self, next_ns: u64) -> Result<(), RuntimeError> {
         match &mut self.succession {
             Some(succession) => succession.look(self.ports, next_ns),
-            None => Ok(()),
+            None => self.peer.check::<S>(),
         }
     }
 }

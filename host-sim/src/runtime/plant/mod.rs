@@ -1,5 +1,6 @@
 //! The plant's side of the loop: publishes what the world's sensors see, and passes commands on to it.
 
+pub mod ages;
 pub mod free_run;
 pub mod lockstep;
 pub mod observer;
@@ -11,6 +12,7 @@ use firmware::Faults;
 use firmware::contract::PaddleCommand;
 use iceoryx2::service::Service;
 
+use self::ages::InputAges;
 use self::observer::{Moment, Observer};
 use super::clock::now_ns;
 use super::error::RuntimeError;
@@ -30,6 +32,7 @@ pub struct PlantLoop<'m> {
     first_ns: Option<u64>,
     solving: Duration,
     observer: Option<Box<dyn Observer>>,
+    ages: InputAges,
 }
 
 impl<'m> PlantLoop<'m> {
@@ -37,7 +40,8 @@ impl<'m> PlantLoop<'m> {
     pub fn new(world: World<TissuePlant<'m>>, simulation: &Simulation) -> Self {
         let truths = Vec::with_capacity(simulation.ticks() as usize);
         let duration_ns = simulation.duration_ns();
-        Self { world, duration_ns, truths, first_ns: None, solving: Duration::ZERO, observer: None }
+        let ages = InputAges::default();
+        Self { world, duration_ns, truths, first_ns: None, solving: Duration::ZERO, observer: None, ages }
     }
 
     /// Somebody looks on from now.
@@ -77,7 +81,9 @@ impl<'m> PlantLoop<'m> {
         let (needle, paddle) = self.world.encoders(time_ns);
         ports.needle.send(needle)?;
         ports.paddle.send(paddle)?;
+        self.ages.needle(needle.sequence, needle.time_ns);
         for sample in self.world.target_samples(&truth) {
+            self.ages.target(sample.sequence, sample.time_ns);
             ports.target.send(sample)?;
         }
         Ok(())

@@ -13,6 +13,7 @@ use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 use crate::runtime::accounts::CommandAccount;
 use crate::runtime::durations::LoopTiming;
 use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::introduction::Introduction;
 use crate::runtime::mode::RunMode;
 use crate::runtime::peer::{Patience, Peer};
 use crate::world::loop_settings::LoopSettings;
@@ -39,7 +40,7 @@ pub struct PlantResult {
 }
 
 /// How a plant is served by whatever controller comes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Visit {
     /// What drives time.
     pub mode: RunMode,
@@ -49,6 +50,17 @@ pub struct Visit {
     pub timeout: Duration,
     /// What the death of a controller means; free-run only.
     pub on_death: OnDeath,
+    /// What a controller's table must have been computed from; none: anything will do.
+    pub expected: Option<Expected>,
+}
+
+/// What a controller's table must have been computed from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Expected {
+    /// SHA-256 of the scenes that will do, as hexadecimal digits.
+    pub scene_hashes: Vec<String>,
+    /// Units of length and stress.
+    pub units: [String; 2],
 }
 
 /// What the death of a controller means to the plant.
@@ -105,7 +117,10 @@ fn insertion(plant: &mut PlantLoop<'_>, space: &Space, visit: &Visit) -> Result<
         patience.wait::<ipc::Service>(&mut peer)?;
     }
     ports.connect()?;
-    let outcome = drive(plant, space, visit, &mut ports, &mut peer);
+    let agreed = visit.expected.as_ref().map_or(Ok(()), |expected| {
+        Introduction::hear(space).and_then(|told| told.check(&expected.scene_hashes, &expected.units))
+    });
+    let outcome = agreed.and_then(|()| drive(plant, space, visit, &mut ports, &mut peer));
     if outcome.is_err() {
         // Whatever has happened, the controller need not wait for its end.
         let _ = ports.clock.send(ClockFrame::new(ClockKind::Stop, 0, 0));
@@ -138,7 +153,8 @@ fn drive(
             let rate_hz = visit.loop_settings.rate;
             let mut succession = Succession::new(space);
             let kept = (visit.on_death == OnDeath::AwaitNext).then_some(&mut succession);
-            let free_run = FreeRun { ports, peer, rate_hz, period_ns, succession: kept };
+            let patience = visit.timeout;
+            let free_run = FreeRun { ports, peer, rate_hz, period_ns, patience, succession: kept };
             let (account, timing) = free_run.run(plant, &|| {})?;
             Ok((account, succession.controllers, Some(timing)))
         }

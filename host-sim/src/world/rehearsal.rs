@@ -1,0 +1,103 @@
+//! How long a step of the tissue takes, found out before a run whose time the machine's clock drives.
+
+use std::time::Instant;
+
+use nalgebra::Vector2;
+
+use super::error::WorldError;
+use super::needle::NeedleTrajectory;
+use super::simulation::Simulation;
+use super::tissue::{TissuePlant, TissueResponse as _};
+
+/// Steps that are timed.
+const STEPS: usize = 101;
+/// Part of the period that the median step may take: the rest is for samples, the machine, and slower steps.
+const PART_OF_PERIOD: f64 = 0.8;
+/// Sideways motion of the paddle per motion of the needle: steps as large as those of a run.
+const PADDLE_PER_DEPTH: f64 = 0.1;
+
+/// What a step takes, against the period.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Median of a step, µs.
+    pub step_us: f64,
+    /// Period of the loop, µs.
+    pub period_us: f64,
+}
+
+impl Pace {
+    /// Whether a loop at this period has time for the step.
+    pub fn keeps_the_period(&self) -> bool {
+        self.step_us <= PART_OF_PERIOD * self.period_us
+    }
+
+    /// Why there is no run.
+    pub fn too_slow(&self) -> WorldError {
+        let Self { step_us, period_us } = *self;
+        WorldError::TooSlow { step_us, period_us, rate_hz: (PART_OF_PERIOD * 1e6 / step_us).floor() }
+    }
+}
+
+/// Takes the tissue through some steps from the middle of the insertion, and back to rest.
+///
+/// # Errors
+/// [`WorldError::Tissue`].
+pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result<Pace, WorldError> {
+    let trajectory = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
+    let period_us = simulation.loop_settings.period_ns() as f64 * 1e-3;
+    let middle_s = 0.5 * simulation.insertion_s;
+    let mut times_us = Vec::with_capacity(STEPS);
+    tissue.aside(|tissue| {
+        for step in 0..=STEPS {
+            let depth = trajectory.at(middle_s + step as f64 * period_us * 1e-6).depth;
+            let before = Instant::now();
+            tissue.step(depth, Vector2::new(0.0, PADDLE_PER_DEPTH * (depth - trajectory.at(middle_s).depth)))?;
+            // The first one comes from rest.
+            if step > 0 {
+                times_us.push(before.elapsed().as_secs_f64() * 1e6);
+            }
+        }
+        Ok(())
+    })?;
+    times_us.sort_by(f64::total_cmp);
+    Ok(Pace { step_us: times_us[STEPS / 2], period_us })
+}
+
+#[cfg(test)]
+mod tests {
+    use model_offline::model::TissueModel;
+    use model_offline::scene::Scene;
+
+    use super::*;
+    use crate::world::World;
+    use crate::world::loop_settings::LoopSettings;
+    use crate::world::tissue::PlantChoice;
+
+    #[test]
+    fn the_rule_of_the_period() {
+        assert!(Pace { step_us: 800.0, period_us: 1000.0 }.keeps_the_period());
+        let slow = Pace { step_us: 801.0, period_us: 1000.0 };
+        assert!(!slow.keeps_the_period());
+        assert!(slow.too_slow().to_string().contains("at most 998 Hz"), "{}", slow.too_slow());
+    }
+
+    /// A period of 2 µs is too short for any nonlinear model, one of 50 s for none: nothing here depends on how fast the
+    /// machine is.
+    #[test]
+    fn a_plant_that_cannot_keep_the_period_is_found_before_the_run() {
+        let scene = Scene::bundled("paper").unwrap();
+        let model = TissueModel::new(&scene).unwrap();
+        let at = |rate, plant| {
+            let loop_settings = LoopSettings { rate, target_rate: rate.min(50.0), ..LoopSettings::default() };
+            Simulation { loop_settings, plant, ..Simulation::new(&scene) }
+        };
+        for plant in [None, Some(PlantChoice::Full)] {
+            let refused = World::in_time(&model, Some(2), &at(5e5, plant));
+            assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
+        }
+        let mut world = World::in_time(&model, Some(2), &at(0.02, None)).unwrap();
+        let fresh = World::new(&model, Some(2), &at(0.02, None)).unwrap().plant_account();
+        assert_eq!(world.plant_account(), fresh, "a rehearsal leaves no trace");
+        assert!(world.advance(0, 0).unwrap().target.iter().all(|x| x.abs() < 1e-9), "at rest again");
+    }
+}

@@ -1,0 +1,267 @@
+//! How processes end, and what of them is left: signals are obeyed within a second, children die with their parents, and
+//! what is left all the same is swept by the next start.
+
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+/// Every command ends within a second of a signal; the rest is for a machine that is busy with other tests.
+const ENDS_WITHIN: Duration = Duration::from_secs(3);
+
+fn host_sim() -> Command {
+    Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
+}
+
+fn start(arguments: &[&str]) -> Child {
+    host_sim().args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn signal(process: u32, name: &str) {
+    assert!(Command::new("kill").args([&format!("-{name}"), &process.to_string()]).status().unwrap().success());
+}
+
+fn is_alive(process: u32) -> bool {
+    std::fs::read_to_string(format!("/proc/{process}/stat")).is_ok_and(|stat| !stat.contains(") Z "))
+}
+
+fn wait_for<T>(what: &str, mut found: impl FnMut() -> Option<T>) -> T {
+    let until = Instant::now() + Duration::from_secs(120);
+    loop {
+        if let Some(found) = found() {
+            return found;
+        }
+        assert!(Instant::now() < until, "{what}");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Children of a process, of all its threads.
+fn children(process: u32) -> Vec<u32> {
+    let tasks = std::fs::read_dir(format!("/proc/{process}/task")).into_iter().flatten().flatten();
+    let lists = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
+    lists.flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>()).collect()
+}
+
+fn message(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).replace(['\n', '│'], " ")
+}
+
+/// Names in shared memory and directories that contain `part`.
+fn traces(part: &str) -> Vec<PathBuf> {
+    let entries = ["/dev/shm".into(), std::env::temp_dir()].map(|directory: PathBuf| std::fs::read_dir(directory));
+    let paths = entries.into_iter().flatten().flatten().flatten().map(|entry| entry.path());
+    paths
+        .filter(|path| path.to_string_lossy().contains(part) && path.to_string_lossy().contains("stillpoint"))
+        .collect()
+}
+
+/// SIGTERM after `after`: exit code 1 with a word, soon.
+fn obeys(arguments: &[&str], after: Duration) {
+    let child = start(arguments);
+    std::thread::sleep(after);
+    let asked = Instant::now();
+    signal(child.id(), "TERM");
+    let output = child.wait_with_output().unwrap();
+    let took = asked.elapsed();
+    assert_eq!(output.status.code(), Some(1), "{arguments:?}: {}", message(&output));
+    assert!(message(&output).contains("SIGTERM"), "{arguments:?}: {}", message(&output));
+    assert!(took < ENDS_WITHIN, "{arguments:?}: {took:?}");
+}
+
+#[test]
+fn signals_are_obeyed_at_once_everywhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let out = out.to_str().unwrap();
+    let millis = Duration::from_millis;
+    // The table, the periodic loops, a loop that never sleeps, one that sleeps for 10 s.
+    obeys(&["timing", "--seconds", "300"], millis(150));
+    obeys(&["timing", "--seconds", "300"], millis(2500));
+    obeys(&["timing", "--seconds", "60", "--rate", "100000"], millis(2500));
+    obeys(&["timing", "--seconds", "300", "--rate", "0.1"], millis(2500));
+    // Placement and table, then the insertions without a controller.
+    obeys(&["run", "--out", out, "--quiet"], millis(60));
+    obeys(&["run", "--out", out, "--quiet", "--insertion-time", "1000", "--threads", "1"], millis(2500));
+    let link = format!("test-signals-{}", std::process::id());
+    obeys(&["plant", "--link", &link], millis(1500));
+    assert!(!Path::new(out).exists());
+    assert_eq!(traces(&link), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn a_polling_peer_dies_with_a_killed_parent() {
+    let mut timing = start(&["timing", "--seconds", "30"]);
+    let peer = wait_for("no peer has started", || children(timing.id()).first().copied());
+    signal(timing.id(), "KILL");
+    timing.wait().unwrap();
+    wait_for("the peer goes on without its parent", || (!is_alive(peer)).then_some(()));
+}
+
+#[test]
+fn an_emulator_dies_with_its_run() {
+    if Command::new("qemu-system-arm").arg("--version").output().is_err() {
+        return println!("skipped: no qemu-system-arm");
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    for name in ["TERM", "INT", "KILL"] {
+        let mut run = start(&[
+            "run",
+            "--tissue",
+            "homogeneous",
+            "--controller",
+            "qemu",
+            "--mode",
+            "lockstep",
+            "--out",
+            out.to_str().unwrap(),
+        ]);
+        let command = |process: u32| std::fs::read_to_string(format!("/proc/{process}/comm")).unwrap_or_default();
+        let emulator = wait_for("no emulator has started", || {
+            if let Some(status) = run.try_wait().unwrap() {
+                // Without the target for bare metal there is no image.
+                return (status.code() == Some(1) || status.code() == Some(2)).then_some(None);
+            }
+            let all = children(run.id()).into_iter().flat_map(children);
+            all.into_iter().find(|process| command(*process).starts_with("qemu-system")).map(Some)
+        });
+        let Some(emulator) = emulator else {
+            let mut said = String::new();
+            std::io::Read::read_to_string(&mut run.stderr.take().unwrap(), &mut said).unwrap();
+            return println!("skipped: {said}");
+        };
+        signal(run.id(), name);
+        run.wait().unwrap();
+        wait_for("the emulator goes on without its run", || (!is_alive(emulator)).then_some(()));
+    }
+}
+
+#[test]
+fn what_killed_processes_leave_is_swept_by_the_next_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let mut run = start(&[
+        "run",
+        "--tissue",
+        "homogeneous",
+        "--mode",
+        "free-run",
+        "--rate",
+        "200",
+        "--insertion-time",
+        "60",
+        "--threads",
+        "1",
+        "--quiet",
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    let mark = format!("run-{}-", run.id());
+    let controller = wait_for("no controller has started", || {
+        let child = children(run.id()).first().copied();
+        child.filter(|_| traces(&mark).len() > 5)
+    });
+    // Neither can tidy up after the other.
+    signal(controller, "STOP");
+    signal(run.id(), "KILL");
+    signal(controller, "KILL");
+    run.wait().unwrap();
+    wait_for("the controller lives", || (!is_alive(controller)).then_some(()));
+    assert!(!traces(&mark).is_empty());
+    let link = format!("test-sweep-{}", std::process::id());
+    let next = start(&["plant", "--link", &link, "--patience", "0.1"]).wait_with_output().unwrap();
+    assert_eq!(traces(&mark), Vec::<PathBuf>::new());
+    assert!(message(&next).contains(&mark), "{}", message(&next));
+}
+
+#[test]
+fn a_process_without_descriptors_removes_nobodys_link() {
+    let link = format!("test-descriptors-{}", std::process::id());
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("paper.table");
+    let made = host_sim()
+        .args(["run", "--tissue", "homogeneous", "--mode", "lockstep", "--insertion-time", "0.2", "--quiet", "--out"])
+        .arg(folder.path().join("report"))
+        .output()
+        .unwrap();
+    assert!(made.status.success(), "{}", message(&made));
+    let recording = std::fs::read(folder.path().join("report/homogeneous-dynamic.rec")).unwrap();
+    let header = host_sim::record::recording::Recording::decode(&recording).unwrap().header;
+    std::fs::write(&table, header.table).unwrap();
+    let table = table.to_str().unwrap();
+
+    let free_run = ["--mode", "free-run", "--link", &link, "--rate", "500"];
+    let world = ["--tissue", "homogeneous", "--plant", "condensed", "--insertion-time", "3"];
+    let plant = start(&[&["plant"], &free_run[..], &world].concat());
+    let controller = start(&[&["controller", "--table", table], &free_run[..]].concat());
+    wait_for("the pair has not met", || (traces(&link).len() > 10).then_some(()));
+    std::thread::sleep(Duration::from_millis(500));
+    let before = traces(&link).len();
+    for limit in 4..16 {
+        let program = assert_cmd::cargo::cargo_bin!("host-sim");
+        let attack = format!("ulimit -n {limit}; exec {} controller --link {link} --table {table}", program.display());
+        let _ = Command::new("sh").args(["-c", &attack]).output().unwrap();
+        assert!(traces(&link).len() >= before, "with {limit} descriptors");
+    }
+    let ends = [plant, controller].map(|child| child.wait_with_output().unwrap());
+    for end in &ends {
+        assert!(end.status.success(), "{}", message(end));
+    }
+    assert_eq!(traces(&link), Vec::<PathBuf>::new());
+}
+
+#[test]
+fn a_controller_that_stops_before_run_is_given_up() {
+    let link = format!("test-patience-{}", std::process::id());
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("paper.table");
+    std::fs::write(
+        &table,
+        model_offline::table::to_bytes(&host_sim::bench::paper_table::paper_table().unwrap()).unwrap(),
+    )
+    .unwrap();
+    let free_run = ["--mode", "free-run", "--link", &link, "--rate", "100"];
+    let controller = start(&[&["controller", "--table", table.to_str().unwrap()], &free_run[..]].concat());
+    // It has opened its side and waits; from here on it says nothing.
+    wait_for("the controller is not there", || (traces(&link).len() > 3).then_some(()));
+    std::thread::sleep(Duration::from_millis(200));
+    signal(controller.id(), "STOP");
+    let plant =
+        start(&[&["plant", "--plant", "condensed", "--paddle", "3", "--patience", "1"], &free_run[..]].concat());
+    let output = plant.wait_with_output().unwrap();
+    signal(controller.id(), "KILL");
+    controller.wait_with_output().unwrap();
+    // It could not leave.
+    host_sim::exchange::sweep();
+    assert_eq!(traces(&link), Vec::<PathBuf>::new());
+    assert_eq!(output.status.code(), Some(1), "{}", message(&output));
+    assert!(message(&output).contains("no answer from the controller"), "{}", message(&output));
+}
+
+#[test]
+fn two_sides_by_hand_compare_their_scenes() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("paper.table");
+    std::fs::write(
+        &table,
+        model_offline::table::to_bytes(&host_sim::bench::paper_table::paper_table().unwrap()).unwrap(),
+    )
+    .unwrap();
+    let text = model_offline::scene::BUNDLED[0].1;
+    let scene = folder.path().join("softer.toml");
+    std::fs::write(&scene, text.replacen("stiffness = 100.0", "stiffness = 50.0", 1)).unwrap();
+    assert_ne!(std::fs::read_to_string(&scene).unwrap(), text);
+    for (insist, code) in [(false, 2), (true, 0)] {
+        let link = format!("test-scenes-{}-{insist}", std::process::id());
+        let mut arguments = vec!["plant", "--link", &link, "--scene", scene.to_str().unwrap(), "--paddle", "3"];
+        arguments.extend(["--insertion-time", "0.2", "--plant", "condensed"]);
+        if insist {
+            arguments.push("--allow-other-scene");
+        }
+        let plant = start(&arguments);
+        let controller = start(&["controller", "--link", &link, "--table", table.to_str().unwrap()]);
+        let (plant, _) = (plant.wait_with_output().unwrap(), controller.wait_with_output().unwrap());
+        assert_eq!(plant.status.code(), Some(code), "{}", message(&plant));
+        assert_eq!(message(&plant).contains("another scene"), !insist, "{}", message(&plant));
+    }
+}

@@ -1,0 +1,99 @@
+//! Entries for generated input, the same for the fuzz targets and for the properties: bytes from outside, of which
+//! nothing but a typed refusal or a plausible value may come.
+
+use firmware::serial::{Frame, FrameReader, Reply, Request};
+use host_sim::exchange::bytes::{Reader, Writer};
+use host_sim::record::export::{csv, mcap};
+use host_sim::record::recording::Recording;
+use host_sim::runtime::accounts::ControllerAccounts;
+use host_sim::runtime::tick::{ControllerTick, TICK_BYTES};
+use model_offline::scene::Scene;
+use model_offline::scene::import::{Imported, gmsh, svg};
+
+/// An entry: its name and what is done with the bytes.
+pub(crate) type Entry = (&'static str, fn(&[u8]));
+
+/// All of them.
+pub(crate) const ENTRIES: [Entry; 7] = [
+    ("recording", recording),
+    ("ticks", ticks),
+    ("accounts", accounts),
+    ("serial", serial),
+    ("scene", scene),
+    ("svg", svg_drawing),
+    ("gmsh", gmsh_mesh),
+];
+
+/// A recording: what is read is written back to the same bytes, and what is whole of a damaged one is exported.
+pub(crate) fn recording(bytes: &[u8]) {
+    if let Ok(recording) = Recording::decode(bytes) {
+        assert_eq!(recording.encode(), bytes, "what is read is what was written");
+    }
+    if let Ok((recording, _)) = Recording::whole_records(bytes) {
+        let table = csv::recording(&recording, &nalgebra::Vector2::x(), "mm");
+        let lines = table.iter().filter(|byte| **byte == b'\n').count();
+        assert_eq!(lines, recording.records.len() + 1);
+        assert!(mcap::encode(&recording, [1.0, 0.0]).is_ok());
+    }
+}
+
+/// Ticks as a controller hands them over.
+pub(crate) fn ticks(bytes: &[u8]) {
+    let mut reader = Reader(bytes);
+    while let Some(tick) = ControllerTick::decode(&mut reader) {
+        let mut writer = Writer::default();
+        tick.encode(&mut writer);
+        assert_eq!(writer.0.len(), TICK_BYTES);
+    }
+}
+
+/// Accounts as a controller hands them in.
+pub(crate) fn accounts(bytes: &[u8]) {
+    if let Some((accounts, kept)) = ControllerAccounts::decode(bytes) {
+        assert_eq!(accounts.kept, kept.len() as u64);
+    }
+}
+
+/// Both directions of a board's line.
+pub(crate) fn serial(bytes: &[u8]) {
+    let mut reader = FrameReader::new();
+    for byte in bytes {
+        if matches!(reader.feed(*byte), Some(Frame::Start | Frame::New)) {
+            let _ = reader.message::<Request<'_>>();
+            let _ = reader.message::<Reply>();
+        }
+    }
+}
+
+/// A scene: what is accepted is finite.
+pub(crate) fn scene(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Ok(scene) = Scene::parse(text, "generated.toml") {
+        assert!(scene.needle.depth.is_finite() && scene.target.iter().all(|x| x.is_finite()));
+        assert!((scene.needle.axis.norm() - 1.0).abs() < 1e-9);
+        let _ = scene.hash();
+    }
+}
+
+fn is_plausible(imported: &Imported) {
+    for outline in std::iter::once(&imported.outline).chain(&imported.inclusions) {
+        assert!(outline.vertices().len() > 2);
+        assert!(outline.vertices().iter().all(|point| point.iter().all(|x| x.is_finite())));
+    }
+}
+
+/// A drawing.
+pub(crate) fn svg_drawing(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    for size in [None, Some(120.0)] {
+        svg::read(text, size).iter().for_each(is_plausible);
+    }
+}
+
+/// A mesh.
+pub(crate) fn gmsh_mesh(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    for size in [None, Some(120.0)] {
+        gmsh::read(text, size).iter().for_each(is_plausible);
+    }
+}

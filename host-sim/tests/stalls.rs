@@ -1,0 +1,160 @@
+//! A stop of a second must be in the figures whole: about a thousand misses at 1 kHz, and about a second late.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use host_sim::bench::timing::TimingResult;
+use host_sim::report::directory::read_run;
+use host_sim::runtime::durations::LoopTiming;
+
+const STOP: Duration = Duration::from_secs(1);
+
+/// Loops at the same time would measure each other.
+static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+
+fn alone() -> MutexGuard<'static, ()> {
+    ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn host_sim() -> Command {
+    Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
+}
+
+fn signal(process: u32, name: &str) {
+    assert!(Command::new("kill").args([&format!("-{name}"), &process.to_string()]).status().unwrap().success());
+}
+
+/// How often the process has waited for something so far.
+fn waits(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("voluntary_ctxt_switches"));
+    line.and_then(|line| line.split_whitespace().nth(1)?.parse().ok()).unwrap_or(0)
+}
+
+/// Stops a process for a second once it has run a loop at 1 kHz for `windows` times 60 ms: such a loop waits once every
+/// period, and whoever waits for a peer does not for so long.
+fn stop_in_the_loop(child: &mut Child, windows: u32) {
+    let until = Instant::now() + Duration::from_secs(120);
+    let mut seen = 0;
+    while seen < windows {
+        let before = waits(child.id());
+        std::thread::sleep(Duration::from_millis(60));
+        seen = if waits(child.id()) - before > 30 { seen + 1 } else { 0 };
+        assert!(Instant::now() < until && child.try_wait().unwrap().is_none(), "no loop in sight");
+    }
+    signal(child.id(), "STOP");
+    std::thread::sleep(STOP);
+    signal(child.id(), "CONT");
+}
+
+/// The figures that say most about a stop: misses, and the largest lateness, s.
+fn worst<'t>(timings: impl IntoIterator<Item = &'t LoopTiming>) -> (u64, f64) {
+    let worst = timings.into_iter().max_by_key(|timing| timing.release_lateness.max_ns).unwrap();
+    assert_eq!(worst.release_lateness.count, worst.ticks + worst.skipped, "an entry for every release");
+    assert_eq!(worst.response_time.count, worst.release_lateness.count);
+    assert!(worst.deadline_misses >= worst.skipped);
+    (worst.deadline_misses, worst.release_lateness.max_ns as f64 * 1e-9)
+}
+
+fn read_timing(path: &Path) -> TimingResult {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+#[test]
+fn timing_finds_a_stop_of_a_second() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("timing.json");
+    let mut child = host_sim()
+        .args(["timing", "--seconds", "15", "--priority", "0", "--json"])
+        .arg(&json)
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    // Twice: between two blocks, where nothing is measured, one of them may be lost.
+    for _ in 0..2 {
+        stop_in_the_loop(&mut child, 5);
+    }
+    assert!(child.wait().unwrap().success());
+    let result = read_timing(&json);
+    let outside = result.blocks.iter().flat_map(|block| &block.outside_run);
+    let (misses, lateness_s) = worst([&result.empty, &result.controller, &result.exchange].into_iter().chain(outside));
+    assert!(misses >= 900, "{misses} misses");
+    assert!((0.9..60.0).contains(&lateness_s), "largest lateness {lateness_s} s");
+}
+
+#[test]
+fn timing_measures_in_run_and_says_where_not() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("timing.json");
+    let output =
+        host_sim().args(["timing", "--seconds", "3", "--priority", "0", "--json"]).arg(&json).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let text = String::from_utf8(output.stdout).unwrap();
+    let result = read_timing(&json);
+    for (ledger, timing) in [(result.ledger, &result.controller), (result.exchange_ledger, &result.exchange)] {
+        assert_eq!(ledger.unaccounted, 0, "{ledger:?}");
+        assert_eq!(ledger.run, timing.ticks, "the headline is RUN");
+        assert_eq!(timing.mode, Some(firmware::Mode::Run));
+        assert!(ledger.due >= 1000);
+        // A machine that stops the loop for long may end RUN; the rounds in which it did are named.
+        let left = ledger.hold + ledger.safe > 0;
+        assert!(!left || text.contains("VOID"), "{ledger:?}\n{text}");
+        assert!(left || ledger.run + ledger.skipped == ledger.due);
+        assert!(ledger.run > 0);
+    }
+    assert!(text.contains("RUN: wake latency"), "{text}");
+    // Fewer than 10,000 values say nothing about one in 10,000.
+    assert_eq!(result.controller.release_lateness.p9999_ns, None);
+    assert!(result.step.p9999_ns.is_some() || result.left_run.iter().any(|left| left.measurement.starts_with("step")));
+}
+
+#[test]
+fn a_free_run_shows_the_plants_stop_in_its_report() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let mut child = host_sim()
+        .args(["run", "--tissue", "homogeneous", "--mode", "free-run", "--plant", "condensed", "--threads", "1"])
+        .args(["--insertion-time", "8", "--duration", "9", "--out"])
+        .arg(&out)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    stop_in_the_loop(&mut child, 12);
+    let output = child.wait_with_output().unwrap();
+    assert!(output.status.success());
+    let result = read_run(&out).unwrap();
+    let free_run = result.cases[0].strategies.dynamic_free_run.as_ref().unwrap();
+    let plant = free_run.plant_timing.as_ref().unwrap();
+    let (misses, lateness_s) = worst([plant]);
+    assert!(misses >= 900, "{misses} misses");
+    assert!(lateness_s > 0.9, "largest lateness {lateness_s} s");
+    // The first line of the figures has both sides.
+    let text = String::from_utf8(output.stdout).unwrap();
+    let line = text.lines().find(|line| line.contains("controller ") && line.contains("plant ")).unwrap();
+    assert!(line.contains(&format!("{} deadline misses", plant.deadline_misses)), "{line}");
+    let ages = [&plant.input_age, &plant.target_age].map(|age| age.as_ref().unwrap());
+    // A sample is taken at a release, and acted on at a later one; the target's sensor is 20 ms late besides.
+    assert!(ages[0].min_ns > 500_000 && ages[1].min_ns > 20_000_000, "{ages:?}");
+}
+
+#[test]
+fn a_plant_that_cannot_keep_the_period_is_refused_before_anything_is_written() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    let output = host_sim()
+        .args(["run", "--tissue", "homogeneous", "--mode", "free-run", "--plant", "full", "--quiet"])
+        .args(["--rate", "100000", "--insertion-time", "0.2", "--out"])
+        .arg(&out)
+        .output()
+        .unwrap();
+    let message = String::from_utf8_lossy(&output.stderr).replace(['\n', '│'], " ");
+    assert_eq!(output.status.code(), Some(2), "{message}");
+    assert!(message.contains("µs a step") && message.contains("--plant reduced"), "{message}");
+    assert!(!out.exists());
+}
