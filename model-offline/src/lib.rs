@@ -33,9 +33,9 @@
 //! let scene = Scene::bundled("paper").expect("bundled").without_inclusions();
 //! let study = PlacementStudy::run(&scene, &PlacementOptions::default())?;
 //! let optimum = study.placement.optimum;
-//! assert_eq!((optimum.static_paddle, optimum.dynamic_paddle), (4, 3)); // the paper's optima
+//! assert_eq!((optimum.static_paddle, optimum.dynamic_paddle), (4, Some(3))); // the paper's optima
 //!
-//! let table = table::build(&study.model, optimum.dynamic_paddle, &Default::default())?;
+//! let table = table::build(&study.model, 3, &Default::default())?;
 //! assert_eq!(table.paddle.index, 3);
 //! # Ok::<(), table::TableBuildError>(())
 //! ```

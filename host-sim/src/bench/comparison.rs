@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use firmware::Controller;
 use firmware::contract::{Table, decode};
-use model_offline::model::TissueModel;
+use model_offline::model::{ModelError, TissueModel};
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
 use model_offline::placement::study::steps;
@@ -15,7 +15,7 @@ use model_offline::table::{TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
 
 use super::describe;
-use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, TableResult};
+use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
 use super::strategy::{ControllerSetup, Extras, Insertion, Label, Measured};
 use super::tissue_variant::TissueVariant;
 use crate::bench::error::SimError;
@@ -194,6 +194,21 @@ struct Studied {
 /// `none` and `static` of a case.
 type Uncontrolled = (Option<Measured>, Option<Measured>);
 
+/// Nothing depends on the table without a paddle: a case that did not run it is held against that of its tissue.
+fn against_none_of_the_same_tissue(cases: &mut [CaseResult]) {
+    let none: Vec<(TissueVariant, f64)> = cases
+        .iter()
+        .filter_map(|case| Some((case.tissue, case.strategies.none.as_ref()?.max_orthogonal_error)))
+        .collect();
+    for case in cases.iter_mut().filter(|case| case.improvement_over_none.is_none()) {
+        let strategies = &case.strategies;
+        let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+        let error = none.iter().find(|(tissue, _)| *tissue == case.tissue);
+        case.improvement_over_none =
+            error.zip(dynamic).map(|((_, none), dynamic)| none / dynamic.max_orthogonal_error);
+    }
+}
+
 /// A comparison that is ready to run.
 ///
 /// ```no_run
@@ -287,6 +302,7 @@ impl<'p> Comparison<'p> {
             artifacts.extend(files);
             results.push(self.case_result(case, table, strategies)?);
         }
+        against_none_of_the_same_tissue(&mut results);
         signals::check()?;
         Ok(Compared { result: self.result(results), artifacts })
     }
@@ -360,7 +376,8 @@ impl<'p> Comparison<'p> {
     fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
         self.progress.say(&format!("{tissue}: controller table"));
         let studied = self.studied(tissue);
-        let table = build(&studied.model, studied.placement.optimum.dynamic_paddle, &TableOptions::default())?;
+        let paddle = studied.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
+        let table = build(&studied.model, paddle, &TableOptions::default())?;
         let bytes = to_bytes(&table)?;
         Ok(EncodedTable { table, bytes })
     }
@@ -469,11 +486,13 @@ impl<'p> Comparison<'p> {
         let settings = self.simulation.loop_settings.settings(table.validity.depth_end);
         let controller = Controller::new(table, &settings)?;
         let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
-        let improvement = strategies
-            .static_paddle
-            .as_ref()
-            .zip(dynamic)
-            .map(|(static_paddle, dynamic)| static_paddle.max_orthogonal_error / dynamic.max_orthogonal_error);
+        let over = |strategy: &Option<StrategyResult>| {
+            let factor = |dynamic: &StrategyResult| {
+                strategy.as_ref().map(|other| other.max_orthogonal_error / dynamic.max_orthogonal_error)
+            };
+            dynamic.and_then(factor)
+        };
+        let (improvement, improvement_over_none) = (over(&strategies.static_paddle), over(&strategies.none));
         Ok(CaseResult {
             tissue: case.tissue,
             table_tissue: self.believed_tissue(table),
@@ -490,6 +509,7 @@ impl<'p> Comparison<'p> {
             },
             strategies,
             improvement,
+            improvement_over_none,
         })
     }
 

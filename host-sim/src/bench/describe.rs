@@ -2,10 +2,10 @@
 
 use model_offline::geometry::Point2;
 use model_offline::model::TissueModel;
-use model_offline::placement::Placement;
+use model_offline::placement::{Placement, StaticStudy};
 use model_offline::scene::Scene;
 
-use super::result::{Geometry, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
+use super::result::{Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
 use super::tissue_variant::TissueVariant;
 use crate::world::simulation::Simulation;
 
@@ -69,7 +69,7 @@ pub fn command_line() -> Vec<String> {
     arguments
 }
 
-/// A placement study.
+/// A placement study of which some paddle can control the target.
 pub fn placement(tissue: TissueVariant, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
     let integration = serde_json::to_value(model.scene().discretization.method.integration);
     PlacementResult {
@@ -78,25 +78,36 @@ pub fn placement(tissue: TissueVariant, model: &TissueModel, placement: &Placeme
         integration: integration.ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default(),
         wall_s,
         best_static: placement.optimum.static_paddle,
-        best_dynamic: placement.optimum.dynamic_paddle,
+        best_dynamic: placement.optimum.dynamic_paddle.unwrap_or_default(),
         paddles: placement
             .paddles
             .iter()
             .map(|paddle| PaddlePlacement {
                 index: paddle.index,
                 jacobian: paddle.jacobian,
-                controllability_measure: paddle.controllability_measure,
+                controllability_measure: paddle.best_direction.map(|_| paddle.controllability_measure),
                 best_direction: paddle.best_direction,
                 depth: paddle.static_study.depth.clone(),
                 orthogonal: paddle.static_study.orthogonal.clone(),
                 max_orthogonal: paddle.static_study.max_orthogonal,
                 reached_depth: paddle.static_study.reached_depth,
-                failure: paddle
-                    .static_study
-                    .failure
-                    .as_ref()
-                    .map(|failure| format!("{}: {}", failure.reason, failure.detail)),
+                failure: failure(&paddle.static_study),
             })
             .collect(),
+        no_paddle: Some(no_paddle(&placement.no_paddle.static_study)),
     }
+}
+
+fn no_paddle(study: &StaticStudy) -> NoPaddlePlacement {
+    NoPaddlePlacement {
+        depth: study.depth.clone(),
+        orthogonal: study.orthogonal.clone(),
+        max_orthogonal: study.max_orthogonal,
+        reached_depth: study.reached_depth,
+        failure: failure(study),
+    }
+}
+
+fn failure(study: &StaticStudy) -> Option<String> {
+    study.failure.as_ref().map(|failure| format!("{}: {}", failure.reason, failure.detail))
 }

@@ -127,6 +127,9 @@ pub struct PlacementResult {
     pub best_dynamic: u32,
     /// All paddles.
     pub paddles: Vec<PaddlePlacement>,
+    /// The insertion without a paddle; results of older versions have none.
+    #[serde(default)]
+    pub no_paddle: Option<NoPaddlePlacement>,
 }
 
 /// One paddle in a placement study.
@@ -136,10 +139,10 @@ pub struct PaddlePlacement {
     pub index: u32,
     /// d(target displacement)/d(paddle displacement) at depth 0, rows target.
     pub jacobian: [[f64; 2]; 2],
-    /// ‖J⁻¹n‖.
-    pub controllability_measure: f64,
-    /// J⁻¹n.
-    pub best_direction: [f64; 2],
+    /// ‖J⁻¹n‖; none where the paddle cannot control the target.
+    pub controllability_measure: Option<f64>,
+    /// J⁻¹n; none where the paddle cannot control the target.
+    pub best_direction: Option<[f64; 2]>,
     /// Depths of the static study, length.
     pub depth: Vec<f64>,
     /// Orthogonal target displacement there, length.
@@ -149,6 +152,21 @@ pub struct PaddlePlacement {
     /// Depth reached, length.
     pub reached_depth: f64,
     /// Why the study ended before the full depth.
+    pub failure: Option<String>,
+}
+
+/// The insertion without a paddle in a placement study.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NoPaddlePlacement {
+    /// Depths, length.
+    pub depth: Vec<f64>,
+    /// Orthogonal target displacement there, length.
+    pub orthogonal: Vec<f64>,
+    /// Largest of these, absolute.
+    pub max_orthogonal: f64,
+    /// Depth reached, length.
+    pub reached_depth: f64,
+    /// Why it ended before the full depth.
     pub failure: Option<String>,
 }
 
@@ -165,6 +183,9 @@ pub struct CaseResult {
     pub strategies: Strategies,
     /// Largest error of `static` over that of `dynamic`.
     pub improvement: Option<f64>,
+    /// Largest error without a paddle over that of `dynamic`; results of older versions have none.
+    #[serde(default)]
+    pub improvement_over_none: Option<f64>,
 }
 
 /// A controller table in short.

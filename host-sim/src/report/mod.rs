@@ -79,17 +79,18 @@ fn sentence(run: &RunResult) -> String {
         })
         .collect();
     let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
-    let reduction = reduction(run).map_or_else(String::new, |range| {
-        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's")
+    let reduction = reduction(run, |case| case.improvement).map_or_else(String::new, |range| {
+        let none = reduction(run, |case| case.improvement_over_none)
+            .map_or_else(String::new, |range| format!(" and {range} times smaller than without a paddle"));
+        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's{none}")
     });
     let text = format!("{}{agreement}{reduction}.", placements.join("; "));
     text.replacen("tissue", "Tissue", 1)
 }
 
-/// How many times smaller the dynamic paddle's largest error is than the static one's, over all cases.
-fn reduction(run: &RunResult) -> Option<String> {
-    let factors: Vec<f64> =
-        run.cases.iter().filter_map(|case| case.improvement).filter(|factor| factor.is_finite()).collect();
+/// How many times smaller the dynamic paddle's largest error is than another one, over all cases.
+fn reduction(run: &RunResult, factor: impl Fn(&CaseResult) -> Option<f64>) -> Option<String> {
+    let factors: Vec<f64> = run.cases.iter().filter_map(factor).filter(|factor| factor.is_finite()).collect();
     let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let high = factors.iter().copied().fold(0.0, f64::max);
     // Small factors with a digit behind the point: "1 times smaller" says nothing.
@@ -110,7 +111,7 @@ fn head(run: &RunResult) -> Markup {
                 (plain(run.settings.depth)) " in " (plain(run.settings.insertion_s)) " s; paddle in brackets"
             } }
             thead { tr {
-                th { "tissue" } th { "no paddle" } th { "static" } th { "dynamic" } th { "static / dynamic" }
+                th { "tissue" } th { "no paddle" } th { "static" } th { "dynamic" } th { "static / dynamic" } th { "none / dynamic" }
                 th.left { "table made from" }
             } }
             tbody { @for case in &run.cases { tr {
@@ -119,6 +120,7 @@ fn head(run: &RunResult) -> Markup {
                 td { (largest(case.strategies.static_paddle.as_ref())) }
                 td.best { (largest(dynamic(case))) }
                 td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
+                td { (case.improvement_over_none.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td.left { (case.table_tissue) }
             } } }
         } }
@@ -303,7 +305,7 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     let insertion: Vec<Panel> =
         run.cases.iter().enumerate().flat_map(|(i, case)| case_charts(run, i, case).panels()).collect();
     let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
-    let reduction = reduction(run).map_or_else(
+    let reduction = reduction(run, |case| case.improvement).map_or_else(
         || "Error along the insertion".to_owned(),
         |range| format!("The dynamic paddle's largest error is {range} times smaller than the static one's"),
     );

@@ -22,6 +22,11 @@ fn at_the_end(paddle: &PaddlePlacement) -> f64 {
     paddle.orthogonal.last().copied().unwrap_or(f64::NAN)
 }
 
+/// The same without a paddle.
+fn without_paddle(placement: &PlacementResult) -> Option<f64> {
+    placement.no_paddle.as_ref()?.orthogonal.last().copied()
+}
+
 /// Points of a chart over the paddles.
 fn over(placement: &PlacementResult, value: impl Fn(&PaddlePlacement) -> f64) -> Vec<(f64, f64)> {
     placement.paddles.iter().enumerate().map(|(i, paddle)| (i as f64, value(paddle))).collect()
@@ -30,7 +35,8 @@ fn over(placement: &PlacementResult, value: impl Fn(&PaddlePlacement) -> f64) ->
 /// Orthogonal displacement with every paddle held, one chart per tissue on the same scale.
 pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
     let all = run.placements.iter().flat_map(|placement| &placement.paddles);
-    let values: Vec<f64> = all.flat_map(|paddle| [0.0, at_the_end(paddle), paddle.max_orthogonal]).collect();
+    let mut values: Vec<f64> = all.flat_map(|paddle| [0.0, at_the_end(paddle), paddle.max_orthogonal]).collect();
+    values.extend(run.placements.iter().filter_map(without_paddle));
     run.placements
         .iter()
         .map(|placement| {
@@ -54,6 +60,8 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
                 panel.strips.push(Strip { label: "the paper's optimum".to_owned(), range: [x - 0.4, x + 0.4] });
             }
             panel.lines.push(ReferenceLine::new("", Place::Y(0.0), Dash::Solid));
+            let none = without_paddle(placement);
+            panel.lines.extend(none.map(|none| ReferenceLine::new("no paddle", Place::Y(none), Dash::Dashed)));
             let ends = over(placement, at_the_end);
             let stems = ends.iter().map(|(x, y)| [x - 0.02, x + 0.02, *y]).collect();
             panel.bars.push(Bars { label: String::new(), colour: Colour::Vermillion, bars: stems });
@@ -79,7 +87,7 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
         .iter()
         .flat_map(|placement| placement.paddles.iter().map(move |paddle| (placement, paddle)))
         .flat_map(|(placement, paddle)| {
-            [Some(paddle.controllability_measure), paper(placement, paddle.index)].into_iter().flatten()
+            [paddle.controllability_measure, paper(placement, paddle.index)].into_iter().flatten()
         })
         .collect();
     run.placements
@@ -98,7 +106,7 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
                 let series = Series::scatter("the paper's Table III", Colour::Ink, Marker::Diamond, reported);
                 panel.series.push(series.open().joined(Dash::Dashed));
             }
-            let ours = over(placement, |p| p.controllability_measure);
+            let ours = over(placement, |p| p.controllability_measure.unwrap_or(f64::NAN));
             panel.series.push(Series::scatter("this run", Colour::Blue, Marker::Circle, ours).joined(Dash::Solid));
             panel
         })
@@ -144,7 +152,14 @@ pub(super) fn static_table(run: &RunResult) -> Markup {
                     td { (plain(paddle.reached_depth)) }
                     td.wrap { (remark(run, placement, paddle)) }
                 }
-            } } }
+            }
+            @if let Some(none) = &placement.no_paddle { tr {
+                td { (placement.tissue) } td { "none" }
+                td { (number(none.orthogonal.last().copied().unwrap_or(f64::NAN), 4)) }
+                td { (number(none.max_orthogonal, 4)) } td { (plain(none.reached_depth)) }
+                td.wrap { (none.failure.as_ref().map(|f| format!("stopped early: {f}")).unwrap_or_default()) }
+            } }
+            } }
         } }
     }
 }
@@ -162,10 +177,11 @@ pub(super) fn controllability_table(run: &RunResult) -> Markup {
                 @let reported = paper_controllability(&run.scene, placement.tissue, paddle.index);
                 tr class=[mark(paddle.index == placement.best_dynamic)] {
                     td { (placement.tissue) } td { (paddle.index) }
-                    td { (number(paddle.controllability_measure, 5)) }
+                    td { (paddle.controllability_measure.map_or_else(|| "cannot control".to_owned(), |value| number(value, 5))) }
                     td { (reported.map_or_else(|| NO_NUMBER.to_owned(), |value| number(value, 5))) }
-                    td { (deviation(paddle.controllability_measure, reported)) }
-                    td { (number(paddle.best_direction[0], 4)) } td { (number(paddle.best_direction[1], 4)) }
+                    td { (deviation(paddle.controllability_measure.unwrap_or(f64::NAN), reported)) }
+                    @let [x, y] = paddle.best_direction.unwrap_or([f64::NAN; 2]);
+                    td { (number(x, 4)) } td { (number(y, 4)) }
                 }
             } } }
         } }

@@ -76,10 +76,16 @@ fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
     )?;
     match (case.improvement, dynamic) {
         (Some(factor), Some(dynamic)) => {
-            writeln!(text, "   {factor:.0} times less, {}", names::mode::name(dynamic.final_state))
+            let none = case.improvement_over_none.map_or_else(String::new, |factor| format!("{} of none, ", share(factor)));
+            writeln!(text, "   {} of static, {none}{}", share(factor), names::mode::name(dynamic.final_state))
         }
         _ => writeln!(text),
     }
+}
+
+/// An error over another one, by how many times it is smaller; a digit more where that is few.
+fn share(factor: f64) -> String {
+    if factor < 10.0 { format!("1/{factor:.1}") } else { format!("1/{factor:.0}") }
 }
 
 const fn plant_name(model: PlantModel) -> &'static str {

@@ -82,8 +82,8 @@ fn paddle_placement(index: u32) -> PaddlePlacement {
     PaddlePlacement {
         index,
         jacobian: [[1.0, 0.0], [0.0, 1.0]],
-        controllability_measure: 3.0 + f64::from(index),
-        best_direction: [1.0, 0.0],
+        controllability_measure: Some(3.0 + f64::from(index)),
+        best_direction: Some([1.0, 0.0]),
         depth: vec![0.1],
         orthogonal: vec![-0.001 * f64::from(index)],
         max_orthogonal: 0.001 * f64::from(index),
@@ -101,6 +101,7 @@ fn run(scene: &str) -> RunResult {
         best_static: 1,
         best_dynamic: 1,
         paddles: vec![paddle_placement(1), paddle_placement(2)],
+        no_paddle: None,
     };
     let case = |tissue: TissueVariant, table_tissue: &str| CaseResult {
         tissue,
@@ -123,6 +124,7 @@ fn run(scene: &str) -> RunResult {
             dynamic_free_run: Some(strategy(RunMode::FreeRun, Some(1), 1e-5)),
         },
         improvement: Some(40.0),
+        improvement_over_none: Some(200.0),
     };
     RunResult {
         format: FORMAT,
@@ -238,7 +240,8 @@ fn numbers_that_are_none_leave_the_page_whole() {
         let mut run = run("paper");
         run.placements[0].paddles[0].orthogonal = vec![wrong];
         run.placements[0].paddles[1].orthogonal.clear();
-        run.placements[0].paddles[1].controllability_measure = wrong;
+        run.placements[0].paddles[1].controllability_measure = Some(wrong);
+        run.placements[1].paddles[1].best_direction = None;
         run.placements[1].paddles[0].max_orthogonal = wrong;
         run.cases[0].improvement = Some(wrong);
         run.geometry.nodes[4] = [wrong, wrong];

@@ -82,7 +82,7 @@ impl CliError {
     fn reason(&self) -> String {
         match self {
             Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => failure.reason.to_string(),
-            Self::Model(ModelError::Uncontrollable { .. }) => "singular-jacobian".into(),
+            Self::Model(ModelError::Uncontrollable { .. } | ModelError::NoPaddleControls) => "singular-jacobian".into(),
             Self::Model(ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_))) => {
                 "singular-moment-matrix".into()
             }

@@ -10,6 +10,7 @@ mod man;
 mod new;
 mod pareto;
 mod place;
+mod place_text;
 mod schema;
 mod solve;
 mod stability;

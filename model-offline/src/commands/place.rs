@@ -3,11 +3,14 @@
 use super::common::{Common, SceneArgs, check_outputs};
 use super::error::CliError;
 use super::json::write_json;
+use super::place_text;
+use model_offline::model::ModelError;
 use model_offline::output;
+use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;
 use model_offline::table::{self, TableOptions};
-use std::fmt::Write as _;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// Options of `place`.
@@ -28,21 +31,58 @@ pub(super) struct PlaceArgs {
 pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
     let scene = args.common.over(args.scene.read()?)?;
     check_outputs(&args.scene.scene, &[("--json", args.json.as_deref()), ("--table", args.table.as_deref())])?;
-    place(&scene, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
+    place(&scene, args).map_err(|error| error.reported(args.json.as_deref(), &scene))?.finish(args)
 }
 
-fn place(scene: &Scene, args: &PlaceArgs) -> Result<(), CliError> {
+/// A study whose JSON and text are out; the table, or why there is none, is left.
+struct Placed {
+    table: Option<Result<Vec<u8>, CliError>>,
+}
+
+impl Placed {
+    fn finish(self, args: &PlaceArgs) -> Result<(), CliError> {
+        match (self.table, &args.table) {
+            (Some(table), Some(path)) => Ok(output::write_whole(path, &table?)?),
+            _ => Ok(()),
+        }
+    }
+}
+
+fn place(scene: &Scene, args: &PlaceArgs) -> Result<Placed, CliError> {
     let bar = args.common.progress(study::steps(scene));
     let progress = || bar.inc(1);
-    let options = PlacementOptions { threads: args.common.threads(), progress: &progress, ..Default::default() };
+    let threads = args.common.threads();
+    let options = PlacementOptions { threads, progress: &progress, ..Default::default() };
     let study = PlacementStudy::run(scene, &options)?;
+    let wanted = !args.common.quiet || args.json.is_some();
+    let accuracy = wanted.then(|| study.accuracy(threads));
     bar.finish_and_clear();
-    if let Some(path) = &args.table {
-        let built = table::build(&study.model, study.placement.optimum.dynamic_paddle, &TableOptions::default())?;
-        output::write_whole(path, &table::to_bytes(&built)?)?;
+    let table = args.table.as_ref().map(|_| table_of(&study));
+    write_json(args.json.as_deref(), &document(&study, accuracy.as_ref(), table.as_ref()))?;
+    if !args.common.quiet {
+        print!("{}", place_text::summary(&study, accuracy.as_ref()));
     }
-    let check = study.cross_check();
-    let document = serde_json::json!({
+    Ok(Placed { table })
+}
+
+/// The controller table of the best dynamic paddle.
+fn table_of(study: &PlacementStudy) -> Result<Vec<u8>, CliError> {
+    let paddle = study.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
+    Ok(table::to_bytes(&table::build(&study.model, paddle, &TableOptions::default())?)?)
+}
+
+type Accuracy = Result<StudyAccuracy, ModelError>;
+
+fn document(study: &PlacementStudy, accuracy: Option<&Accuracy>, table: Option<&Result<Vec<u8>, CliError>>) -> Value {
+    let scene = study.model.scene();
+    let known = accuracy.and_then(|a| a.as_ref().ok());
+    let mut paddles = json!(study.placement.paddles);
+    for (i, paddle) in paddles.as_array_mut().into_iter().flatten().enumerate() {
+        paddle["error"] = json!(known.map(|known| &known.errors.paddles[i]));
+    }
+    let mut no_paddle = json!(study.placement.no_paddle);
+    no_paddle["error"] = json!(known.map(|known| json!({ "static": known.errors.no_paddle })));
+    json!({
         "scene": scene.name,
         "tissue": scene.tissue(),
         "nodes": study.model.nodes(),
@@ -50,64 +90,14 @@ fn place(scene: &Scene, args: &PlaceArgs) -> Result<(), CliError> {
         "integration": scene.discretization.method.integration,
         "wall_s": study.wall_s,
         "error_estimate": study.error_estimate,
-        "cross_check": check,
+        "cross_check": known.and_then(|known| known.cross_check),
+        "errors_unknown": accuracy.and_then(|a| a.as_ref().err()).map(ToString::to_string),
+        "reference_nodes": known.map(|known| known.reference_nodes),
         "static_nodes": study.placement.profile_nodes,
-        "paddles": study.placement.paddles,
+        "static_second_nodes": known.and_then(|known| known.errors.second_nodes),
+        "paddles": paddles,
+        "no_paddle": no_paddle,
         "optimum": study.placement.optimum,
-    });
-    write_json(args.json.as_deref(), &document)?;
-    if !args.common.quiet {
-        print!("{}", summary(&study));
-        if let Some(check) = check {
-            println!("{}", check.line());
-        }
-    }
-    Ok(())
-}
-
-fn summary(study: &PlacementStudy) -> String {
-    let (scene, optimum) = (study.model.scene(), study.placement.optimum);
-    let mut out = format!(
-        "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖   J⁻¹n                  max orthogonal (static)\n",
-        scene.name,
-        scene.tissue(),
-        study.model.nodes(),
-        1e3 * study.wall_s
-    );
-    for p in &study.placement.paddles {
-        let mark = |best: u32| if p.index == best { "*" } else { " " };
-        let stopped = p
-            .static_study
-            .failure
-            .as_ref()
-            .map_or(String::new(), |f| format!("  stopped at depth {:.4}: {}", f.depth, f.reason));
-        let _ = writeln!(
-            out,
-            "{:>7}  {:8.4}{} ({:8.4}, {:8.4})  {:12.6}{}{stopped}",
-            p.index,
-            p.controllability_measure,
-            mark(optimum.dynamic_paddle),
-            p.best_direction[0],
-            p.best_direction[1],
-            p.static_study.max_orthogonal,
-            mark(optimum.static_paddle),
-        );
-    }
-    if let Some(e) = study.error_estimate {
-        let _ = writeln!(
-            out,
-            "\nestimated error: controllability {:.2} %, small-depth target displacement {:.2} % of the largest",
-            100.0 * e.controllability,
-            100.0 * e.target_displacement
-        );
-    }
-    let _ = writeln!(
-        out,
-        "\nbest static paddle: {}; best dynamic paddle: {}",
-        optimum.static_paddle, optimum.dynamic_paddle
-    );
-    for line in study.verdict() {
-        let _ = writeln!(out, "{line}");
-    }
-    out
+        "table_failure": table.and_then(|table| table.as_ref().err()).map(ToString::to_string),
+    })
 }

@@ -17,6 +17,9 @@ pub fn cubic_b_spline(z: f64) -> (f64, f64) {
     }
 }
 
+/// Kernel values below this are zero: at the very end of a support, rounding of the distance leaves (1e-16)³.
+pub const NEGLIGIBLE: f64 = 1e-30;
+
 /// Value and gradient with respect to x of φ_a(x − x_I), for `offset` = x − x_I and half-width `a` of the support.
 #[inline]
 pub fn product_kernel<const D: usize>(offset: &Point<D>, a: f64) -> (f64, Point<D>) {

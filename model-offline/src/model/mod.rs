@@ -37,7 +37,7 @@ pub enum ModelError {
     NothingConstrained(String),
     /// The paddle cannot move the target orthogonally to the needle.
     #[error(
-        "paddle {paddle}: the actuation Jacobian is singular (condition {condition:.1e}): this paddle cannot control the target"
+        "paddle {paddle}: the actuation Jacobian is singular (condition number {condition:.1e}): this paddle cannot control the target"
     )]
     Uncontrollable {
         /// Paddle index.
@@ -45,6 +45,9 @@ pub enum ModelError {
         /// Condition number of the Jacobian.
         condition: f64,
     },
+    /// None of the scene's paddles can move the target orthogonally to the needle.
+    #[error("no paddle of this scene can control the target: move a paddle, turn the needle, or use one static")]
+    NoPaddleControls,
     /// A model of more nodes than are tried.
     #[error("{nodes} nodes are needed, at most {limit} are tried")]
     TooManyNodes {

@@ -5,10 +5,11 @@
 //! towards the singular points, level by level, until their distance to that, with what it leaves open, is within the
 //! tolerance. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
 
-use super::goal_oriented::{self, Certified};
+use super::goal_oriented;
+pub use super::reference::{Reference, distance};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
-use crate::discretization::{Integration, Method, Resolution};
+use crate::discretization::{Integration, Resolution};
 use crate::model::{ModelError, TissueModel, graded_model};
 use crate::scene::Scene;
 use serde::Serialize;
@@ -39,9 +40,31 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
+    fn of(responses: &[RestResponse], reference: &Reference, level: i32) -> Self {
+        let (_, target_displacement) = reference.distance(responses);
+        Self {
+            controllability: reference.errors(responses).into_iter().fold(0.0, f64::max),
+            target_displacement: target_displacement + reference.open_displacement(),
+            reference: reference.open,
+            reference_nodes: reference.nodes,
+            level,
+        }
+    }
+
     fn worst(&self) -> f64 {
         self.controllability.max(self.target_displacement)
     }
+}
+
+/// A discretised scene, and what is known of its error already.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// The model.
+    pub model: TissueModel,
+    /// Its estimated error, where the scene asks for a tolerance.
+    pub estimate: Option<ErrorEstimate>,
+    /// What it was judged by, where the scene asks for a tolerance.
+    pub reference: Option<Reference>,
 }
 
 /// Discretises a scene at its spacing, or refines it to its tolerance.
@@ -49,12 +72,22 @@ impl ErrorEstimate {
 /// # Errors
 /// [`ModelError`], among them [`ModelError::ToleranceNotReached`] with the estimate that was reached.
 pub fn discretise(scene: &Scene) -> Result<(TissueModel, Option<ErrorEstimate>), ModelError> {
+    discretise_judged(scene).map(|judged| (judged.model, judged.estimate))
+}
+
+/// The same with what the model was judged by.
+///
+/// # Errors
+/// As for [`discretise`].
+pub fn discretise_judged(scene: &Scene) -> Result<Judged, ModelError> {
     match scene.discretization.resolution {
-        Resolution::Tolerance(tolerance) => {
-            let (model, estimate) = refine(scene, tolerance)?;
-            Ok((model, Some(estimate)))
+        Resolution::Tolerance(tolerance) if scene.discretization.method.integration == Integration::FemT6 => {
+            refine_elements(scene, tolerance)
         }
-        Resolution::Spacing(_) | Resolution::Level(_) => Ok((TissueModel::new(scene)?, None)),
+        Resolution::Tolerance(tolerance) => refine_nodes(scene, tolerance),
+        Resolution::Spacing(_) | Resolution::Level(_) => {
+            Ok(Judged { model: TissueModel::new(scene)?, estimate: None, reference: None })
+        }
     }
 }
 
@@ -74,11 +107,8 @@ pub fn profile_model(model: &TissueModel) -> Result<TissueModel, ModelError> {
 /// Largest model on which the finite-depth profile is followed.
 const PROFILE_NODES: usize = 1500;
 
-fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
+fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let method = scene.discretization.method;
-    if method.integration == Integration::FemT6 {
-        return refine_elements(scene, method, tolerance);
-    }
     let mut reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
     let mut level = first_level(tolerance);
@@ -95,17 +125,17 @@ fn refine(scene: &Scene, tolerance: f64) -> Result<(TissueModel, ErrorEstimate),
             Err(error) => return Err(error),
         };
         let responses = rest_responses(&model)?;
-        let mut estimate = reference.estimate(&responses, level);
+        let mut estimate = ErrorEstimate::of(&responses, &reference, level);
         if estimate.worst() > tolerance
             && estimate.worst() - reference.open <= tolerance
-            && !reference.is_sharp(tolerance)
+            && reference.open > SHARP_SHARE * tolerance
         {
             // What the reference leaves open decides: sharpening it costs less than another level, and serves all to come.
             reference = Reference::compute(scene, SHARP_SHARE * tolerance)?;
-            estimate = reference.estimate(&responses, level);
+            estimate = ErrorEstimate::of(&responses, &reference, level);
         }
         if estimate.worst() <= tolerance {
-            return Ok((model, estimate));
+            return Ok(Judged { model, estimate: Some(estimate), reference: Some(reference) });
         }
         tried = level;
         // A level halves the error at best, so those that could not reach the tolerance are not tried; but what the
@@ -124,101 +154,20 @@ fn first_level(tolerance: f64) -> i32 {
 }
 
 /// Refines quadratic triangles where the answers ask for it; they need no other reference.
-fn refine_elements(scene: &Scene, method: Method, tolerance: f64) -> Result<(TissueModel, ErrorEstimate), ModelError> {
+fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut level = MIN_LEVEL - 1;
     let mut estimate = None;
     let (certified, reached) = goal_oriented::refine(scene, |certified| {
         level += 1;
-        let reference = Reference::from_certified(certified);
-        let found = reference.estimate(&certified.responses, level);
+        let found = ErrorEstimate::of(&certified.responses, &Reference::from_certified(certified), level);
         estimate = Some(found);
         found.worst() <= tolerance
     })?;
-    let Some(estimate) = estimate.filter(|_| reached) else {
+    if !reached {
         let reached = estimate.map_or(f64::INFINITY, |e| e.worst());
         return Err(ModelError::ToleranceNotReached { tolerance, reached });
-    };
-    let planar = certified.model.planar().clone();
-    debug_assert_eq!(method.integration, Integration::FemT6);
-    Ok((TissueModel::on(scene, planar, certified.model.spacing())?, estimate))
-}
-
-/// A solution on quadratic triangles, extrapolated, to judge others by.
-#[derive(Debug, Clone)]
-pub struct Reference {
-    responses: Vec<RestResponse>,
-    open_by_paddle: Vec<f64>,
-    open_displacement: f64,
-    /// What it leaves open: worst relative error, of all paddles' measures and of the displacements.
-    pub open: f64,
-    /// Nodes of the finer mesh.
-    pub nodes: usize,
-}
-
-impl Reference {
-    /// Refines until what the limit leaves open is no more than `share`, or as far as nodes are accepted.
-    ///
-    /// # Errors
-    /// [`ModelError`] as for any model.
-    pub fn compute(scene: &Scene, share: f64) -> Result<Self, ModelError> {
-        let (certified, _) = goal_oriented::refine(scene, |certified| certified.worst_open() <= share)?;
-        Ok(Self::from_certified(&certified))
     }
-
-    fn from_certified(certified: &Certified) -> Self {
-        Self {
-            responses: certified.limit.clone(),
-            open_by_paddle: certified.open.clone(),
-            open_displacement: certified.open_displacement,
-            open: certified.worst_open(),
-            nodes: certified.nodes,
-        }
-    }
-
-    fn is_sharp(&self, tolerance: f64) -> bool {
-        self.open <= SHARP_SHARE * tolerance
-    }
-
-    /// Estimated relative errors of the controllability measures, paddle by paddle: the distance to the limit, and what
-    /// that leaves open.
-    pub fn errors(&self, responses: &[RestResponse]) -> Vec<f64> {
-        let off = responses
-            .iter()
-            .zip(&self.responses)
-            .map(|(found, limit)| (found.controllability_measure / limit.controllability_measure - 1.0).abs());
-        off.zip(&self.open_by_paddle).map(|(off, open)| off + open).collect()
-    }
-
-    /// Worst relative distance of the controllability measures, and of the small-depth target displacements over the
-    /// largest one.
-    pub fn distance(&self, responses: &[RestResponse]) -> (f64, f64) {
-        distance(responses, &self.responses)
-    }
-
-    /// The extrapolated responses.
-    pub fn responses(&self) -> &[RestResponse] {
-        &self.responses
-    }
-
-    fn estimate(&self, responses: &[RestResponse], level: i32) -> ErrorEstimate {
-        let (_, target_displacement) = distance(responses, &self.responses);
-        ErrorEstimate {
-            controllability: self.errors(responses).into_iter().fold(0.0, f64::max),
-            target_displacement: target_displacement + self.open_displacement,
-            reference: self.open,
-            reference_nodes: self.nodes,
-            level,
-        }
-    }
-}
-
-/// Worst relative distance of the measures, and of the displacements over the largest one.
-pub fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
-    let largest = b.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
-    a.iter().zip(b).fold((0.0, 0.0), |(measure, displacement): (f64, f64), (a, b)| {
-        (
-            measure.max((a.controllability_measure / b.controllability_measure - 1.0).abs()),
-            displacement.max((a.target_per_depth - b.target_per_depth).norm() / largest),
-        )
-    })
+    let reference = Some(Reference::from_certified(&certified));
+    let model = TissueModel::on(scene, certified.model.planar().clone(), certified.model.spacing())?;
+    Ok(Judged { model, estimate, reference })
 }

@@ -1,21 +1,16 @@
-//! A second opinion on an answer that carries no error estimate: quadratic triangles on a few graded nodes.
+//! A second opinion on an answer that carries no error estimate: quadratic triangles that certify their own error.
 
-use super::rest::rest_responses;
-use super::study::PaddleResult;
-use crate::discretization::{Integration, Method};
-use crate::model::graded_model;
-use crate::scene::Scene;
+use super::reference::Reference;
+use super::study::Placement;
 use serde::Serialize;
 
-/// Refinement level of the triangles: wrong by 1 to 3 % on `paper`, `paper-hull`, `breast` and `prostate`, for 5 to 50 ms.
-const LEVEL: i32 = 0;
-/// Distance from which on the answer is not to be trusted, whatever the triangles are wrong by themselves.
+/// Distance from which on the answer is not to be trusted.
 const DOUBTFUL: f64 = 0.15;
 
-/// How far the controllability measures are from those of another method.
+/// How far the controllability measures may be from the truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CrossCheck {
-    /// Worst relative distance of the controllability measures.
+    /// Worst relative distance of the controllability measures from the limit of the triangles, with what that leaves open.
     pub controllability: f64,
     /// The paddle where it is.
     pub paddle: u32,
@@ -23,15 +18,12 @@ pub struct CrossCheck {
     pub nodes: usize,
 }
 
-/// Compares results with quadratic triangles on graded nodes; none where those cannot be made.
-pub fn cross_check(scene: &Scene, paddles: &[PaddleResult]) -> Option<CrossCheck> {
-    let model = graded_model(scene, Method::new(Integration::FemT6), LEVEL).ok()?;
-    let others = rest_responses(&model).ok()?;
-    let apart = paddles.iter().zip(&others).map(|(paddle, other)| {
-        ((paddle.controllability_measure / other.controllability_measure - 1.0).abs(), paddle.index)
-    });
-    let (controllability, paddle) = apart.max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(CrossCheck { controllability, paddle, nodes: model.nodes() })
+/// The worst of the errors that a reference finds; none where there is nothing to compare.
+pub fn cross_check(placement: &Placement, reference: &Reference) -> Option<CrossCheck> {
+    let rest: Vec<_> = placement.paddles.iter().map(|p| p.rest()).collect();
+    let errors = reference.errors(&rest).into_iter().zip(&placement.paddles);
+    let (controllability, paddle) = errors.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(CrossCheck { controllability, paddle: paddle.index, nodes: reference.nodes })
 }
 
 impl CrossCheck {
@@ -43,7 +35,7 @@ impl CrossCheck {
             ""
         };
         format!(
-            "cross-check: ‖J⁻¹n‖ up to {:.1} % away from quadratic triangles on {} graded nodes (paddle {}){advice}",
+            "cross-check: ‖J⁻¹n‖ up to {:.1} % off, judged by quadratic triangles on {} nodes (paddle {}){advice}",
             100.0 * self.controllability,
             self.nodes,
             self.paddle
@@ -54,9 +46,10 @@ impl CrossCheck {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::discretization::Resolution;
+    use crate::discretization::{Integration, Resolution};
     use crate::model::TissueModel;
     use crate::placement::study::{PlacementOptions, place};
+    use crate::scene::Scene;
 
     #[test]
     fn coarse_nodes_are_found_out_and_fine_ones_are_not_accused() {
@@ -67,7 +60,7 @@ mod tests {
             scene.discretization.resolution = Resolution::Spacing(spacing);
             let model = TissueModel::new(&scene).unwrap();
             let placement = place(&model, &PlacementOptions::default()).unwrap();
-            cross_check(&scene, &placement.paddles).unwrap()
+            cross_check(&placement, &Reference::compute(&scene, 0.01).unwrap()).unwrap()
         };
         let (coarse, fine) = (check(Integration::Dni, 0.2), check(Integration::Gauss, 0.05));
         assert!(coarse.controllability > DOUBTFUL && coarse.line().contains("too far"), "{coarse:?}");

@@ -129,24 +129,20 @@ impl Pair {
             coarse.push(fields.clone());
             Ok(())
         })?;
-        let responses = (0..coarse.len())
-            .map(|paddle| response_of(&self.coarse, paddle, &coarse[paddle]))
-            .collect::<Result<Vec<_>, _>>()?;
+        let responses: Vec<_> = coarse.iter().map(|fields| response_of(&self.coarse, fields)).collect();
         let largest = responses.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
         let stiffness = self.stiffness();
         let mut parts = vec![0.0_f64; self.coarse.cells().len()];
         let (mut limit, mut open, mut open_displacement) = (Vec::new(), Vec::new(), 0.0_f64);
         for_each_paddle(&self.fine, Loads::OnTarget, |paddle, fields| {
-            let found = response_of(&self.fine, paddle, fields)?;
+            let found = response_of(&self.fine, fields);
             let errors = self.errors(&coarse[paddle], fields);
             for pair in pairs(&found, largest) {
                 self.add_parts(&errors, &pair, &stiffness, &mut parts);
             }
             let before = &responses[paddle];
-            limit.push(shifted(&self.fine, paddle, before, &found)?);
-            let length = (found.controllability_measure - before.controllability_measure).abs();
-            let sideways = SIDEWAYS * (found.best_direction - before.best_direction).norm();
-            open.push((OPEN * length).max(sideways) / found.controllability_measure);
+            limit.push(shifted(before, &found, self.fine.scene().needle.orthogonal()));
+            open.push(left_open(before, &found));
             let moved = (found.target_per_depth - before.target_per_depth).norm();
             open_displacement = open_displacement.max(OPEN * moved / largest);
             Ok(())
@@ -203,8 +199,8 @@ impl Pair {
 /// What is prescribed and where it is looked at, as weights on the fields (paddle x, y, needle, target x, y): the
 /// controllability measure ‖b‖, whose relative change is `−(J⁻ᵀ b)ᵀ ∂J b / ‖b‖²`, and the needle's two displacements.
 fn pairs(response: &RestResponse, largest: f64) -> [([f64; 5], [f64; 5]); 3] {
-    let b = response.best_direction;
-    let w = response.jacobian.transpose().try_inverse().map_or(Vector2::zeros(), |i| i * b / b.norm_squared());
+    let b = response.best_direction.unwrap_or_default();
+    let w = response.jacobian.transpose().try_inverse().filter(|_| b != Vector2::zeros()).map_or(Vector2::zeros(), |i| i * b / b.norm_squared());
     let needle = [0.0, 0.0, 1.0, 0.0, 0.0];
     [
         ([b.x, b.y, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, w.x, w.y]),
@@ -214,15 +210,21 @@ fn pairs(response: &RestResponse, largest: f64) -> [([f64; 5], [f64; 5]); 3] {
 }
 
 /// The middle of where the limit lies.
-fn shifted(
-    model: &TissueModel,
-    paddle: usize,
-    coarse: &RestResponse,
-    fine: &RestResponse,
-) -> Result<RestResponse, ModelError> {
+fn shifted(coarse: &RestResponse, fine: &RestResponse, normal: Vector2<f64>) -> RestResponse {
     let jacobian = fine.jacobian + (fine.jacobian - coarse.jacobian) * SHIFT;
     let per_depth = fine.target_per_depth + (fine.target_per_depth - coarse.target_per_depth) * SHIFT;
-    RestResponse::of(model, paddle, jacobian, per_depth)
+    RestResponse::new(jacobian, per_depth, normal)
+}
+
+/// What the limit leaves open of the controllability measure, relative.
+fn left_open(coarse: &RestResponse, fine: &RestResponse) -> f64 {
+    match (coarse.best_direction, fine.best_direction) {
+        (Some(before), Some(after)) => (OPEN * (after.norm() - before.norm()).abs())
+            .max(SIDEWAYS * (after - before).norm())
+            / fine.controllability_measure,
+        (None, None) => 0.0,
+        _ => f64::INFINITY,
+    }
 }
 
 /// Displacement gradients of every field at the corners of every triangle: they are linear, and the integration points
@@ -285,7 +287,7 @@ mod tests {
         let stiffness = pair.stiffness();
         for_each_paddle(&pair.fine, Loads::OnTarget, |paddle, fields| {
             let (before, after) =
-                (response_of(&pair.coarse, paddle, &coarse[paddle])?, response_of(&pair.fine, paddle, fields)?);
+                (response_of(&pair.coarse, &coarse[paddle]), response_of(&pair.fine, fields));
             let errors = pair.errors(&coarse[paddle], fields);
             let rule = pair.fine.rule();
             let product = |u: usize, z: usize| -> f64 {

@@ -1,10 +1,13 @@
 //! Where to put the paddle: the actuation Jacobian d(target)/d(paddle), the controllability measure ‖J⁻¹n‖, the static
 //! study, and the rankings for the static and the dynamic approach.
 
+pub mod accuracy;
 pub mod adaptive;
 pub mod controllability;
 pub mod cross_check;
 mod goal_oriented;
+pub mod hindrance;
+pub mod reference;
 pub mod rest;
 pub mod study;
 pub mod verdict;

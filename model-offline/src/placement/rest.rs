@@ -14,10 +14,10 @@ use nalgebra::{Matrix2, Vector2};
 pub struct RestResponse {
     /// Actuation Jacobian, needle held: rows target x, y, columns paddle x, y.
     pub jacobian: Matrix2<f64>,
-    /// ‖J⁻¹ n‖.
+    /// ‖J⁻¹ n‖; infinite where the paddle cannot control the target.
     pub controllability_measure: f64,
-    /// J⁻¹ n.
-    pub best_direction: Vector2<f64>,
+    /// J⁻¹ n; none where the paddle cannot control the target.
+    pub best_direction: Option<Vector2<f64>>,
     /// d(target displacement)/d(depth), paddle held.
     pub target_per_depth: Vector2<f64>,
 }
@@ -43,15 +43,15 @@ const RATES: usize = 3;
 /// Responses of all paddles of the model's scene, in its order.
 ///
 /// # Errors
-/// [`ModelError`] when the tangent at rest is singular or a paddle cannot control the target.
+/// [`ModelError`] when the tangent at rest is singular. A paddle that cannot control the target is a result.
 pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelError> {
     let count = model.scene().paddles.len();
     if (0..count).any(|p| model.constrained_rows(Some(p)).is_none()) {
         return (0..count).map(|paddle| rest_response_weakly_imposed(model, paddle)).collect();
     }
     let mut responses = Vec::with_capacity(count);
-    for_each_paddle(model, Loads::None, |paddle, fields| {
-        responses.push(response_of(model, paddle, fields)?);
+    for_each_paddle(model, Loads::None, |_, fields| {
+        responses.push(response_of(model, fields));
         Ok(())
     })?;
     Ok(responses)
@@ -122,27 +122,32 @@ fn rest_response_weakly_imposed(model: &TissueModel, paddle: usize) -> Result<Re
     let mut body = model.body(Some(paddle), NewtonSettings::default())?;
     let jacobian = body.actuation_jacobian()?;
     let target_per_depth = body.depth_sensitivity()?;
-    RestResponse::of(model, paddle, jacobian, target_per_depth)
+    Ok(RestResponse::new(jacobian, target_per_depth, model.scene().needle.orthogonal()))
 }
 
 /// What the fields of one paddle say about it.
-pub(super) fn response_of(model: &TissueModel, paddle: usize, fields: &Fields) -> Result<RestResponse, ModelError> {
+pub(super) fn response_of(model: &TissueModel, fields: &Fields) -> RestResponse {
     let target = |rate: usize| model.target_row().interpolate(fields.field(rate));
-    RestResponse::of(model, paddle, Matrix2::from_columns(&[target(0), target(1)]), target(2))
+    let jacobian = Matrix2::from_columns(&[target(0), target(1)]);
+    RestResponse::new(jacobian, target(2), model.scene().needle.orthogonal())
 }
 
 impl RestResponse {
-    pub(super) fn of(
-        model: &TissueModel,
-        paddle: usize,
-        jacobian: Matrix2<f64>,
-        target_per_depth: Vector2<f64>,
-    ) -> Result<Self, ModelError> {
-        let scene = model.scene();
-        let direction = best_direction(&jacobian, scene.needle.orthogonal()).map_err(|singular| {
-            ModelError::Uncontrollable { paddle: scene.paddles[paddle].index, condition: singular.condition }
-        })?;
-        Ok(Self { jacobian, controllability_measure: direction.norm(), best_direction: direction, target_per_depth })
+    /// The response of a Jacobian; `normal` is orthogonal to the needle.
+    pub(super) fn new(jacobian: Matrix2<f64>, target_per_depth: Vector2<f64>, normal: Vector2<f64>) -> Self {
+        let best_direction = best_direction(&jacobian, normal).ok();
+        let controllability_measure = best_direction.map_or(f64::INFINITY, |direction| direction.norm());
+        Self { jacobian, controllability_measure, best_direction, target_per_depth }
+    }
+
+    /// Relative distance of the controllability measure from another one; none apart where neither paddle controls the
+    /// target, infinitely far where one does.
+    pub fn measure_distance(&self, other: &Self) -> f64 {
+        match (self.best_direction, other.best_direction) {
+            (None, None) => 0.0,
+            (Some(_), Some(_)) => (self.controllability_measure / other.controllability_measure - 1.0).abs(),
+            _ => f64::INFINITY,
+        }
     }
 }
 

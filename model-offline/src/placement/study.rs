@@ -2,13 +2,14 @@
 
 use super::adaptive::profile_model;
 use super::controllability::rows;
+use super::hindrance::{Hindrance, hindrance};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::Resolution;
 use crate::model::{ModelError, TissueModel};
 use crate::parallel;
 use crate::scene::Scene;
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
-use nalgebra::Vector2;
+use nalgebra::{Matrix2, Vector2};
 use serde::Serialize;
 use std::borrow::Cow;
 
@@ -24,8 +25,10 @@ pub struct StaticFailure {
 }
 
 /// The insertion with a static paddle: attached, and held still.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct StaticStudy {
+    /// d(target displacement)/d(depth) at zero depth, on the model that the insertion is followed on.
+    pub target_per_depth: [f64; 2],
     /// Needle depths, from the first increment.
     pub depth: Vec<f64>,
     /// Target displacement at these depths.
@@ -49,15 +52,28 @@ pub struct PaddleResult {
     pub jacobian: [[f64; 2]; 2],
     /// Condition number ‖J‖·‖J⁻¹‖ in the Frobenius norm, as the controller judges it.
     pub condition: f64,
-    /// ‖J⁻¹ n‖: paddle displacement per orthogonal target displacement.
+    /// ‖J⁻¹ n‖: paddle displacement per orthogonal target displacement; infinite (`null` in JSON) where the paddle cannot
+    /// control the target.
     pub controllability_measure: f64,
-    /// J⁻¹ n.
-    pub best_direction: [f64; 2],
+    /// J⁻¹ n; none where the paddle cannot control the target.
+    pub best_direction: Option<[f64; 2]>,
+    /// What keeps the paddle from holding the target; none when nothing does.
+    pub hindrance: Option<Hindrance>,
     /// d(target displacement)/d(depth) at zero depth, paddle held.
     pub target_per_depth: [f64; 2],
     /// Jacobians along the insertion, at the depths of the static study.
     pub jacobians: Vec<[[f64; 2]; 2]>,
     /// The insertion with this paddle static.
+    #[serde(rename = "static")]
+    pub static_study: StaticStudy,
+    /// Largest orthogonal displacement with this paddle static over that without a paddle, to the depth that both reached.
+    pub static_over_no_paddle: Option<f64>,
+}
+
+/// The insertion without a paddle: what every paddle is held against.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NoPaddle {
+    /// The insertion.
     #[serde(rename = "static")]
     pub static_study: StaticStudy,
 }
@@ -68,9 +84,9 @@ pub struct Optimum {
     /// Smallest largest orthogonal displacement with a static paddle.
     #[serde(rename = "static")]
     pub static_paddle: u32,
-    /// Smallest controllability measure.
+    /// Smallest controllability measure; none where no paddle can control the target.
     #[serde(rename = "dynamic")]
-    pub dynamic_paddle: u32,
+    pub dynamic_paddle: Option<u32>,
 }
 
 /// A whole placement study.
@@ -78,6 +94,8 @@ pub struct Optimum {
 pub struct Placement {
     /// Results by paddle, in the scene's order.
     pub paddles: Vec<PaddleResult>,
+    /// The insertion without a paddle.
+    pub no_paddle: NoPaddle,
     /// The best paddles.
     pub optimum: Optimum,
     /// Nodes of the model on which the insertion was followed to depth.
@@ -121,7 +139,8 @@ impl Default for PlacementOptions<'_> {
 /// a tolerance, the insertion is followed to depth on its [`profile_model`].
 ///
 /// # Errors
-/// [`ModelError`] when a Jacobian cannot be computed; a static run that stops early is a result, not an error.
+/// [`ModelError`] when the body at rest cannot be solved. A static run that stops early and a paddle that cannot control
+/// the target are results, not errors.
 pub fn place(model: &TissueModel, options: &PlacementOptions<'_>) -> Result<Placement, ModelError> {
     let resolution = model.scene().discretization.resolution;
     let profile = match resolution {
@@ -130,17 +149,27 @@ pub fn place(model: &TissueModel, options: &PlacementOptions<'_>) -> Result<Plac
     };
     let newton = options.newton.unwrap_or_else(|| newton_for(resolution));
     let rest = rest_responses(model)?;
-    let paddles = parallel::map(rest.len(), options.threads, |paddle| {
-        study_paddle(&profile, &rest[paddle], paddle, &PlacementOptions { newton: Some(newton), ..*options })
+    // Every paddle, and none at the end of the list.
+    let insertions = parallel::map(rest.len() + 1, options.threads, |i| {
+        follow(&profile, (i < rest.len()).then_some(i), newton, options.progress)
     });
-    let paddles = paddles.into_iter().collect::<Result<Vec<_>, _>>()?;
-    let optimum = rank(&paddles, model.scene().needle.orthogonal());
-    Ok(Placement { paddles, optimum, profile_nodes: profile.nodes() })
+    let mut insertions = insertions.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let without = insertions.pop().unwrap_or_default();
+    let scene = model.scene();
+    let paddles: Vec<PaddleResult> = rest
+        .iter()
+        .zip(insertions)
+        .zip(&scene.paddles)
+        .map(|((rest, insertion), paddle)| paddle_result(paddle.index, rest, insertion, &without.study, scene))
+        .collect();
+    let optimum = rank(&paddles, scene.needle.orthogonal());
+    let no_paddle = NoPaddle { static_study: without.study };
+    Ok(Placement { paddles, no_paddle, optimum, profile_nodes: profile.nodes() })
 }
 
 /// Newton's settings for the static study. On nodes refined to a tolerance the law loses stability under the needle's
 /// edge long before the full depth; finding that depth to an eighth of an increment is enough there.
-fn newton_for(resolution: Resolution) -> NewtonSettings {
+pub(super) fn newton_for(resolution: Resolution) -> NewtonSettings {
     match resolution {
         Resolution::Spacing(_) => NewtonSettings::default(),
         Resolution::Tolerance(_) | Resolution::Level(_) => {
@@ -151,50 +180,54 @@ fn newton_for(resolution: Resolution) -> NewtonSettings {
 
 /// Number of times [`place`] calls its progress function.
 pub fn steps(scene: &Scene) -> u64 {
-    scene.paddles.len() as u64 * u64::from(scene.needle.increments)
+    (scene.paddles.len() as u64 + 1) * u64::from(scene.needle.increments)
 }
 
 /// The paddle with the smallest controllability measure, by index; no static study is run.
 ///
 /// # Errors
-/// [`ModelError`] when a Jacobian cannot be computed.
+/// [`ModelError::NoPaddleControls`] when none can control the target; any other when the body at rest cannot be solved.
 pub fn best_dynamic(model: &TissueModel) -> Result<u32, ModelError> {
     let measures = rest_responses(model)?;
-    let best = model
-        .scene()
-        .paddles
-        .iter()
-        .zip(&measures)
-        .min_by(|a, b| a.1.controllability_measure.total_cmp(&b.1.controllability_measure));
-    Ok(best.map_or(0, |b| b.0.index))
+    let indices = model.scene().paddles.iter().map(|paddle| paddle.index);
+    least(indices.zip(measures.iter().map(|r| r.controllability_measure))).ok_or(ModelError::NoPaddleControls)
 }
 
-fn study_paddle(
-    model: &TissueModel,
-    rest: &RestResponse,
-    paddle: usize,
-    options: &PlacementOptions<'_>,
-) -> Result<PaddleResult, ModelError> {
-    let scene = model.scene();
-    let index = scene.paddles[paddle].index;
-    let normal = scene.needle.orthogonal();
-    let mut body = model.body(Some(paddle), options.newton.unwrap_or_default())?;
+/// The index with the smallest finite measure.
+fn least(measures: impl Iterator<Item = (u32, f64)>) -> Option<u32> {
+    measures.filter(|m| m.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1)).map(|m| m.0)
+}
 
-    let mut study = StaticStudy {
-        depth: Vec::new(),
-        target_displacement: Vec::new(),
-        orthogonal: Vec::new(),
-        max_orthogonal: 0.0,
-        reached_depth: 0.0,
-        failure: None,
-    };
-    let mut jacobians = Vec::new();
+/// One insertion with a paddle held still, or without one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct FollowedInsertion {
+    pub jacobians: Vec<[[f64; 2]; 2]>,
+    pub study: StaticStudy,
+}
+
+/// Follows the insertion at the scene's increments, until it stops.
+///
+/// # Errors
+/// [`ModelError`] when the body at rest cannot be solved.
+pub(super) fn follow(
+    model: &TissueModel,
+    paddle: Option<usize>,
+    newton: NewtonSettings,
+    progress: &(dyn Fn() + Sync),
+) -> Result<FollowedInsertion, ModelError> {
+    let scene = model.scene();
+    let normal = scene.needle.orthogonal();
+    let mut body = model.body(paddle, newton)?;
+    let mut followed = FollowedInsertion::default();
+    let study = &mut followed.study;
+    study.target_per_depth = body.depth_sensitivity()?.into();
     let increments = scene.needle.increments;
     for increment in 1..=increments {
-        (options.progress)();
+        progress();
         let depth = scene.needle.depth * f64::from(increment) / f64::from(increments);
-        let outcome = body.drive(depth, Vector2::zeros()).and_then(|()| body.actuation_jacobian());
-        match outcome {
+        let outcome = body.drive(depth, Vector2::zeros());
+        let jacobian = outcome.and_then(|()| paddle.map(|_| body.actuation_jacobian()).transpose());
+        match jacobian {
             Ok(jacobian) => {
                 let displacement = body.target_displacement();
                 let orthogonal = displacement.dot(&normal);
@@ -203,7 +236,7 @@ fn study_paddle(
                 study.orthogonal.push(orthogonal);
                 study.max_orthogonal = study.max_orthogonal.max(orthogonal.abs());
                 study.reached_depth = depth;
-                jacobians.push(rows(&jacobian));
+                followed.jacobians.extend(jacobian.as_ref().map(rows));
             }
             Err(Failure { reason, detail, .. }) => {
                 study.reached_depth = body.depth();
@@ -212,16 +245,51 @@ fn study_paddle(
             }
         }
     }
-    Ok(PaddleResult {
+    Ok(followed)
+}
+
+fn paddle_result(
+    index: u32,
+    rest: &RestResponse,
+    insertion: FollowedInsertion,
+    without: &StaticStudy,
+    scene: &Scene,
+) -> PaddleResult {
+    PaddleResult {
         index,
         jacobian: rows(&rest.jacobian),
         condition: firmware::contract::condition_number(&rest.jacobian),
         controllability_measure: rest.controllability_measure,
-        best_direction: rest.best_direction.into(),
+        best_direction: rest.best_direction.map(Into::into),
+        hindrance: hindrance(rest, scene),
         target_per_depth: rest.target_per_depth.into(),
-        jacobians,
-        static_study: study,
-    })
+        jacobians: insertion.jacobians,
+        static_over_no_paddle: insertion.study.over(without),
+        static_study: insertion.study,
+    }
+}
+
+impl PaddleResult {
+    /// The response at rest that it holds.
+    pub(super) fn rest(&self) -> RestResponse {
+        RestResponse {
+            jacobian: Matrix2::from_row_slice(&self.jacobian.concat()),
+            controllability_measure: self.controllability_measure,
+            best_direction: self.best_direction.map(Into::into),
+            target_per_depth: self.target_per_depth.into(),
+        }
+    }
+}
+
+impl StaticStudy {
+    /// Largest orthogonal displacement over that of another insertion, to the depth that both reached; none where they
+    /// have no depth in common, or the other one does not move the target.
+    pub fn over(&self, other: &Self) -> Option<f64> {
+        let common = self.depth.len().min(other.depth.len());
+        let largest = |study: &Self| study.orthogonal[..common].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+        let (own, reference) = (largest(self), largest(other));
+        (reference > 0.0).then_some(own / reference)
+    }
 }
 
 /// The best paddles. A static paddle that did not reach the depth ranks below every one that did. When none did, they are
@@ -236,9 +304,8 @@ fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
         Some(_) => Vector2::from(p.target_per_depth).dot(&normal).abs(),
     };
     let static_paddle = paddles.iter().min_by(|a, b| key(a).total_cmp(&key(b)));
-    let dynamic_paddle = paddles.iter().min_by(|a, b| a.controllability_measure.total_cmp(&b.controllability_measure));
     Optimum {
         static_paddle: static_paddle.map_or(0, |p| p.index),
-        dynamic_paddle: dynamic_paddle.map_or(0, |p| p.index),
+        dynamic_paddle: least(paddles.iter().map(|p| (p.index, p.controllability_measure))),
     }
 }

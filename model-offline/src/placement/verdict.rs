@@ -1,46 +1,19 @@
 //! Whether a paddle can hold the target at all, in words.
 
-use super::study::{PaddleResult, Placement};
-use crate::scene::Scene;
+use super::hindrance::Hindrance;
+use super::study::Placement;
 use firmware::contract::CONDITION_LIMIT;
-use nalgebra::Vector2;
-
-/// Why a paddle cannot hold the target.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hindrance {
-    /// The actuation Jacobian is too nearly singular: whatever the paddle does moves the target in one direction.
-    IllConditioned {
-        /// Its condition number.
-        condition: f64,
-    },
-    /// The paddle would have to go farther than its actuator can, by the linearisation at rest.
-    OutOfReach {
-        /// Paddle displacement it takes at full depth, length units.
-        needed: f64,
-        /// Paddle displacement there is, length units.
-        available: f64,
-        /// Condition number of the Jacobian.
-        condition: f64,
-    },
-}
-
-/// What keeps a paddle from holding the target; none when nothing does.
-pub fn hindrance(paddle: &PaddleResult, scene: &Scene) -> Option<Hindrance> {
-    let condition = paddle.condition;
-    if condition > CONDITION_LIMIT {
-        return Some(Hindrance::IllConditioned { condition });
-    }
-    let drift = Vector2::from(paddle.target_per_depth).dot(&scene.needle.orthogonal()).abs() * scene.needle.depth;
-    let (needed, available) = (drift * paddle.controllability_measure, scene.actuator.max_displacement);
-    (needed > available).then_some(Hindrance::OutOfReach { needed, available, condition })
-}
 
 /// Lines for people about paddles that cannot hold the target; empty when all can.
-pub fn verdict(placement: &Placement, scene: &Scene) -> Vec<String> {
-    let hindered: Vec<_> = placement.paddles.iter().filter_map(|p| Some((p.index, hindrance(p, scene)?))).collect();
+pub fn verdict(placement: &Placement) -> Vec<String> {
+    let hindered: Vec<_> = placement.paddles.iter().filter_map(|p| Some((p.index, p.hindrance?))).collect();
     let mut lines: Vec<String> = hindered
         .iter()
         .map(|(index, hindrance)| match hindrance {
+            Hindrance::Uncontrollable { condition } => format!(
+                "paddle {index} cannot control the target: whatever it does moves the target along one line or hardly at \
+                 all (condition number of its Jacobian {condition:.1e}); put it elsewhere, or use it static"
+            ),
             Hindrance::IllConditioned { condition } => format!(
                 "paddle {index} cannot hold the target: its Jacobian is ill-conditioned \
                  (condition number {condition:.3e}, limit {CONDITION_LIMIT:.0e})"
@@ -54,7 +27,18 @@ pub fn verdict(placement: &Placement, scene: &Scene) -> Vec<String> {
     if hindered.len() == placement.paddles.len() {
         lines.push("no paddle of this scene can: move a paddle, turn the needle, or accept a static one".to_owned());
     }
+    lines.extend(fixtures_no_better_than_none(placement));
     lines
+}
+
+/// Says so where even the best static paddle moves the target more than no paddle does.
+fn fixtures_no_better_than_none(placement: &Placement) -> Option<String> {
+    let best = placement.paddles.iter().find(|p| p.index == placement.optimum.static_paddle)?;
+    let factor = best.static_over_no_paddle.filter(|factor| *factor > 1.0)?;
+    Some(format!(
+        "no static paddle helps: the best one, {}, moves the target {factor:.2} times as far as no paddle does",
+        best.index
+    ))
 }
 
 #[cfg(test)]
@@ -62,11 +46,12 @@ mod tests {
     use super::*;
     use crate::model::TissueModel;
     use crate::placement::{PlacementOptions, place};
+    use crate::scene::Scene;
 
     fn lines(name: &str) -> Vec<String> {
         let scene = Scene::bundled(name).unwrap();
         let model = TissueModel::new(&scene).unwrap();
-        verdict(&place(&model, &PlacementOptions::default()).unwrap(), &scene)
+        verdict(&place(&model, &PlacementOptions::default()).unwrap())
     }
 
     #[test]

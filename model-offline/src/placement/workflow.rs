@@ -1,8 +1,10 @@
 //! From a scene to a placement, the one way that all commands go: discretise, refine if a tolerance is asked for, study every
 //! paddle, and judge the answer.
 
-use super::adaptive::{ErrorEstimate, discretise};
+use super::accuracy::{Accuracy, accuracy};
+use super::adaptive::{ErrorEstimate, Judged, discretise_judged};
 use super::cross_check::{CrossCheck, cross_check};
+use super::reference::Reference;
 use super::study::{Placement, PlacementOptions, place};
 use super::verdict::verdict;
 use crate::model::{ModelError, TissueModel};
@@ -18,8 +20,9 @@ use std::time::Instant;
 ///
 /// let scene = Scene::bundled("paper").expect("bundled").without_inclusions();
 /// let study = PlacementStudy::run(&scene, &PlacementOptions::default())?;
-/// assert_eq!((study.placement.optimum.static_paddle, study.placement.optimum.dynamic_paddle), (4, 3)); // the paper's optima
-/// assert!(study.cross_check().is_some_and(|check| check.controllability < 0.5));
+/// assert_eq!((study.placement.optimum.static_paddle, study.placement.optimum.dynamic_paddle), (4, Some(3))); // the paper's optima
+/// let accuracy = study.accuracy(1)?;
+/// assert!(accuracy.errors.paddles.iter().all(|p| p.controllability_measure.is_some_and(|error| error < 0.5)));
 /// # Ok::<(), model_offline::model::ModelError>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -32,7 +35,22 @@ pub struct PlacementStudy {
     pub error_estimate: Option<ErrorEstimate>,
     /// Time that it took, s.
     pub wall_s: f64,
+    reference: Option<Reference>,
 }
+
+/// What is known of a study's errors.
+#[derive(Debug, Clone)]
+pub struct StudyAccuracy {
+    /// The errors, number by number.
+    pub errors: Accuracy,
+    /// The worst of them in a line for people; none where the study has estimated its own error.
+    pub cross_check: Option<CrossCheck>,
+    /// Nodes of the triangles that the numbers at rest are judged by.
+    pub reference_nodes: usize,
+}
+
+/// What a reference may leave open, where the study asks for no tolerance.
+const REFERENCE_OPEN: f64 = 0.01;
 
 impl PlacementStudy {
     /// Discretises the scene at its resolution and studies every paddle.
@@ -41,21 +59,28 @@ impl PlacementStudy {
     /// [`ModelError`] when the scene cannot be modelled, its tolerance not be reached, or a Jacobian not be computed.
     pub fn run(scene: &Scene, options: &PlacementOptions<'_>) -> Result<Self, ModelError> {
         let start = Instant::now();
-        let (model, error_estimate) = discretise(scene)?;
+        let Judged { model, estimate: error_estimate, reference } = discretise_judged(scene)?;
         let placement = place(&model, options)?;
-        Ok(Self { model, placement, error_estimate, wall_s: start.elapsed().as_secs_f64() })
+        Ok(Self { model, placement, error_estimate, wall_s: start.elapsed().as_secs_f64(), reference })
     }
 
-    /// A second opinion by another method; none where the study estimates its own error, or the other method fails.
-    pub fn cross_check(&self) -> Option<CrossCheck> {
-        if self.error_estimate.is_some() {
-            return None;
-        }
-        cross_check(self.model.scene(), &self.placement.paddles)
+    /// Estimates the error of every number, by other methods; not part of the study's time.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the body cannot be cut into triangles that follow its outline.
+    pub fn accuracy(&self, threads: usize) -> Result<StudyAccuracy, ModelError> {
+        let scene = self.model.scene();
+        let reference = match &self.reference {
+            Some(reference) => reference.clone(),
+            None => Reference::compute(scene, REFERENCE_OPEN)?,
+        };
+        let check = if self.error_estimate.is_some() { None } else { cross_check(&self.placement, &reference) };
+        let errors = accuracy(scene, &self.placement, &reference, threads)?;
+        Ok(StudyAccuracy { errors, cross_check: check, reference_nodes: reference.nodes })
     }
 
     /// Lines for people about paddles that cannot hold the target; empty when all can.
     pub fn verdict(&self) -> Vec<String> {
-        verdict(&self.placement, self.model.scene())
+        verdict(&self.placement)
     }
 }

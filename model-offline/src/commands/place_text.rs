@@ -1,0 +1,109 @@
+//! A placement study as text: a row per paddle and one without, with the error of every number beside it.
+
+use model_offline::model::ModelError;
+use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};
+use model_offline::placement::study::StaticStudy;
+use model_offline::placement::workflow::StudyAccuracy;
+use model_offline::placement::{PaddleResult, PlacementStudy};
+use std::fmt::Write as _;
+
+/// What stands where there is no number.
+const NONE: &str = "–";
+
+/// The study on a screen.
+pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
+    let (scene, optimum) = (study.model.scene(), study.placement.optimum);
+    let known = accuracy.and_then(|a| a.as_ref().ok());
+    let mut out = format!(
+        "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖         ±   J⁻¹n                  \
+         max orthogonal (static)        ±   of no paddle\n",
+        scene.name,
+        scene.tissue(),
+        study.model.nodes(),
+        1e3 * study.wall_s
+    );
+    for (i, paddle) in study.placement.paddles.iter().enumerate() {
+        let errors = known.map(|known| &known.errors.paddles[i]);
+        let best = (optimum.static_paddle == paddle.index, optimum.dynamic_paddle == Some(paddle.index));
+        let _ = writeln!(out, "{}", paddle_row(paddle, errors, best));
+    }
+    let none = &study.placement.no_paddle.static_study;
+    let errors = known.map(|known| &known.errors.no_paddle);
+    let _ = writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {}", static_part(none, errors, (false, Some(1.0))));
+    out.push_str(&notes(study, accuracy));
+    out
+}
+
+fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, (fixture, dynamic): (bool, bool)) -> String {
+    let measure = match paddle.best_direction {
+        Some(_) => format!("{:8.4}", paddle.controllability_measure),
+        None => format!("{NONE:>8}"),
+    };
+    let error = errors.and_then(|e| e.controllability_measure);
+    let error = error.map_or(NONE.to_owned(), |e| format!("{:.2} %", 100.0 * e));
+    let direction = paddle.best_direction.map_or(NONE.to_owned(), |[x, y]| format!("({x:8.4}, {y:8.4})"));
+    let mark = if dynamic { "*" } else { " " };
+    let rest = static_part(
+        &paddle.static_study,
+        errors.map(|e| &e.static_study),
+        (fixture, paddle.static_over_no_paddle),
+    );
+    format!("{:>7}  {measure}{mark} {error:>8}   {direction:<20}  {rest}", paddle.index)
+}
+
+/// Largest orthogonal displacement, its error, its share of that without a paddle, and why the insertion ended early.
+fn static_part(study: &StaticStudy, errors: Option<&StaticErrors>, (best, share): (bool, Option<f64>)) -> String {
+    let error = errors.and_then(|e| e.max_orthogonal).map_or(NONE.to_owned(), |e| format!("{e:.6}"));
+    let share = share.map_or(NONE.to_owned(), |share| format!("{share:.3}"));
+    let stopped =
+        study.failure.as_ref().map_or(String::new(), |f| format!("  stopped at depth {:.4}: {}", f.depth, f.reason));
+    let mark = if best { "*" } else { " " };
+    format!("{:23.6}{mark} {error:>8}   {share:>12}{stopped}", study.max_orthogonal)
+}
+
+fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
+    let optimum = study.placement.optimum;
+    let dynamic = optimum.dynamic_paddle.map_or(NONE.to_owned(), |index| index.to_string());
+    let mut out = String::new();
+    if let Some(e) = study.error_estimate {
+        let _ = writeln!(
+            out,
+            "\nestimated error: controllability {:.2} %, small-depth target displacement {:.2} % of the largest",
+            100.0 * e.controllability,
+            100.0 * e.target_displacement
+        );
+    }
+    let _ = writeln!(out, "\nbest static paddle: {}; best dynamic paddle: {dynamic}", optimum.static_paddle);
+    for line in study.verdict() {
+        let _ = writeln!(out, "{line}");
+    }
+    match accuracy {
+        Some(Ok(known)) => out.push_str(&how_known(study, known)),
+        Some(Err(error)) => {
+            let _ = writeln!(out, "errors are not known: {error}");
+        }
+        None => {}
+    }
+    out
+}
+
+/// Where the errors come from, and what they do not cover.
+fn how_known(study: &PlacementStudy, known: &StudyAccuracy) -> String {
+    let mut out = String::new();
+    if let Some(check) = known.cross_check {
+        let _ = writeln!(out, "{}", check.line());
+    }
+    let placement = &study.placement;
+    if placement.profile_nodes != study.model.nodes() {
+        let _ = writeln!(out, "the insertion was followed on {} nodes", placement.profile_nodes);
+    }
+    let unknown = known.errors.paddles.iter().any(|p| p.static_study.max_orthogonal.is_none());
+    if unknown {
+        let why = match known.errors.second_nodes {
+            Some(nodes) => format!("the insertion on other nodes ({nodes}) does not get as deep"),
+            None => "the insertion could not be followed on other nodes".to_owned(),
+        };
+        let _ = writeln!(out, "static displacements without an error: {why}");
+    }
+    out
+}

@@ -1,0 +1,158 @@
+//! How far every number of a study may be off: those at rest by a certified solution, those at depth by an insertion that
+//! another method follows on nodes of its own.
+
+use super::reference::Reference;
+use super::study::{FollowedInsertion, PaddleResult, Placement, StaticStudy, follow, newton_for};
+use crate::discretization::{Essential, Integration, Method, Resolution};
+use crate::model::{ModelError, TissueModel, graded_model};
+use crate::parallel;
+use crate::scene::Scene;
+use nalgebra::{Matrix2, Vector2};
+use serde::Serialize;
+
+/// Level of the nodes on which the insertion is followed a second time: 200 to 500 of them.
+const LEVEL: i32 = -2;
+
+/// Estimated errors of one paddle's numbers.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PaddleErrors {
+    /// Of the Jacobian at rest: Frobenius norm, over that of the Jacobian.
+    pub jacobian: f64,
+    /// Of ‖J⁻¹n‖, over itself; none where the paddle cannot control the target.
+    pub controllability_measure: Option<f64>,
+    /// Of J⁻¹n: length of the difference; none where there is no J⁻¹n.
+    pub best_direction: Option<f64>,
+    /// Of d(target displacement)/d(depth): length of the difference.
+    pub target_per_depth: f64,
+    /// Of the insertion.
+    #[serde(rename = "static")]
+    pub static_study: StaticErrors,
+}
+
+/// Estimated errors of an insertion, depth by depth; none where the second model did not get there.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct StaticErrors {
+    /// Of the target displacement and its orthogonal part, length units.
+    pub target_displacement: Vec<Option<f64>>,
+    /// Of the Jacobians: Frobenius norm, over that of the Jacobian.
+    pub jacobians: Vec<Option<f64>>,
+    /// Of the largest orthogonal displacement, length units.
+    pub max_orthogonal: Option<f64>,
+}
+
+/// Estimated errors of a whole study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accuracy {
+    /// Errors by paddle, in the study's order.
+    pub paddles: Vec<PaddleErrors>,
+    /// Errors of the insertion without a paddle.
+    pub no_paddle: StaticErrors,
+    /// Nodes of the second model of the insertion; none where it could not be made.
+    pub second_nodes: Option<usize>,
+}
+
+/// Estimates the errors of a placement in `scene`, whose numbers at rest are judged by `reference`.
+///
+/// # Errors
+/// [`ModelError`] when the second model's body at rest cannot be solved.
+pub fn accuracy(
+    scene: &Scene,
+    placement: &Placement,
+    reference: &Reference,
+    threads: usize,
+) -> Result<Accuracy, ModelError> {
+    let second = second_model(scene);
+    let none = vec![FollowedInsertion::default(); scene.paddles.len() + 1];
+    let seconds = second.as_ref().map_or(Ok(none), |model| follow_all(model, threads))?;
+    let rest = Rest::new(reference);
+    let paddles = placement.paddles.iter().enumerate();
+    let paddles = paddles.map(|(i, paddle)| rest.paddle_errors(i, paddle, &seconds[i])).collect();
+    let followed = Followed { study: &placement.no_paddle.static_study, jacobians: &[] };
+    let no_paddle = followed.errors(&seconds[scene.paddles.len()], 0.0);
+    Ok(Accuracy { paddles, no_paddle, second_nodes: second.map(|model| model.nodes()) })
+}
+
+/// Quadratic triangles on a few graded nodes; the default rule where the study is of quadratic triangles itself. Never
+/// the study's own method: what is alike agrees where both are wrong.
+fn second_model(scene: &Scene) -> Option<TissueModel> {
+    let mut scene = scene.clone();
+    scene.discretization.essential = Essential::Transformation;
+    let integration = match scene.discretization.method.integration {
+        Integration::FemT6 => Integration::default(),
+        _ => Integration::FemT6,
+    };
+    graded_model(&scene, Method::new(integration), LEVEL).ok()
+}
+
+/// The insertion with every paddle, and last without one.
+fn follow_all(model: &TissueModel, threads: usize) -> Result<Vec<FollowedInsertion>, ModelError> {
+    let count = model.scene().paddles.len();
+    let newton = newton_for(Resolution::Level(LEVEL));
+    parallel::map(count + 1, threads, |i| follow(model, (i < count).then_some(i), newton, &|| {})).into_iter().collect()
+}
+
+/// What is known at rest.
+struct Rest<'a> {
+    reference: &'a Reference,
+    /// What the reference leaves open of displacements per depth.
+    open_per_depth: f64,
+}
+
+impl<'a> Rest<'a> {
+    fn new(reference: &'a Reference) -> Self {
+        let largest = reference.responses().iter().map(|r| r.target_per_depth.norm()).fold(0.0, f64::max);
+        Self { reference, open_per_depth: reference.open_displacement() * largest }
+    }
+
+    fn paddle_errors(&self, i: usize, paddle: &PaddleResult, second: &FollowedInsertion) -> PaddleErrors {
+        let (limit, open) = (&self.reference.responses()[i], self.reference.open_by_paddle()[i]);
+        let off = |per_depth: [f64; 2]| {
+            (Vector2::from(per_depth) - limit.target_per_depth).norm() + self.open_per_depth
+        };
+        let measure = (paddle.controllability_measure / limit.controllability_measure - 1.0).abs() + open;
+        let directions = paddle.best_direction.map(Vector2::from).zip(limit.best_direction);
+        let followed = Followed { study: &paddle.static_study, jacobians: &paddle.jacobians };
+        PaddleErrors {
+            jacobian: relative(&matrix(&paddle.jacobian), &limit.jacobian) + open,
+            controllability_measure: measure.is_finite().then_some(measure),
+            best_direction: directions.map(|(found, limit)| (found - limit).norm() + open * limit.norm()),
+            target_per_depth: off(paddle.target_per_depth),
+            // The insertion may be that of a coarser model, which starts off with an error of its own.
+            static_study: followed.errors(second, off(paddle.static_study.target_per_depth)),
+        }
+    }
+}
+
+/// An insertion to judge.
+struct Followed<'a> {
+    study: &'a StaticStudy,
+    jacobians: &'a [[[f64; 2]; 2]],
+}
+
+impl Followed<'_> {
+    /// The distance from a second insertion, and never less than what the error at rest (`slope`, per depth) grows to.
+    fn errors(&self, second: &FollowedInsertion, slope: f64) -> StaticErrors {
+        let displacements = self.study.target_displacement.iter().zip(&self.study.depth).enumerate();
+        let target_displacement: Vec<Option<f64>> = displacements
+            .map(|(k, (found, depth))| {
+                let other = second.study.target_displacement.get(k)?;
+                Some((Vector2::from(*found) - Vector2::from(*other)).norm().max(slope * depth))
+            })
+            .collect();
+        let jacobians = self.jacobians.iter().enumerate();
+        StaticErrors {
+            max_orthogonal: target_displacement.iter().copied().try_fold(0.0, |m: f64, e| Some(m.max(e?))),
+            target_displacement,
+            jacobians: jacobians.map(|(k, j)| Some(relative(&matrix(j), &matrix(second.jacobians.get(k)?)))).collect(),
+        }
+    }
+}
+
+fn matrix(rows: &[[f64; 2]; 2]) -> Matrix2<f64> {
+    Matrix2::new(rows[0][0], rows[0][1], rows[1][0], rows[1][1])
+}
+
+/// Distance over the size of what it is measured from.
+fn relative(found: &Matrix2<f64>, limit: &Matrix2<f64>) -> f64 {
+    (found - limit).norm() / limit.norm()
+}

@@ -1,0 +1,78 @@
+//! A solution to judge others by: quadratic triangles, refined where the answers ask for it and extrapolated.
+
+use super::goal_oriented::{self, Certified};
+use super::rest::RestResponse;
+use crate::model::ModelError;
+use crate::scene::Scene;
+
+/// A solution on quadratic triangles, extrapolated, to judge others by.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    responses: Vec<RestResponse>,
+    open_by_paddle: Vec<f64>,
+    open_displacement: f64,
+    /// What it leaves open: worst relative error, of all paddles' measures and of the displacements.
+    pub open: f64,
+    /// Nodes of the finer mesh.
+    pub nodes: usize,
+}
+
+impl Reference {
+    /// Refines until what the limit leaves open is no more than `share`, or as far as nodes are accepted.
+    ///
+    /// # Errors
+    /// [`ModelError`] as for any model.
+    pub fn compute(scene: &Scene, share: f64) -> Result<Self, ModelError> {
+        let (certified, _) = goal_oriented::refine(scene, |certified| certified.worst_open() <= share)?;
+        Ok(Self::from_certified(&certified))
+    }
+
+    pub(super) fn from_certified(certified: &Certified) -> Self {
+        Self {
+            responses: certified.limit.clone(),
+            open_by_paddle: certified.open.clone(),
+            open_displacement: certified.open_displacement,
+            open: certified.worst_open(),
+            nodes: certified.nodes,
+        }
+    }
+
+    /// Estimated relative errors of the controllability measures, paddle by paddle: the distance to the limit, and what
+    /// that leaves open.
+    pub fn errors(&self, responses: &[RestResponse]) -> Vec<f64> {
+        let off = responses.iter().zip(&self.responses).map(|(found, limit)| found.measure_distance(limit));
+        off.zip(&self.open_by_paddle).map(|(off, open)| off + open).collect()
+    }
+
+    /// What the limit leaves open of the controllability measures, paddle by paddle, relative.
+    pub fn open_by_paddle(&self) -> &[f64] {
+        &self.open_by_paddle
+    }
+
+    /// What the limit leaves open of the small-depth displacements, over the largest.
+    pub fn open_displacement(&self) -> f64 {
+        self.open_displacement
+    }
+
+    /// Worst relative distance of the controllability measures, and of the small-depth target displacements over the
+    /// largest one.
+    pub fn distance(&self, responses: &[RestResponse]) -> (f64, f64) {
+        distance(responses, &self.responses)
+    }
+
+    /// The extrapolated responses.
+    pub fn responses(&self) -> &[RestResponse] {
+        &self.responses
+    }
+}
+
+/// Worst relative distance of the measures, and of the displacements over the largest one.
+pub fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
+    let largest = b.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
+    a.iter().zip(b).fold((0.0, 0.0), |(measure, displacement): (f64, f64), (a, b)| {
+        (
+            measure.max(a.measure_distance(b)),
+            displacement.max((a.target_per_depth - b.target_per_depth).norm() / largest),
+        )
+    })
+}

@@ -1,0 +1,69 @@
+//! Scenes of many kinds, none of which the methods were tuned on: slabs, notches, slots, inner needles, thin parts,
+//! inclusions on the edge, other units, origins far away. The default rule reaches 1 % on each, and its estimated errors hold,
+//! against quadratic triangles refined until they leave next to nothing open.
+
+use model_offline::placement::adaptive::{ErrorEstimate, Judged, Reference, discretise_judged};
+use model_offline::placement::rest::{RestResponse, rest_responses};
+use model_offline::scene::Scene;
+
+const TOLERANCE: f64 = 0.01;
+/// What the triangles may leave open, of the tolerance.
+const BEYOND_DOUBT: f64 = 0.05;
+/// Errors smaller than this share of the tolerance come about by accident: no estimate is three times them at most.
+const ACCIDENT: f64 = 0.1;
+
+struct Outcome {
+    nodes: usize,
+    estimate: ErrorEstimate,
+    /// Estimated and true error, paddle by paddle, with the measure.
+    paddles: Vec<(f64, f64, f64)>,
+}
+
+fn outcome(text: &str) -> Outcome {
+    let scene = Scene::parse(text, "scene").unwrap();
+    let Judged { model, estimate, reference } = discretise_judged(&scene).unwrap();
+    let found = rest_responses(&model).unwrap();
+    let truth = Reference::compute(&scene, BEYOND_DOUBT * TOLERANCE).unwrap();
+    println!("truth: {} nodes leave {:.3} % open", truth.nodes, 100.0 * truth.open);
+    let estimated = reference.unwrap().errors(&found);
+    let off = found.iter().zip(truth.responses()).map(|(found, truth)| found.measure_distance(truth));
+    let measures = found.iter().map(|r: &RestResponse| r.controllability_measure);
+    let paddles = estimated.into_iter().zip(off).zip(measures).map(|((e, t), m)| (e, t, m)).collect();
+    Outcome { nodes: model.nodes(), estimate: estimate.unwrap(), paddles }
+}
+
+fn check(text: &str) {
+    let Outcome { nodes, estimate, paddles } = outcome(text);
+    println!("{nodes} nodes, level {}, estimated {:.3} %", estimate.level, 100.0 * estimate.controllability);
+    for (estimated, truth, measure) in &paddles {
+        let effectivity = estimated / truth;
+        println!("  ‖J⁻¹n‖ {measure:8.3}: estimated {:.3} %, true {:.3} %, effectivity {effectivity:.2}", 100.0 * estimated, 100.0 * truth);
+    }
+    for (estimated, truth, measure) in paddles {
+        assert!(truth <= TOLERANCE, "‖J⁻¹n‖ = {measure}: wrong by {truth}");
+        assert!(estimated <= TOLERANCE && truth <= estimated, "‖J⁻¹n‖ = {measure}: {truth} true, {estimated} estimated");
+        if truth > ACCIDENT * TOLERANCE {
+            assert!(estimated <= 3.0 * truth, "‖J⁻¹n‖ = {measure}: {truth} true, {estimated} estimated");
+        }
+    }
+}
+
+macro_rules! scenes {
+    ($($name:ident: $file:literal),+ $(,)?) => {$(
+        #[test]
+        fn $name() {
+            check(include_str!(concat!("../scenes/", $file, ".toml")));
+        }
+    )+};
+}
+
+scenes! {
+    a_slab_far_from_the_origin: "slab-kpa",
+    a_notch: "notch",
+    a_slot: "slot",
+    an_inner_needle: "inner-needle",
+    a_neck_between_two_blocks: "neck",
+    inclusions_on_the_edge: "rib",
+    paddles_far_from_the_target: "far",
+    an_ell: "ell",
+}
