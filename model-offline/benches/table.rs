@@ -96,7 +96,8 @@ fn main() {
     let fine = Grading::level(&homogeneous().features(), 2, InterfaceFit::Between);
     let (time, error, nodes) = five_jacobians(Integration::Scni, fine, 2.0);
     row(&format!("five Jacobians, SCNI, graded, {nodes} nodes, worst error {error:.2} %"), time, 50.0, 10.0);
-    let coarse = Grading { coarsest: 0.2, finest: 0.015, slope: 0.55, interface: 1.0, fit: InterfaceFit::On };
+    let coarse =
+        Grading { coarsest: 0.2, finest: 0.015, slope: 0.55, interface: 1.0, narrow: 0.5, fit: InterfaceFit::On };
     let (time, error, nodes) = five_jacobians(Integration::FemT6, coarse, 2.0);
     row(&format!("five Jacobians, quadratic triangles, graded, {nodes} nodes, error {error:.2} %"), time, 50.0, 10.0);
     for integration in [Integration::Scni, Integration::FemT6] {

@@ -19,7 +19,8 @@ fn the_papers_scenes_have_the_published_node_counts() {
 #[test]
 fn nodes_follow_the_outline_and_gather_at_the_paddles() {
     let scene = Scene::bundled("paper").unwrap();
-    let grading = Grading { coarsest: 0.1, finest: 0.005, slope: 0.3, interface: 0.05, fit: InterfaceFit::Between };
+    let grading =
+        Grading { coarsest: 0.1, finest: 0.005, slope: 0.3, interface: 0.05, narrow: 0.5, fit: InterfaceFit::Between };
     let nodes = graded_nodes(&scene.features(), &grading);
     assert!(scene.outline.vertices().iter().all(|v| nodes.contains(v)));
     assert!(nodes.contains(&scene.target));

@@ -162,7 +162,7 @@ proptest! {
     ) {
         let scene = Scene::bundled("paper").unwrap();
         let fit = if on { InterfaceFit::On } else { InterfaceFit::Between };
-        let grading = Grading { coarsest, finest: coarsest * ratio, slope, interface: interface.min(coarsest), fit };
+        let grading = Grading { coarsest, finest: coarsest * ratio, slope, interface: interface.min(coarsest), narrow: 0.5, fit };
         let nodes = graded_nodes(&scene.features(), &grading);
         prop_assert!(nodes.len() < 200_000);
         let cells = model_offline::discretization::nodal_cells::clipped_voronoi(&nodes, &scene.outline).unwrap();

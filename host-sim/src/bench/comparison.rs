@@ -204,8 +204,7 @@ fn against_none_of_the_same_tissue(cases: &mut [CaseResult]) {
         let strategies = &case.strategies;
         let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
         let error = none.iter().find(|(tissue, _)| *tissue == case.tissue);
-        case.improvement_over_none =
-            error.zip(dynamic).map(|((_, none), dynamic)| none / dynamic.max_orthogonal_error);
+        case.improvement_over_none = error.zip(dynamic).map(|((_, none), dynamic)| none / dynamic.max_orthogonal_error);
     }
 }
 

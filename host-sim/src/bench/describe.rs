@@ -5,7 +5,9 @@ use model_offline::model::TissueModel;
 use model_offline::placement::{Placement, StaticStudy};
 use model_offline::scene::Scene;
 
-use super::result::{Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings};
+use super::result::{
+    Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings,
+};
 use super::tissue_variant::TissueVariant;
 use crate::world::simulation::Simulation;
 

@@ -76,7 +76,8 @@ fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
     )?;
     match (case.improvement, dynamic) {
         (Some(factor), Some(dynamic)) => {
-            let none = case.improvement_over_none.map_or_else(String::new, |factor| format!("{} of none, ", share(factor)));
+            let none =
+                case.improvement_over_none.map_or_else(String::new, |factor| format!("{} of none, ", share(factor)));
             writeln!(text, "   {} of static, {none}{}", share(factor), names::mode::name(dynamic.final_state))
         }
         _ => writeln!(text),

@@ -29,7 +29,8 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
     }
     let none = &study.placement.no_paddle.static_study;
     let errors = known.map(|known| &known.errors.no_paddle);
-    let _ = writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {}", static_part(none, errors, (false, Some(1.0))));
+    let _ =
+        writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {}", static_part(none, errors, (false, Some(1.0))));
     out.push_str(&notes(study, accuracy));
     out
 }
@@ -43,11 +44,8 @@ fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, (fixture, dy
     let error = error.map_or(NONE.to_owned(), |e| format!("{:.2} %", 100.0 * e));
     let direction = paddle.best_direction.map_or(NONE.to_owned(), |[x, y]| format!("({x:8.4}, {y:8.4})"));
     let mark = if dynamic { "*" } else { " " };
-    let rest = static_part(
-        &paddle.static_study,
-        errors.map(|e| &e.static_study),
-        (fixture, paddle.static_over_no_paddle),
-    );
+    let rest =
+        static_part(&paddle.static_study, errors.map(|e| &e.static_study), (fixture, paddle.static_over_no_paddle));
     format!("{:>7}  {measure}{mark} {error:>8}   {direction:<20}  {rest}", paddle.index)
 }
 

@@ -25,6 +25,8 @@ pub struct Grading {
     pub slope: f64,
     /// Spacing along the edges of inclusions, length units.
     pub interface: f64,
+    /// Largest spacing where the body, or a slot in it, is narrow: over the width there.
+    pub narrow: f64,
     /// Where nodes lie with respect to those edges.
     pub fit: InterfaceFit,
 }
@@ -62,6 +64,7 @@ impl Grading {
             finest: (0.2 * paddle.min(contact) * halved).min(coarsest),
             slope: 0.6 * halved.powf(0.25),
             interface: (0.2 * edge * halved).min(coarsest),
+            narrow: 0.5 * halved.sqrt(),
             fit,
         }
     }
@@ -72,16 +75,37 @@ struct Field<'a> {
     grading: &'a Grading,
     singular: Vec<(Point2, f64)>,
     interfaces: Vec<(Point2, Point2)>,
+    narrows: Vec<[(Point2, Point2); 2]>,
 }
 
 impl Field<'_> {
     /// Spacing wanted at `x`.
     fn spacing(&self, x: Point2) -> f64 {
-        let Grading { coarsest, finest, slope, interface, .. } = *self.grading;
+        let Grading { coarsest, finest, slope, interface, narrow, .. } = *self.grading;
         let points = self.singular.iter().map(|(s, weight)| finest * weight + slope * (x - s).norm());
         let edges = self.interfaces.iter().map(|(a, b)| interface + slope * distance_to_segment(x, *a, *b));
-        points.chain(edges).fold(coarsest, f64::min)
+        // The distances from two sides add up to the width between them, and grow away from there.
+        let to = |(a, b): (Point2, Point2)| distance_to_segment(x, a, b);
+        let narrows = self.narrows.iter().map(|[a, b]| narrow * (to(*a) + to(*b)));
+        points.chain(edges).chain(narrows).fold(coarsest, f64::min)
     }
+}
+
+/// Pairs of edges of the outline that face each other, across the body or across a slot, nearer than spacings of `coarsest`
+/// can resolve.
+fn narrows(outline: &Polygon, coarsest: f64, narrow: f64) -> Vec<[(Point2, Point2); 2]> {
+    let edges: Vec<(Point2, Point2)> = outline.edges().collect();
+    let direction = |e: (Point2, Point2)| (e.1 - e.0).normalize();
+    let facing = |e, f| direction(e).dot(&direction(f)) < -0.5;
+    let apart = |e: (Point2, Point2), f: (Point2, Point2)| {
+        let to = |p, (a, b)| distance_to_segment(p, a, b);
+        to(e.0, f).min(to(e.1, f)).min(to(f.0, e)).min(to(f.1, e))
+    };
+    let pairs = (0..edges.len()).flat_map(|i| (i + 1..edges.len()).map(move |j| (i, j)));
+    pairs
+        .map(|(i, j)| [edges[i], edges[j]])
+        .filter(|[e, f]| facing(*e, *f) && apart(*e, *f) > 0.0 && narrow * apart(*e, *f) < coarsest)
+        .collect()
 }
 
 /// Points where the solution, or its adjoint, is singular, each with a factor on the finest spacing: 1 where the type of
@@ -114,7 +138,8 @@ pub fn graded_nodes(features: &Features, grading: &Grading) -> Vec<Point2> {
     let outline = &features.outline;
     let tolerance = COINCIDENT * outline.size();
     let interfaces: Vec<(Point2, Point2)> = features.inclusions.iter().flat_map(Polygon::edges).collect();
-    let field = Field { grading, singular: singular_points(features), interfaces };
+    let narrows = narrows(outline, grading.coarsest, grading.narrow);
+    let field = Field { grading, singular: singular_points(features), interfaces, narrows };
 
     // Features first, then nodes along outline and needle contact between them.
     let mut positions: Vec<Point2> = Vec::new();

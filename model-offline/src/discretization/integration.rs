@@ -2,7 +2,7 @@
 //! functions there, so that assembly knows one loop only: `∫ W(F) dΩ ≈ Σ_q w_q W(I + Σ_I d_I ⊗ g_I(q))`.
 
 use super::method::{Basis, Consistency};
-use super::nodal_cells::NodalCell;
+use super::nodal_cells::{Across, NodalCell};
 use super::shape_functions::Wanted;
 use super::{ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2};
@@ -352,9 +352,9 @@ impl<'a, 'c> CellAverage<'a, 'c> {
         self.shape.cloud().covering(&low, &high, &mut self.candidates);
         self.nodes.clear();
         self.gradients.clear();
-        for (a, b, _) in cell.edges() {
+        for (a, b, across) in cell.edges() {
             let normal = Point2::new(b.y - a.y, a.x - b.x);
-            if normal.norm_squared() == 0.0 {
+            if normal.norm_squared() == 0.0 || across == Across::Bridge {
                 continue;
             }
             for (s, weight) in points {

@@ -7,6 +7,7 @@
 
 pub mod bisection;
 pub mod boundary;
+mod cell_loops;
 pub mod features;
 pub mod finite_element;
 pub mod graded;
@@ -18,6 +19,7 @@ pub mod nodal_cells;
 pub mod node_cloud;
 pub mod planar;
 pub mod shape_functions;
+pub mod sight;
 pub mod subcells;
 pub mod triangulation;
 

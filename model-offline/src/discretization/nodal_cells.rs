@@ -2,6 +2,7 @@
 //!
 //! On a lattice they are the lattice squares clipped by the outline.
 
+use super::cell_loops::tidied;
 use super::triangulation::TriangulationError;
 use crate::geometry::{Point, Point2, Polygon, clip_half_plane, signed_area};
 
@@ -12,6 +13,8 @@ pub enum Across {
     Cell(u32),
     /// Nothing: this edge of the outline (`u32::MAX` where it is not known which).
     Outline(u32),
+    /// Nothing, on either side: the edge leads to another piece of the cell, and back.
+    Bridge,
 }
 
 /// A node's cell.
@@ -54,6 +57,7 @@ pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Result<Vec<Noda
     let boundary: Vec<(Point2, Across)> =
         outline.vertices().iter().enumerate().map(|(i, &v)| (v, Across::Outline(i as u32))).collect();
     let mut scratch = Vec::new();
+    let (convex, tolerance) = (outline.is_convex(), 1e-10 * outline.size());
     Ok(nodes
         .iter()
         .zip(&neighbours)
@@ -62,7 +66,11 @@ pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Result<Vec<Noda
             let cell = cut(square_around(x, outline.size()));
             let radius = cell.iter().map(|c| (c.0 - x).norm()).fold(0.0, f64::max);
             // Near the boundary it is the body that is cut, so that its edges stay exactly what they are.
-            let boundary = if radius < outline.distance_to_boundary(*x) { cell } else { cut(boundary.clone()) };
+            let boundary = match radius < outline.distance_to_boundary(*x) {
+                true => cell,
+                false if convex => cut(boundary.clone()),
+                false => tidied(&cut(boundary.clone()), tolerance),
+            };
             let corners: Vec<Point2> = boundary.iter().map(|c| c.0).collect();
             NodalCell { area: signed_area(&corners).max(0.0), boundary }
         })

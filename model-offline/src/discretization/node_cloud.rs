@@ -1,14 +1,17 @@
 //! The nodes, with their supports, and the search for those whose kernel covers a region.
 
+use super::sight::Sight;
 use crate::geometry::Point;
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
+use std::sync::Arc;
 
 type Support<const D: usize> = GeomWithData<Rectangle<[f64; D]>, u32>;
 
 /// Nodes X_I with the half-width a_I of their rectangular support.
 #[derive(Debug, Clone)]
 pub struct NodeCloud<const D: usize> {
+    sight: Option<Arc<dyn Sight<D>>>,
     positions: Vec<Point<D>>,
     half_widths: Vec<f64>,
     supports: RTree<Support<D>>,
@@ -35,7 +38,18 @@ where
                 })
                 .collect(),
         );
-        Self { positions, half_widths, supports }
+        Self { sight: None, positions, half_widths, supports }
+    }
+
+    /// The same nodes in a body where not every point sees every other.
+    #[must_use]
+    pub fn in_sight(self, sight: Option<Arc<dyn Sight<D>>>) -> Self {
+        Self { sight, ..self }
+    }
+
+    /// Whether a node is in sight of `x`.
+    pub(super) fn sees(&self, x: &Point<D>, node: u32) -> bool {
+        self.sight.as_ref().is_none_or(|sight| sight.sees(x, &self.positions[node as usize]))
     }
 
     /// Number of nodes.

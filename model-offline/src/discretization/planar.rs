@@ -3,6 +3,7 @@
 use super::finite_element::Elements;
 use super::method::{Integration, Method};
 use super::nodal_cells::{Across, clipped_voronoi};
+use super::sight::{OutlineSight, Sight};
 use super::triangulation::{TriangulationError, triangulate};
 use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, Wanted, integration, subcells};
 use crate::geometry::{Point, Point2, Polygon};
@@ -68,7 +69,8 @@ impl Planar {
             triangles = triangulate(&nodes, outline, inclusions)?;
             cells = Elements::linear(nodes.clone(), triangles.clone()).cells();
         }
-        let cloud = NodeCloud::new(nodes, half_widths);
+        let sight = OutlineSight::of(outline).map(|sight| Arc::new(sight) as Arc<dyn Sight<2>>);
+        let cloud = NodeCloud::new(nodes, half_widths).in_sight(sight);
         let shape = ShapeFunctions::new(&cloud, method.basis);
         let rule = match method.integration {
             Integration::Dni => integration::direct_nodal(&shape, &cells)?,

@@ -1,7 +1,7 @@
 //! Shape functions Ψ_I and their gradients from the moment matrix.
 
 use super::NodeCloud;
-use super::kernel::product_kernel;
+use super::kernel::{NEGLIGIBLE, product_kernel};
 use super::method::Basis;
 use crate::geometry::Point;
 use nalgebra::{SMatrix, SVector};
@@ -172,7 +172,7 @@ where
         for &i in candidates {
             let offset = x - self.cloud.positions()[i as usize];
             let (phi, phi_slope) = product_kernel(&offset, self.cloud.half_widths()[i as usize]);
-            if phi <= 0.0 {
+            if phi <= NEGLIGIBLE || !self.cloud.sees(x, i) {
                 continue;
             }
             nodes.push(i);

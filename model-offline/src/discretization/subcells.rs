@@ -14,7 +14,7 @@
 //!   It follows the law's own loss of stiffness, at the cost of the law evaluated in every triangle.
 
 use super::integration::GAUSS_2;
-use super::nodal_cells::NodalCell;
+use super::nodal_cells::{Across, NodalCell};
 use super::shape_functions::Wanted;
 use super::{Quadrature, ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2, cross};
@@ -66,7 +66,7 @@ pub fn modified_scni(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resu
     for (node, cell) in cells.iter().enumerate() {
         subcells.compute(node, cell)?;
         // A cell that its node does not see all of (at a notch) has triangles that overlap; its mean serves there.
-        if subcells.areas.iter().any(|a| *a < -DEGENERATE * cell.area) {
+        if subcells.areas.is_empty() || subcells.areas.iter().any(|a| *a < -DEGENERATE * cell.area) {
             rule.push(cell.area, node, &subcells.nodes, &subcells.mean);
             continue;
         }
@@ -125,9 +125,18 @@ impl<'a, 'c> Subcells<'a, 'c> {
         let (low, high) = corners.iter().fold((x, x), |(low, high), c| (low.inf(c), high.sup(c)));
         self.shape.cloud().covering(&low, &high, &mut self.candidates);
         let n = corners.len();
-        let spokes = (0..n).map(|k| self.mean_values(node, x, corners[k])).collect::<Result<Vec<_>, _>>()?;
-        let edges =
-            (0..n).map(|k| self.mean_values(node, corners[k], corners[(k + 1) % n])).collect::<Result<Vec<_>, _>>()?;
+        // A cell that its node does not see all of has no triangles: the mean gradient serves in all of it.
+        let seen = corners.iter().all(|corner| self.shape.cloud().sees(corner, node as u32));
+        let edges = (0..n)
+            .map(|k| match cell.boundary[k].1 {
+                Across::Bridge => Ok(vec![0.0; self.candidates.len()]),
+                _ => self.mean_values(node, corners[k], corners[(k + 1) % n]),
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let spokes = match seen {
+            true => (0..n).map(|k| self.mean_values(node, x, corners[k])).collect::<Result<Vec<_>, _>>()?,
+            false => Vec::new(),
+        };
         let used: Vec<usize> = (0..self.candidates.len())
             .filter(|&i| spokes.iter().chain(&edges).any(|values| values[i] != 0.0))
             .collect();
@@ -140,13 +149,16 @@ impl<'a, 'c> Subcells<'a, 'c> {
         for k in 0..n {
             let (a, b) = (corners[k], corners[(k + 1) % n]);
             let area = 0.5 * cross(a - x, b - x);
-            self.areas.push(area);
             for (place, &i) in used.iter().enumerate() {
                 let across = normal(a, b) * edges[k][i];
                 self.mean[place] += across / cell.area;
+                if !seen {
+                    continue;
+                }
                 let around = across + normal(x, a) * spokes[k][i] + normal(b, x) * spokes[(k + 1) % n][i];
                 self.gradients.push(if area == 0.0 { Point::zeros() } else { around / area });
             }
+            self.areas.extend(seen.then_some(area));
         }
         Ok(())
     }

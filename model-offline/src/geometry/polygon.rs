@@ -89,6 +89,15 @@ impl Polygon {
         signed_area(&self.vertices)
     }
 
+    /// Whether no corner turns inwards, but for rounding.
+    pub fn is_convex(&self) -> bool {
+        let v = &self.vertices;
+        (0..v.len()).all(|i| {
+            let (a, b, c) = (v[i], v[(i + 1) % v.len()], v[(i + 2) % v.len()]);
+            cross(b - a, c - b) >= -1e-9 * (b - a).norm() * (c - b).norm()
+        })
+    }
+
     /// Lower left and upper right corner of the bounding box.
     pub fn bounds(&self) -> (Point2, Point2) {
         bounds(&self.vertices)

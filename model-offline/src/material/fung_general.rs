@@ -3,7 +3,7 @@
 use super::catalogue::{Catalogued, LameParameters};
 use super::error::{MaterialError, not_negative};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, push_forward, zero4};
-use super::material::{Material, Response, stable_at_rest};
+use super::material::{Material, Response, is_negative_somewhere, stable_at_rest};
 use super::section::{MaterialSection, TensorEntry, unused};
 use serde::Serialize;
 
@@ -29,6 +29,9 @@ impl FungTensors {
     /// The same, checked.
     pub(super) fn checked(self) -> Result<Self, MaterialError> {
         not_negative(self.c, "c")?;
+        if is_negative_somewhere(&self.c_tensor) {
+            return Err(MaterialError::Negative("the quadratic form C of the exponent"));
+        }
         Material::<2>::check_stable_at_rest(&self)?;
         Ok(self)
     }
@@ -122,5 +125,30 @@ impl Catalogued for FungTensors {
 
     fn with_exponential_factor(&self, c: f64) -> Option<Result<Self, MaterialError>> {
         Some(Self { c, ..self.clone() }.checked())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Law;
+
+    #[test]
+    fn an_exponent_that_falls_with_strain_is_refused_in_both_forms() {
+        // A law that softens without end, whatever else it is at rest.
+        assert!(
+            Law::fung(383.0, 318.5, 0.779, 1.5, -0.1).is_err() && Law::fung(383.0, 318.5, 0.779, -1.5, 1.0).is_err()
+        );
+        let isotropic = |lambda: f64, mu: f64| {
+            let shear = [(0, 1, 0, 1, mu), (1, 0, 1, 0, mu), (0, 1, 1, 0, mu), (1, 0, 0, 1, mu)];
+            let normal = [(0, 0, 0, 0, lambda + 2.0 * mu), (1, 1, 1, 1, lambda + 2.0 * mu)];
+            let mixed = [(0, 0, 1, 1, lambda), (1, 1, 0, 0, lambda)];
+            [&shear[..], &normal[..], &mixed[..]].concat()
+        };
+        let law = |lambda_c, mu_c| {
+            FungTensors::from_entries(&isotropic(383.0, 318.5), &isotropic(lambda_c, mu_c), 0.779).unwrap().checked()
+        };
+        assert!(law(1.5, 1.0).is_ok() && law(0.0, 0.0).is_ok());
+        assert_eq!(law(1.5, -0.1), Err(MaterialError::Negative("the quadratic form C of the exponent")));
     }
 }

@@ -72,15 +72,26 @@ pub trait Material<const D: usize>: std::fmt::Debug {
     }
 }
 
-/// Whether a tangent at rest is positive definite on symmetric strains.
-pub(super) fn stable_at_rest<const D: usize>(a: &Tensor4<D>) -> Result<(), MaterialError> {
+/// A tensor with both minor symmetries as a matrix on symmetric strains.
+fn on_strains<const D: usize>(a: &Tensor4<D>) -> DMatrix<f64> {
     // Mandel's notation: strains (ε_ii, √2 ε_ij), so that the matrix has the tensor's own eigenvalues.
     let pairs: Vec<(usize, usize)> = (0..D).flat_map(|i| (i..D).map(move |j| (i, j))).collect();
     let weight = |(i, j): (usize, usize)| if i == j { 1.0 } else { std::f64::consts::SQRT_2 };
-    let mandel = DMatrix::from_fn(pairs.len(), pairs.len(), |r, c| {
+    DMatrix::from_fn(pairs.len(), pairs.len(), |r, c| {
         let ((i, j), (k, l)) = (pairs[r], pairs[c]);
         weight(pairs[r]) * weight(pairs[c]) * a[i][j][k][l]
-    });
+    })
+}
+
+/// Whether `E:C:E` is negative for some strain E, by more than rounding.
+pub(super) fn is_negative_somewhere<const D: usize>(c: &Tensor4<D>) -> bool {
+    let form = on_strains(c);
+    form.symmetric_eigenvalues().min() < -1e-12 * form.norm()
+}
+
+/// Whether a tangent at rest is positive definite on symmetric strains.
+pub(super) fn stable_at_rest<const D: usize>(a: &Tensor4<D>) -> Result<(), MaterialError> {
+    let mandel = on_strains(a);
     if !mandel.iter().all(|v| v.is_finite()) {
         return Err(MaterialError::NotFinite("a modulus"));
     }

@@ -15,8 +15,25 @@ use crate::material::{Material, Matrix, determinant};
 pub struct Inverted {
     /// Integration point.
     pub point: usize,
-    /// det F there (NaN when the law overflowed).
+    /// det F there; positive when it is the law that has no finite stress there.
     pub det_f: f64,
+}
+
+impl Inverted {
+    /// Whether the body is not inverted, but the law's stress not finite.
+    pub fn law_overflowed(&self) -> bool {
+        self.det_f > 0.0
+    }
+}
+
+impl std::fmt::Display for Inverted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { point, det_f } = self;
+        match self.law_overflowed() {
+            true => write!(f, "the law's stress is not finite at integration point {point} (det F = {det_f:.3e})"),
+            false => write!(f, "det F = {det_f:.3e} at integration point {point}"),
+        }
+    }
 }
 
 /// Displacement gradients of all integration points, kept from the force evaluation for the tangent.
@@ -51,7 +68,8 @@ pub fn displacement_gradient<const D: usize>(rule: &Quadrature<D>, q: usize, coe
 /// Internal force and strain energy at the given coefficients; fills `state` for [`tangent`].
 ///
 /// # Errors
-/// [`Inverted`] when det F ≤ 0 or not a number at an integration point; `force` is then not meaningful.
+/// [`Inverted`] when det F ≤ 0 or not a number, or the stress not finite, at an integration point; `force` is then not
+/// meaningful.
 pub fn internal_force<const D: usize>(
     rule: &Quadrature<D>,
     tissue: &Tissue,
@@ -77,7 +95,7 @@ pub fn internal_force<const D: usize>(
             pk1 += response.pk1_stress * (point.weight * factor);
         }
         if !pk1.iter().all(|p| p.is_finite()) {
-            return Err(Inverted { point: q, det_f: f64::NAN });
+            return Err(Inverted { point: q, det_f });
         }
         for (&i, g) in point.nodes.iter().zip(point.gradients) {
             let f = &mut force[i as usize * D..i as usize * D + D];

@@ -79,8 +79,10 @@ pub trait WeaklyImposed: std::fmt::Debug + Send + Sync {
     fn node_lists(&self) -> Vec<&[u32]>;
     /// Adds energy and its gradient at coefficients `d`, for the prescribed numbers.
     fn add_force(&self, tissue: &Tissue, d: &[f64], prescribed: &[f64], force: &mut [f64]) -> f64;
-    /// Adds the second derivative.
-    fn add_tangent(&self, tissue: &Tissue, d: &[f64], pattern: &Pattern, values: &mut [f64]);
+    /// Adds the second derivative at coefficients and prescribed numbers.
+    fn add_tangent(&self, tissue: &Tissue, at: (&[f64], &[f64]), pattern: &Pattern, values: &mut [f64]);
+    /// The same with what keeps it stable suited to coefficients `d`; none where that is so already.
+    fn adapted(&self, tissue: &Tissue, d: &[f64]) -> Option<Arc<dyn WeaklyImposed>>;
     /// Adds the force that unit rates of the prescribed numbers cause: −∂(force)/∂(prescribed) · rates.
     fn add_response(&self, tissue: &Tissue, d: &[f64], rates: &[f64], out: &mut [f64]);
 }

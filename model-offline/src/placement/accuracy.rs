@@ -67,8 +67,10 @@ pub fn accuracy(
     let rest = Rest::new(reference);
     let paddles = placement.paddles.iter().enumerate();
     let paddles = paddles.map(|(i, paddle)| rest.paddle_errors(i, paddle, &seconds[i])).collect();
+    // The reference answers for paddles; without one the body is no harder to solve than with the worst of them.
+    let slope = placement.paddles.iter().enumerate().map(|(i, p)| rest.slope_error(i, p)).fold(0.0, f64::max);
     let followed = Followed { study: &placement.no_paddle.static_study, jacobians: &[] };
-    let no_paddle = followed.errors(&seconds[scene.paddles.len()], 0.0);
+    let no_paddle = followed.errors(&seconds[scene.paddles.len()], slope);
     Ok(Accuracy { paddles, no_paddle, second_nodes: second.map(|model| model.nodes()) })
 }
 
@@ -104,11 +106,17 @@ impl<'a> Rest<'a> {
         Self { reference, open_per_depth: reference.open_displacement() * largest }
     }
 
+    fn per_depth_error(&self, i: usize, per_depth: [f64; 2]) -> f64 {
+        (Vector2::from(per_depth) - self.reference.responses()[i].target_per_depth).norm() + self.open_per_depth
+    }
+
+    /// The same of the model that the insertion is followed on.
+    fn slope_error(&self, i: usize, paddle: &PaddleResult) -> f64 {
+        self.per_depth_error(i, paddle.static_study.target_per_depth)
+    }
+
     fn paddle_errors(&self, i: usize, paddle: &PaddleResult, second: &FollowedInsertion) -> PaddleErrors {
         let (limit, open) = (&self.reference.responses()[i], self.reference.open_by_paddle()[i]);
-        let off = |per_depth: [f64; 2]| {
-            (Vector2::from(per_depth) - limit.target_per_depth).norm() + self.open_per_depth
-        };
         let measure = (paddle.controllability_measure / limit.controllability_measure - 1.0).abs() + open;
         let directions = paddle.best_direction.map(Vector2::from).zip(limit.best_direction);
         let followed = Followed { study: &paddle.static_study, jacobians: &paddle.jacobians };
@@ -116,9 +124,9 @@ impl<'a> Rest<'a> {
             jacobian: relative(&matrix(&paddle.jacobian), &limit.jacobian) + open,
             controllability_measure: measure.is_finite().then_some(measure),
             best_direction: directions.map(|(found, limit)| (found - limit).norm() + open * limit.norm()),
-            target_per_depth: off(paddle.target_per_depth),
+            target_per_depth: self.per_depth_error(i, paddle.target_per_depth),
             // The insertion may be that of a coarser model, which starts off with an error of its own.
-            static_study: followed.errors(second, off(paddle.static_study.target_per_depth)),
+            static_study: followed.errors(second, self.slope_error(i, paddle)),
         }
     }
 }
@@ -130,13 +138,21 @@ struct Followed<'a> {
 }
 
 impl Followed<'_> {
-    /// The distance from a second insertion, and never less than what the error at rest (`slope`, per depth) grows to.
+    /// What the error at rest (`slope`, per depth) grows to, and how far what the law's nonlinearity adds to the response at
+    /// rest is from what it adds on the second model, whose own error at rest does not matter then.
     fn errors(&self, second: &FollowedInsertion, slope: f64) -> StaticErrors {
-        let displacements = self.study.target_displacement.iter().zip(&self.study.depth).enumerate();
-        let target_displacement: Vec<Option<f64>> = displacements
-            .map(|(k, (found, depth))| {
-                let other = second.study.target_displacement.get(k)?;
-                Some((Vector2::from(*found) - Vector2::from(*other)).norm().max(slope * depth))
+        let added = |study: &StaticStudy, k: usize, depth: f64| -> Option<Vector2<f64>> {
+            let displacement: [f64; 2] = *study.target_displacement.get(k)?;
+            Some(Vector2::from(displacement) - Vector2::from(study.target_per_depth) * depth)
+        };
+        let target_displacement: Vec<Option<f64>> = self
+            .study
+            .depth
+            .iter()
+            .enumerate()
+            .map(|(k, &depth)| {
+                let apart = added(self.study, k, depth)? - added(&second.study, k, depth)?;
+                Some(apart.norm() + slope * depth)
             })
             .collect();
         let jacobians = self.jacobians.iter().enumerate();

@@ -21,6 +21,8 @@ const LOOSE: f64 = 0.03;
 const LONGEST_SKIP: i32 = 2;
 /// Share of the tolerance that the reference may leave open.
 const REFERENCE_SHARE: f64 = 0.25;
+/// The same where an accepted model's errors drown in it.
+const TELLING_SHARE: f64 = 0.12;
 /// The same where that decides.
 const SHARP_SHARE: f64 = 0.08;
 
@@ -135,6 +137,11 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
             estimate = ErrorEstimate::of(&responses, &reference, level);
         }
         if estimate.worst() <= tolerance {
+            if !reference.tells(&responses, SHARP_SHARE * tolerance) {
+                // Enough to accept, but not to say how far off each paddle is.
+                reference = Reference::compute(scene, TELLING_SHARE * tolerance)?;
+                estimate = ErrorEstimate::of(&responses, &reference, level);
+            }
             return Ok(Judged { model, estimate: Some(estimate), reference: Some(reference) });
         }
         tried = level;

@@ -25,7 +25,8 @@ pub struct SingularJacobian {
 pub fn best_direction(jacobian: &Matrix2<f64>, normal: Vector2<f64>) -> Result<Vector2<f64>, SingularJacobian> {
     let values = jacobian.singular_values();
     let condition = values.max() / values.min();
-    let direction = jacobian.try_inverse().filter(|_| condition <= MAX_JACOBIAN_CONDITION).map(|inverse| inverse * normal);
+    let direction =
+        jacobian.try_inverse().filter(|_| condition <= MAX_JACOBIAN_CONDITION).map(|inverse| inverse * normal);
     direction.filter(|d| d.norm() <= MAX_CONTROLLABILITY_MEASURE).ok_or(SingularJacobian { condition })
 }
 

@@ -200,7 +200,12 @@ impl Pair {
 /// controllability measure ‖b‖, whose relative change is `−(J⁻ᵀ b)ᵀ ∂J b / ‖b‖²`, and the needle's two displacements.
 fn pairs(response: &RestResponse, largest: f64) -> [([f64; 5], [f64; 5]); 3] {
     let b = response.best_direction.unwrap_or_default();
-    let w = response.jacobian.transpose().try_inverse().filter(|_| b != Vector2::zeros()).map_or(Vector2::zeros(), |i| i * b / b.norm_squared());
+    let w = response
+        .jacobian
+        .transpose()
+        .try_inverse()
+        .filter(|_| b != Vector2::zeros())
+        .map_or(Vector2::zeros(), |i| i * b / b.norm_squared());
     let needle = [0.0, 0.0, 1.0, 0.0, 0.0];
     [
         ([b.x, b.y, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, w.x, w.y]),
@@ -219,9 +224,10 @@ fn shifted(coarse: &RestResponse, fine: &RestResponse, normal: Vector2<f64>) -> 
 /// What the limit leaves open of the controllability measure, relative.
 fn left_open(coarse: &RestResponse, fine: &RestResponse) -> f64 {
     match (coarse.best_direction, fine.best_direction) {
-        (Some(before), Some(after)) => (OPEN * (after.norm() - before.norm()).abs())
-            .max(SIDEWAYS * (after - before).norm())
-            / fine.controllability_measure,
+        (Some(before), Some(after)) => {
+            (OPEN * (after.norm() - before.norm()).abs()).max(SIDEWAYS * (after - before).norm())
+                / fine.controllability_measure
+        }
         (None, None) => 0.0,
         _ => f64::INFINITY,
     }
@@ -286,8 +292,7 @@ mod tests {
         .unwrap();
         let stiffness = pair.stiffness();
         for_each_paddle(&pair.fine, Loads::OnTarget, |paddle, fields| {
-            let (before, after) =
-                (response_of(&pair.coarse, &coarse[paddle]), response_of(&pair.fine, fields));
+            let (before, after) = (response_of(&pair.coarse, &coarse[paddle]), response_of(&pair.fine, fields));
             let errors = pair.errors(&coarse[paddle], fields);
             let rule = pair.fine.rule();
             let product = |u: usize, z: usize| -> f64 {

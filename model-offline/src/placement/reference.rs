@@ -44,6 +44,14 @@ impl Reference {
         off.zip(&self.open_by_paddle).map(|(off, open)| off + open).collect()
     }
 
+    /// Whether the errors are known to within a factor of three: what is left open of each is at most half the distance, or
+    /// negligible.
+    pub(super) fn tells(&self, responses: &[RestResponse], negligible: f64) -> bool {
+        let open = self.open_by_paddle.iter();
+        let off = responses.iter().zip(&self.responses).map(|(found, limit)| found.measure_distance(limit));
+        open.zip(off).all(|(open, off)| *open <= 0.5 * off || *open <= negligible)
+    }
+
     /// What the limit leaves open of the controllability measures, paddle by paddle, relative.
     pub fn open_by_paddle(&self) -> &[f64] {
         &self.open_by_paddle

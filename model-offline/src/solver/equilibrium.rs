@@ -61,7 +61,8 @@ pub struct NewtonSettings {
     pub line_search: bool,
     /// Whether a converged state with an indefinite tangent ends the run.
     pub require_stability: bool,
-    /// Keep the last factor while each iteration still gains a factor of four: cheap for small steps.
+    /// Keep the last factor while each iteration still gains a factor of four: cheap for small steps. Stability is then
+    /// checked whenever the body has moved by a twentieth of the spacing since it was last.
     pub reuse_tangent: bool,
     /// How the linear systems are solved.
     pub linear_solver: LinearSolver,
@@ -89,6 +90,9 @@ pub enum FailureReason {
     /// det F ≤ 0 at an integration point.
     #[error("element-inverted")]
     ElementInverted,
+    /// The material law has no finite stress at an integration point: an exponential overflowed.
+    #[error("law-overflow")]
+    LawOverflow,
     /// The equilibrium is not stable: its tangent is not positive definite.
     #[error("lost-stability")]
     LostStability,
@@ -155,6 +159,8 @@ pub struct Equilibrium<const D: usize> {
     /// Whether the factor belongs to the current state.
     factor_is_current: bool,
     factor_exists: bool,
+    /// Coefficients where the tangent was last found positive definite.
+    stable_at: Vec<f64>,
     residuals: Vec<f64>,
     effort: Effort,
 }
@@ -246,10 +252,11 @@ impl<const D: usize> Equilibrium<D> {
             at,
             factor_is_current: false,
             factor_exists: false,
+            stable_at: Vec::new(),
             residuals: Vec::new(),
             effort: Effort::default(),
         };
-        body.evaluate().map_err(|_| body.failure(FailureReason::ElementInverted, 0.0, "at rest".into()))?;
+        body.evaluate().map_err(|at| body.failure(reason_of(&at), 0.0, "at rest".into()))?;
         if !body.refactorise() {
             return Err(body.failure(
                 FailureReason::SingularTangent,
@@ -403,7 +410,7 @@ impl<const D: usize> Equilibrium<D> {
         self.solver.assemble(|pattern, values| {
             assembly::tangent(rule, tissue, &at.state, blocks, values);
             if let Some(weak) = weak {
-                weak.add_tangent(tissue, &at.coefficients, pattern, values);
+                weak.add_tangent(tissue, (&at.coefficients, &at.prescribed[at.multipliers.len()..]), pattern, values);
             }
         });
     }
@@ -419,7 +426,16 @@ impl<const D: usize> Equilibrium<D> {
         self.factor_is_current = self.solver.factorise().is_ok();
         // A failed factorisation has overwritten the last factor.
         self.factor_exists = self.factor_is_current;
+        if self.factor_is_current {
+            self.stable_at.clone_from(&self.at.coefficients);
+        }
         self.factor_is_current
+    }
+
+    /// Whether the body has moved far enough since its tangent was last found positive definite for that to have changed.
+    fn stability_is_uncertain(&self) -> bool {
+        let moved = |(a, b): (&f64, &f64)| (a - b).abs() > STABILITY_REACH * self.spacing;
+        self.at.coefficients.iter().zip(&self.stable_at).any(moved)
     }
 
     /// Whether a new tangent is first tried by conjugate gradients with the last factor.
@@ -502,10 +518,14 @@ impl<const D: usize> Equilibrium<D> {
     /// Newton's method towards the prescribed values and the load.
     fn attempt(&mut self) -> Attempt {
         let n = self.at.coefficients.len();
+        if let Some(adapted) = self.weak.as_ref().and_then(|weak| weak.adapted(&self.tissue, &self.at.coefficients)) {
+            self.weak = Some(adapted);
+            self.factor_is_current = false;
+        }
         // Load and weakly imposed values are part of the energy, which has changed with them.
         let loaded = self.weak.is_some() || self.at.external.iter().any(|f| *f != 0.0);
-        if loaded && self.evaluate().is_err() {
-            return Attempt::Failed(FailureReason::ElementInverted, "before the first step".into());
+        if loaded && let Err(at) = self.evaluate() {
+            return Attempt::Failed(reason_of(&at), "before the first step".into());
         }
         let rows = self.at.multipliers.len();
         let mut step = Step {
@@ -545,7 +565,7 @@ impl<const D: usize> Equilibrium<D> {
                     self.factor_is_current = true;
                     return Attempt::Converged;
                 }
-                if self.settings.reuse_tangent && !step.indefinite {
+                if self.settings.reuse_tangent && !step.indefinite && !self.stability_is_uncertain() {
                     return Attempt::Converged;
                 }
                 if self.settings.require_stability && !self.refactorise() {
@@ -601,10 +621,7 @@ impl<const D: usize> Equilibrium<D> {
             length *= 0.5;
             if length < shortest {
                 return Err(match outcome {
-                    Err(inverted) => (
-                        FailureReason::ElementInverted,
-                        format!("det F = {:.3e} at integration point {}", inverted.det_f, inverted.point),
-                    ),
+                    Err(at) => (reason_of(&at), at.to_string()),
                     Ok(()) => {
                         (FailureReason::NotConverged, "no step along Newton's direction lowers the energy".into())
                     }
@@ -623,4 +640,12 @@ impl<const D: usize> Equilibrium<D> {
         let load = norm(&mut self.at.external.iter().copied());
         residual / holding.max(load).max(self.smallest_force)
     }
+}
+
+/// Share of the spacing by which a body moves before its stability is checked again: strains of a few per cent, after
+/// which no law here has lost what it had.
+const STABILITY_REACH: f64 = 0.05;
+
+fn reason_of(at: &Inverted) -> FailureReason {
+    if at.law_overflowed() { FailureReason::LawOverflow } else { FailureReason::ElementInverted }
 }

@@ -215,7 +215,7 @@ pub(super) const TICK_SETTINGS: NewtonSettings = NewtonSettings {
     max_iterations: 25,
     max_cutbacks: 8,
     line_search: true,
-    require_stability: false,
+    require_stability: true,
     reuse_tangent: true,
     linear_solver: LinearSolver::BySize,
 };

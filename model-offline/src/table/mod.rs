@@ -205,6 +205,9 @@ fn linearise(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<L
     Ok((jacobian, direction, body.depth_sensitivity()?))
 }
 
+/// Orthogonal error that a knot of the path may keep where rounding ends Newton's method early, over the body's size.
+const MAX_PATH_ERROR: f64 = 1e-9;
+
 /// Newton's method on the paddle displacement: n·(target displacement) = 0 at the present depth.
 fn steer(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<(), ModelError> {
     let tolerance = 1e-12 * body.scale();
@@ -217,7 +220,7 @@ fn steer(body: &mut Body<'_>, paddle: u32, normal: Vector2<f64>) -> Result<(), M
         body.drive(body.depth(), body.paddle() - direction * error)?;
         error = normal.dot(&body.target_displacement());
     }
-    if error.abs() <= 1e6 * tolerance {
+    if error.abs() <= MAX_PATH_ERROR * body.scale() {
         return Ok(());
     }
     Err(ModelError::Solve(Failure {

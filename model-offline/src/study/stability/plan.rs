@@ -1,6 +1,7 @@
 //! What is varied: one parameter at a time around the scene's own setting.
 
 use crate::discretization::{Integration, Method, Resolution};
+use crate::material::Material;
 use crate::scene::Scene;
 use crate::study::extent::Extent;
 use strum::VariantArray as _;
@@ -187,6 +188,16 @@ pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
     entries
 }
 
+/// Shear modulus at rest of the paper's law, which the values of c are meant for.
+const PAPER_SHEAR_MODULUS: f64 = 319.279;
+
+/// What the values of c are multiplied by: c is a stress, and means nothing without the others of its law.
+fn stress_scale(scene: &Scene) -> f64 {
+    let scale = Material::<2>::rest_shear_modulus(&scene.material) / PAPER_SHEAR_MODULUS;
+    // 1, not 0.9999999999999998.
+    (1e12 * scale).round() / 1e12
+}
+
 fn sweeps(scene: &Scene, base: Setting, values: &Values, out: &mut Vec<Entry>) {
     let mut push = |parameter, value, setting| out.push(Entry { parameter, value, setting });
     if !base.method.integration.is_element() {
@@ -211,7 +222,7 @@ fn sweeps(scene: &Scene, base: Setting, values: &Values, out: &mut Vec<Entry>) {
         }
     }
     if scene.material.with_exponential_factor(0.0).is_some() {
-        for &c in values.c {
+        for c in values.c.iter().map(|c| c * stress_scale(scene)) {
             push(Parameter::C, c, Setting { c: Some(c), ..base });
         }
     }
