@@ -108,7 +108,9 @@ fn the_checkerboard_is_felt_by_rules_that_see_the_gradient_vary() {
     for blind in [Integration::Dni, Integration::Scni] {
         let z = of(blind, 0.0);
         assert!(z.interior_energy_ratio.abs() < 1e-12 && z.least_energy_ratio < 0.2, "{z:?}");
+        assert!(z.bloch_share.abs() < 1e-12, "{z:?}");
     }
+    assert!(of(Integration::ScniStabilised, 0.0).bloch_share > 0.36);
     for seeing in [Integration::Nsni, Integration::Gauss] {
         let z = of(seeing, 0.0);
         assert!(z.interior_energy_ratio > 0.9 && z.least_energy_ratio > 0.8, "{z:?}");

@@ -18,11 +18,15 @@ struct Outcome {
     estimate: ErrorEstimate,
     /// Estimated and true error, paddle by paddle, with the measure.
     paddles: Vec<(f64, f64, f64)>,
+    /// What the truth itself leaves open.
+    open: f64,
 }
 
 fn outcome(text: &str) -> Result<Outcome, ModelError> {
     let scene = Scene::parse(text, "scene").unwrap();
+    let start = std::time::Instant::now();
     let Judged { model, estimate, reference } = discretise_judged(&scene)?;
+    println!("{:.2} s", start.elapsed().as_secs_f64());
     let found = rest_responses(&model).unwrap();
     let truth = Reference::compute(&scene, BEYOND_DOUBT * TOLERANCE).unwrap();
     println!("truth: {} nodes leave {:.3} % open", truth.nodes, 100.0 * truth.open);
@@ -30,11 +34,11 @@ fn outcome(text: &str) -> Result<Outcome, ModelError> {
     let off = found.iter().zip(truth.responses()).map(|(found, truth)| found.measure_distance(truth));
     let measures = found.iter().map(|r: &RestResponse| r.controllability_measure);
     let paddles = estimated.into_iter().zip(off).zip(measures).map(|((e, t), m)| (e, t, m)).collect();
-    Ok(Outcome { nodes: model.nodes(), estimate: estimate.unwrap(), paddles })
+    Ok(Outcome { nodes: model.nodes(), estimate: estimate.unwrap(), paddles, open: truth.open })
 }
 
 fn check(text: &str) {
-    let Outcome { nodes, estimate, paddles } = outcome(text).unwrap();
+    let Outcome { nodes, estimate, paddles, open } = outcome(text).unwrap();
     println!("{nodes} nodes, level {}, estimated {:.3} %", estimate.level, 100.0 * estimate.controllability);
     for (estimated, truth, measure) in &paddles {
         let effectivity = estimated / truth;

@@ -11,11 +11,14 @@ pub trait Sight<const D: usize>: std::fmt::Debug + Send + Sync {
     fn sees(&self, a: &Point<D>, b: &Point<D>) -> bool;
 }
 
+/// An edge in the tree, with its ends.
+type Edge = GeomWithData<Line<[f64; 2]>, (Point2, Point2)>;
+
 /// Sight inside an outline that is not convex.
 #[derive(Debug)]
 pub struct OutlineSight {
     outline: Polygon,
-    edges: RTree<GeomWithData<Line<[f64; 2]>, (Point2, Point2)>>,
+    edges: RTree<Edge>,
     tolerance: f64,
 }
 

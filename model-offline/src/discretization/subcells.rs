@@ -20,7 +20,8 @@ use super::{Quadrature, ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2, cross};
 
 /// Weight α of the stabilisation: with 1 the least share of its energy that any lattice wave keeps is 0.37 (see the
-/// Bloch symbols), with 0.3 it is 0.12.
+/// Bloch symbols), with 0.3 it is 0.12: where the cell's own energy vanishes the weight enters linearly, and a script that
+/// shares no code with this crate finds 0.395 and 0.118 for support 1.49, 0.373 and 0.117 for support 2.
 pub const STABILISATION: f64 = 1.0;
 /// Triangles below this share of their cell's area have none: the node lies on that edge.
 const DEGENERATE: f64 = 1e-12;

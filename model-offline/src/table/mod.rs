@@ -1,5 +1,8 @@
 //! The controller's table: Jacobians and the feed-forward paddle path along the insertion, from the nonlinear model.
 
+mod amplification;
+
+use self::amplification::largest_amplification;
 use crate::model::{Body, ModelError, TissueModel};
 use crate::placement::controllability::best_direction;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
@@ -27,8 +30,9 @@ pub struct TableOptions {
     pub knots: usize,
     /// Delay of the feedback loop that the suggested gain is for, in target samples.
     pub delay_samples: u32,
-    /// Largest |λ| of J·Ĵ⁻¹ that the tissue may turn out to have. On the paper's scene, homogeneous tissue and the
-    /// 100-fold inclusion mistaken for each other give 0.9 to 1.28 (`host-sim stability`).
+    /// Largest |λ| of J·Ĵ⁻¹ that the gain allows for at least. Where the scene's own tissues (with its inclusions and
+    /// without), mistaken for each other, reach more at some depth, the table says so and its gain allows for that. On the
+    /// paper's scene they give 0.9 to 1.28 (`host-sim loop-stability`).
     pub lambda_max: f64,
 }
 
@@ -117,6 +121,8 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
             Err(_) => break,
         }
     }
+    let amplification = largest_amplification(model, position, &knots).map_err(ModelError::from)?;
+    let lambda_max = options.lambda_max.max(amplification);
     let (first, last) = (&knots[0], &knots[knots.len() - 1]);
     let table = Table {
         scene_hash: scene.hash(),
@@ -138,9 +144,9 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
             needle_speed: scene.actuator.max_needle_speed,
         },
         gains: Gains {
-            loop_gain: default_gain(options.delay_samples, options.lambda_max),
+            loop_gain: default_gain(options.delay_samples, lambda_max),
             delay_samples: options.delay_samples,
-            lambda_max: options.lambda_max,
+            lambda_max,
         },
         knots,
     };

@@ -47,12 +47,12 @@ pub fn csv(study: &Stability) -> String {
 /// One row per method.
 pub fn zero_energy_csv(study: &Stability) -> String {
     let mut out = String::from(
-        "method,integration,spacing,jitter_percent,nodes,zero_modes,checkerboard_over_smooth,checkerboard_felt,interior_felt,least_felt\n",
+        "method,integration,spacing,jitter_percent,nodes,zero_modes,checkerboard_over_smooth,checkerboard_felt,interior_felt,least_felt,bloch_share\n",
     );
     for z in &study.zero_energy {
         let _ = writeln!(
             out,
-            "{},{},{},{:.0},{},{},{:.6e},{:.6e},{:.6e},{:.6e}",
+            "{},{},{},{:.0},{},{},{:.6e},{:.6e},{:.6e},{:.6e},{:.6e}",
             family(z.integration),
             z.integration.name(),
             study.spacing,
@@ -62,7 +62,8 @@ pub fn zero_energy_csv(study: &Stability) -> String {
             z.checkerboard_over_smooth,
             z.checkerboard_energy_ratio,
             z.interior_energy_ratio,
-            z.least_energy_ratio
+            z.least_energy_ratio,
+            z.bloch_share
         );
     }
     out

@@ -2,7 +2,7 @@
 //! displacements that alternate from node to node.
 
 use super::plan::{self, Setting};
-use super::probe;
+use super::{bloch, probe};
 use crate::discretization::finite_element::Elements;
 use crate::discretization::triangulation::triangulate;
 use crate::discretization::{
@@ -41,6 +41,8 @@ pub struct ZeroEnergy {
     pub interior_energy_ratio: f64,
     /// The least share of its energy, integrated accurately, that the rule gives to any deformation.
     pub least_energy_ratio: f64,
+    /// The same for any wave on an unbounded lattice, where no boundary helps (see [`bloch`]): 0 is a ghost mode.
+    pub bloch_share: f64,
 }
 
 /// Measures every method at a spacing, on a regular lattice and with nodes jittered by 40 %.
@@ -113,6 +115,7 @@ fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelErro
         checkerboard_over_smooth: energy(&stiffness, &checkerboard) / energy(&stiffness, &smooth),
         checkerboard_energy_ratio: energy(&stiffness, &checkerboard) / energy(&exact, &checkerboard),
         interior_energy_ratio,
+        bloch_share: bloch::least_share(integration, setting.method.support, &scene.material)?.share,
         least_energy_ratio: if !integration.is_element() { least_share(&stiffness, &exact) } else { 1.0 },
     })
 }
