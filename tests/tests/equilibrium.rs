@@ -204,9 +204,9 @@ fn the_volumetric_barrier_gives_the_finite_depth_profile_a_mesh_limit() {
 
 #[test]
 fn small_steps_with_an_old_factor_do_not_pass_the_depth_at_which_stability_is_lost() {
-    // A simulator's way: a thousand steps, the last factor kept as long as it serves.
+    // A simulator's way: hundreds of steps, the last factor kept as long as it serves.
     let mut scene = Scene::bundled("paper").unwrap().without_inclusions();
-    scene.discretization = scene.discretization.with(Resolution::Level(0), Method::new(Integration::FemT6));
+    scene.discretization = scene.discretization.with(Resolution::Level(-2), Method::new(Integration::FemT6));
     let model = TissueModel::new(&scene).unwrap();
     let mut body = model.body(Some(2), NewtonSettings::default()).unwrap();
     let failure = body.drive(0.1, Vector2::zeros()).unwrap_err();
@@ -219,10 +219,10 @@ fn small_steps_with_an_old_factor_do_not_pass_the_depth_at_which_stability_is_lo
         ..NewtonSettings::default()
     };
     let mut body = model.body(Some(2), ticks).unwrap();
-    let passed = (1..=1000).map(|k| 1e-4 * f64::from(k)).find(|&depth| body.drive(depth, Vector2::zeros()).is_err());
+    let passed = (1..=500).map(|k| 2e-4 * f64::from(k)).find(|&depth| body.drive(depth, Vector2::zeros()).is_err());
     let stopped_at = passed.expect("it stops");
     println!("small steps stop at {stopped_at}");
-    assert!(stopped_at <= 1.02 * lost_at + 2e-4, "{stopped_at} past {lost_at}");
+    assert!(stopped_at <= 1.02 * lost_at + 4e-4, "{stopped_at} past {lost_at}");
 }
 
 #[test]

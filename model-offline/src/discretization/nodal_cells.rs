@@ -69,7 +69,7 @@ pub fn clipped_voronoi(nodes: &[Point<2>], outline: &Polygon) -> Result<Vec<Noda
             let boundary = match radius < outline.distance_to_boundary(*x) {
                 true => cell,
                 false if convex => cut(boundary.clone()),
-                false => tidied(&cut(boundary.clone()), tolerance),
+                false => tidied(&cut(boundary.clone()), Across::Bridge, tolerance),
             };
             let corners: Vec<Point2> = boundary.iter().map(|c| c.0).collect();
             NodalCell { area: signed_area(&corners).max(0.0), boundary }
