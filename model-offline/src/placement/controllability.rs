@@ -6,7 +6,7 @@ use nalgebra::{Matrix2, Vector2};
 pub const MAX_JACOBIAN_CONDITION: f64 = 1e8;
 /// A paddle that must go farther than this many times the target's way controls nothing either: what the target then
 /// answers is little more than what the discretization leaves.
-pub const MAX_CONTROLLABILITY_MEASURE: f64 = 1e4;
+pub const MAX_CONTROLLABILITY_MEASURE: f64 = 1e6;
 
 /// A Jacobian that cannot be inverted to any use.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
