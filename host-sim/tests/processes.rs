@@ -251,3 +251,60 @@ fn two_terminals_find_each_other_in_any_order() {
         assert!(!root.exists(), "nothing stays behind");
     }
 }
+
+/// A controller in free-run whose plant is stopped for a while, re-armed or not: its last mode and its recording.
+fn after_a_stopped_plant(folder: &Path, rearms: bool) -> (String, Recording) {
+    let link = format!("rearm-{}-{rearms}", std::process::id());
+    let [table, record, json] = ["own.table", "controller.rec", "controller.json"].map(|name| folder.join(name));
+    let common = ["--link", &link, "--mode", "free-run", "--rate", "200", "--patience", "20"];
+    let mut controller = host_sim();
+    controller.arg("controller").args(common).arg("--table").arg(&table).stdout(Stdio::null());
+    let mut controller = controller.arg("--record").arg(&record).arg("--json").arg(&json).spawn().unwrap();
+    let mut plant = host_sim();
+    plant.arg("plant").args(common).args(["--tissue", "homogeneous", "--paddle", "3", "--insertion-time", "6"]);
+    let mut plant = plant.stdout(Stdio::null()).spawn().unwrap();
+    let started = Instant::now();
+    // Until the record has grown by some ticks in RUN.
+    while std::fs::metadata(&record).map_or(0, |metadata| metadata.len()) < 100_000 {
+        assert!(started.elapsed() < Duration::from_secs(60), "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    signal(plant.id(), "STOP");
+    std::thread::sleep(Duration::from_millis(1500));
+    signal(plant.id(), "CONT");
+    std::thread::sleep(Duration::from_millis(300));
+    if rearms {
+        succeeded(&host_sim().arg("rearm").arg(controller.id().to_string()).output().unwrap());
+    }
+    assert!(plant.wait().unwrap().success() && controller.wait().unwrap().success());
+    let accounts: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    succeeded(&host_sim().arg("replay").arg(&record).output().unwrap());
+    (accounts["handover"]["final_state"].to_string(), Recording::read(&record).unwrap())
+}
+
+#[test]
+fn a_controller_leaves_safe_when_somebody_rearms_it_and_not_before() {
+    use firmware::Mode;
+    let folder = tempfile::tempdir().unwrap();
+    let scene = model_offline::scene::Scene::bundled("paper").unwrap();
+    let (model, _) = model_offline::placement::discretise(&scene.without_inclusions()).unwrap();
+    let options = model_offline::table::TableOptions { knots: 3, ..Default::default() };
+    let table = model_offline::table::build(&model, 3, &options).unwrap();
+    std::fs::write(folder.path().join("own.table"), model_offline::table::to_bytes(&table).unwrap()).unwrap();
+    for rearms in [false, true] {
+        let (last, recording) = after_a_stopped_plant(folder.path(), rearms);
+        let modes: Vec<u32> = recording.records.iter().map(|record| record.tick.command.state).collect();
+        let safe = modes.iter().position(|mode| *mode == Mode::Safe as u32).expect("the ages lead to SAFE");
+        assert!(modes[..safe].contains(&(Mode::Run as u32)));
+        let runs_again = modes[safe..].contains(&(Mode::Run as u32));
+        assert_eq!(runs_again, rearms, "final state {last}");
+    }
+}
+
+#[test]
+fn only_a_controller_can_be_rearmed() {
+    // This process is none, and must not die of the attempt.
+    let refused = host_sim().arg("rearm").arg(std::process::id().to_string()).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("no controller"));
+}

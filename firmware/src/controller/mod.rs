@@ -38,6 +38,15 @@ impl<'t, T: Scalar> Controller<'t, T> {
         Ok(Self { table, runtime: Runtime::new(table, settings)? })
     }
 
+    /// The same controller with these monitors off: their codes are never set, and what they would refuse is taken. For
+    /// test benches that see whether anybody would notice.
+    #[cfg(feature = "switches")]
+    #[must_use]
+    pub fn without(mut self, monitors: Faults) -> Self {
+        self.runtime.off = monitors;
+        self
+    }
+
     /// Loop gain g per target sample in use.
     pub fn loop_gain(&self) -> f64 {
         self.runtime.gain.to_f64()
@@ -55,15 +64,15 @@ impl<'t, T: Scalar> Controller<'t, T> {
         let fresh_target = elapsed_ns.and_then(|_| self.read_inputs(state, inputs, &mut faults));
         self.expire_before_arming(state);
         self.check_ages(state, &mut faults);
-        let mut mode = state.supervisor.decide(faults);
+        let mut mode = state.supervisor.decide(self.runtime.seen(faults));
         if let (Mode::Run, Some(elapsed_ns)) = (mode, elapsed_ns) {
             state.armed = true;
             self.move_paddle(state, &Tick { time_ns: inputs.time_ns, elapsed_ns, fresh_target }, &mut faults);
             // The law itself may have found a reason to stop; its last command is within the limits.
-            mode = state.supervisor.decide(faults);
+            mode = state.supervisor.decide(self.runtime.seen(faults));
         }
         state.mode = mode;
-        state.faults = faults | state.supervisor.latched();
+        state.faults = self.runtime.seen(faults) | state.supervisor.latched();
         state.ledger.ticks.end(mode);
         self.command(state, inputs)
     }

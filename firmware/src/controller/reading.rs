@@ -36,7 +36,7 @@ impl<T: Scalar> Controller<'_, T> {
         let (sample, previous) = (Measurement::from(sample), state.needle.accepted.as_ref());
         let checked = checks.needle(&sample, previous, &state.needle_monitor);
         let travelled = previous.map_or(0.0, |previous| (sample.values[0] - previous.values[0]).abs());
-        if !state.needle.offer(&sample, checked.map(|_| ()), &mut state.ledger.needle, faults) {
+        if !state.needle.offer(&sample, checks.judge(checked.map(|_| ())), &mut state.ledger.needle, faults) {
             return;
         }
         state.needle_monitor = checked.unwrap_or_default();
@@ -68,7 +68,7 @@ impl<T: Scalar> Controller<'_, T> {
             Err(Discard::NotVisible)
         };
         let mut found = Faults::NONE;
-        let accepted = state.target.offer(&sample, content, &mut state.ledger.target, &mut found);
+        let accepted = state.target.offer(&sample, checks.judge(content), &mut state.ledger.target, &mut found);
         *faults |= found;
         state.target_lost |= found.contains(Faults::TARGET_LOST);
         if !accepted {
@@ -102,7 +102,7 @@ impl<T: Scalar> Controller<'_, T> {
             let admitted = FROZEN_TRAVEL * runtime.limits.max_displacement.to_f64() + runtime.unseen_motion(age);
             content = state.paddle_frozen.check(identical, commanded, admitted);
         }
-        if !state.paddle.offer(&sample, content, &mut state.ledger.paddle, faults) {
+        if !state.paddle.offer(&sample, checks.judge(content), &mut state.ledger.paddle, faults) {
             return;
         }
         let Some(commanded) = commanded else {

@@ -3,6 +3,7 @@
 use super::ledger::Discard;
 use super::monitors::{InnovationGate, NeedleMonitor};
 use super::sample::{Measurement, are_within};
+use super::stream::fault_of;
 use crate::detection::{NEEDLE_JUMP_FLOOR, NEEDLE_JUMP_MARGIN};
 use crate::scalar::Scalar;
 use crate::settings::Runtime;
@@ -23,6 +24,12 @@ impl<'r, T: Scalar> Checks<'r, T> {
     /// The checks of a tick at `now_ns`.
     pub(crate) fn new(runtime: &'r Runtime<T>, now_ns: u64) -> Self {
         Self { runtime, now_ns, latest_ns: now_ns.saturating_add(runtime.loop_period_ns) }
+    }
+
+    /// What becomes of a sample: one that only a monitor that is off refuses is good.
+    #[inline(always)]
+    pub(crate) fn judge(&self, content: Result<(), Discard>) -> Result<(), Discard> {
+        content.or_else(|reason| if self.runtime.seen(fault_of(reason)).is_empty() { Ok(()) } else { Err(reason) })
     }
 
     /// Checks a needle sample against the one before it. Returns what the monitor knows once it is accepted.

@@ -111,7 +111,7 @@ impl Stream {
 }
 
 /// Fault code that goes with a refusal.
-const fn fault_of(reason: Discard) -> Faults {
+pub(super) const fn fault_of(reason: Discard) -> Faults {
     match reason {
         Discard::Late => Faults::OUT_OF_ORDER,
         Discard::NotFinite => Faults::NOT_FINITE,

@@ -1,7 +1,7 @@
 //! Settings and table, built once into the numbers that a step uses.
 
 use super::{Settings, SettingsError, check, check_periods};
-use crate::contract::{Table, TableBounds};
+use crate::contract::{Faults, Table, TableBounds};
 use crate::detection::{
     DEPTH_MARGIN, FOLLOWING_FRACTION, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN, RESOLUTION_PER_FOLLOWING_ERROR,
     SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
@@ -58,6 +58,9 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) paddle_rate: f64,
     /// Until a command shows in a measured position, s.
     pub(crate) unseen_delay: f64,
+    /// Codes of monitors that are off.
+    #[cfg(feature = "switches")]
+    pub(crate) off: Faults,
 }
 
 impl<T: Scalar> Runtime<T> {
@@ -121,11 +124,21 @@ impl<T: Scalar> Runtime<T> {
             paddle_resolution: RESOLUTION_PER_FOLLOWING_ERROR * following_error,
             paddle_rate: table.paddle.max_rate.to_f64(),
             unseen_delay: seconds(settings.actuator_delay_ns.saturating_add(settings.loop_period_ns)),
+            #[cfg(feature = "switches")]
+            off: Faults::NONE,
         })
     }
 }
 
 impl<T: Scalar> Runtime<T> {
+    /// What remains of `faults` when some monitors are off: everything, outside of test benches.
+    #[inline(always)]
+    pub(crate) fn seen(&self, faults: Faults) -> Faults {
+        #[cfg(feature = "switches")]
+        let faults = Faults::from_bits(faults.bits() & !self.off.bits());
+        faults
+    }
+
     /// Extent of the table in depth, length.
     pub(crate) fn depth_range(&self) -> f64 {
         self.table_depth.1 - self.table_depth.0

@@ -116,6 +116,12 @@ pub enum SimError {
         /// Random schedules that failed.
         schedules: usize,
     },
+    /// The catalogue does not notice that monitors are off.
+    #[error("no row notices that {monitors} of the controller's monitors are off; see above")]
+    Unnoticed {
+        /// How many.
+        monitors: usize,
+    },
 }
 
 // What happens inside a run, from wherever it comes, is one kind of error.

@@ -84,7 +84,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
         Hardware::Qemu => on_emulated_board(&bytes, &settings, timeout)?,
     };
     let header = Header { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
-    let mut control_loop = ControlLoop::new(executor, args.capacity as usize);
+    let mut control_loop = ControlLoop::new(executor, args.capacity as usize).rearmed_by(signals::install_rearming());
     if let Some(path) = &args.record {
         control_loop = control_loop.recorded_by(Box::new(StreamRecorder::create(path, &header)?));
     }

@@ -5,9 +5,11 @@ use std::time::Instant;
 
 use clap::Args;
 use firmware::Mode;
+use firmware::contract::Table;
 use host_sim::SimError;
 use host_sim::bench::faults::catalogue::ROWS;
 use host_sim::bench::faults::evidence::Verdict;
+use host_sim::bench::faults::monitors::{MonitorOff, monitors_off};
 use host_sim::bench::faults::random::{Composed, composed};
 use host_sim::bench::faults::report::{FaultsResult, RowResult};
 use host_sim::bench::paper_table::paper_table;
@@ -33,6 +35,9 @@ pub(crate) struct FaultsArgs {
     /// Part of the repetitions of rows 33, 35 and 36 (200 kills, 100 kills, 100 cycles)
     #[arg(long, default_value_t = 1.0, value_name = "PART")]
     pub(crate) effort: f64,
+    /// Instead, switch off one monitor of the controller after the other, and show which rows of 1 to 32 notice
+    #[arg(long, conflicts_with_all = ["only", "seeds", "effort", "out"])]
+    pub(crate) monitors_off: bool,
     /// Write faults.csv and faults.json into this directory
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
@@ -64,6 +69,9 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     let [csv, own] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
     let table = paper_table()?;
+    if args.monitors_off {
+        return without_monitors(args, &table);
+    }
     let mut result = FaultsResult {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         seed: args.seed,
@@ -92,6 +100,20 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
         return Err(SimError::Faults { failed, rows: result.rows.len(), schedules });
     }
     Ok(())
+}
+
+/// The table monitor × row.
+fn without_monitors(args: &FaultsArgs, table: &Table<f64, 2>) -> Result<(), SimError> {
+    let monitors = monitors_off(table, args.seed)?;
+    for MonitorOff { monitor, rows } in &monitors {
+        let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
+        println!("{monitor:<20}  {}", if rows.is_empty() { "nobody notices".to_owned() } else { rows.join(" ") });
+    }
+    if let Some(path) = &args.json {
+        write_json(path, &monitors)?;
+    }
+    let unnoticed = monitors.iter().filter(|off| off.rows.is_empty()).count();
+    if unnoticed > 0 { Err(SimError::Unnoticed { monitors: unnoticed }) } else { Ok(()) }
 }
 
 fn write(args: &FaultsArgs, result: &FaultsResult) -> Result<(), SimError> {

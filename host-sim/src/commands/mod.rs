@@ -7,6 +7,7 @@ mod faults;
 mod outputs;
 mod plant;
 mod progress;
+mod rearm;
 mod replay;
 mod report;
 mod run;
@@ -29,6 +30,7 @@ use self::controller::{ControllerArgs, controller};
 use self::export::{ExportArgs, export};
 use self::faults::{FaultsArgs, faults};
 use self::plant::{PlantArgs, plant};
+use self::rearm::{RearmArgs, rearm};
 use self::replay::{ReplayArgs, replay};
 use self::report::{ReportArgs, report};
 use self::run::{RunArgs, run};
@@ -69,6 +71,9 @@ pub(crate) enum Command {
         after_help = "Example, in two terminals:\n  host-sim controller --table paper.table --mode free-run\n  host-sim plant --scene paper --mode free-run"
     )]
     Plant(Box<PlantArgs>),
+    /// Lets a running controller out of SAFE, once somebody has looked
+    #[command(after_help = "Example, beside a controller by hand that has gone to SAFE: host-sim rearm")]
+    Rearm(RearmArgs),
     /// Checks the fixed-rate loop against an empty one
     #[command(
         after_help = "Examples:\n  host-sim timing --rate 1000 --seconds 10 --out timing\n  host-sim timing --sweep --cpu 0"
@@ -137,6 +142,7 @@ pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
         Command::Run(args) => run(&args),
         Command::Controller(args) => controller(&args),
         Command::Plant(args) => plant(&args),
+        Command::Rearm(args) => rearm(&args),
         Command::Timing(args) => timing(&args),
         Command::TimingPeer(args) => timing_peer(&args),
         Command::Faults(args) => faults(&args),

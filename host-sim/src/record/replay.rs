@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use firmware::Mode;
 use firmware::contract::PaddleCommand;
 
 use super::error::RecordError;
@@ -45,8 +46,14 @@ pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, RecordErro
     let mut executor = table.on_this_machine(&header.settings)?;
     let mut differences = 0;
     let mut first = None;
+    let mut was_safe = false;
     for record in &recording.records {
         let inputs = &record.tick.inputs;
+        // Nothing but a re-arming leads out of SAFE, and it is not recorded by itself.
+        if was_safe && record.tick.command.state != Mode::Safe as u32 {
+            executor.rearm()?;
+        }
+        was_safe = record.tick.command.state == Mode::Safe as u32;
         let command = executor.step(inputs)?;
         if let Some(detail) = difference(&record.tick.command, &command) {
             differences += 1;

@@ -6,6 +6,7 @@ use clap::ValueEnum;
 use firmware::contract::{MAX_TABLE_BYTES, PaddleCommand, Table, TableError, decode, encode};
 use firmware::inputs::Ledger;
 use firmware::scalar::{Scalar, ScalarKind};
+use firmware::serial::Request;
 use firmware::{Controller, Inputs, Settings, State};
 
 use super::error::RuntimeError;
@@ -71,6 +72,12 @@ pub trait StepExecutor {
     /// [`RuntimeError::Board`]: the step was not computed, or its command was lost.
     fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, RuntimeError>;
 
+    /// Leaves SAFE before the next tick, see [`State::rearm`].
+    ///
+    /// # Errors
+    /// [`RuntimeError::Board`].
+    fn rearm(&mut self) -> Result<(), RuntimeError>;
+
     /// Accounts at the end.
     ///
     /// # Errors
@@ -90,6 +97,11 @@ impl<T: Scalar> StepExecutor for OnThisMachine<'_, T> {
         Ok(self.controller.step(&mut self.state, inputs))
     }
 
+    fn rearm(&mut self) -> Result<(), RuntimeError> {
+        self.state.rearm();
+        Ok(())
+    }
+
     fn ledger(&mut self) -> Result<Ledger, RuntimeError> {
         Ok(*self.state.ledger())
     }
@@ -107,6 +119,10 @@ impl StepExecutor for OnBoard {
         let silent = BoardError::Silent { to: "a step", silent_s: self.patience.as_secs_f64() };
         let answer = self.device.step(inputs, self.patience)?.ok_or(silent)?;
         Ok(answer.command)
+    }
+
+    fn rearm(&mut self) -> Result<(), RuntimeError> {
+        Ok(self.device.tell(Request::Rearm)?)
     }
 
     fn ledger(&mut self) -> Result<Ledger, RuntimeError> {

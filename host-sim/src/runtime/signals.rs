@@ -1,11 +1,12 @@
-//! Signals that ask for the end: remembered, and answered between two ticks, so that everything is tidied up.
+//! Signals that ask for the end, or for a re-arming: remembered, and answered between two ticks, so that everything is
+//! tidied up and no step is interrupted.
 
 use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 
 use super::clock;
 use super::error::RuntimeError;
@@ -26,6 +27,15 @@ pub fn install() {
         }
         received
     });
+}
+
+/// Takes SIGUSR1 as the word of somebody who has looked: the controller is to be re-armed. Only its user and root can
+/// send it. Returns where it is noted.
+pub fn install_rearming() -> Arc<AtomicBool> {
+    let asked = Arc::new(AtomicBool::new(false));
+    // Refused only for signals that cannot be caught, which this one is not.
+    let _ = signal_hook::flag::register(SIGUSR1, Arc::clone(&asked));
+    asked
 }
 
 /// Fails once a signal has asked for the end.

@@ -1,6 +1,6 @@
 //! The 45 rows: number, name, and how each is tried.
 
-use firmware::contract::Table;
+use firmware::contract::{Faults, Table};
 
 use super::evidence::Evidence;
 use super::processes::{self, Stage};
@@ -92,10 +92,26 @@ impl Row {
     pub fn run(&self, table: &Table<f64, 2>, seed: u64, effort: f64) -> Result<Evidence, SimError> {
         let mut evidence = Evidence::default();
         match self.method {
-            Method::Lockstep(run) => run(&Trial { table, seed }, &mut evidence)?,
+            Method::Lockstep(run) => run(&Trial { table, seed, without: Faults::NONE }, &mut evidence)?,
             Method::Processes(run) => run(&Stage::new(table, seed, effort)?, &mut evidence)?,
         }
         Ok(evidence)
+    }
+
+    /// Tries a row in lockstep with these monitors of the controller off; `None` for one with real processes.
+    ///
+    /// # Errors
+    /// [`SimError`] when it could not be set up.
+    pub fn run_without(
+        &self,
+        monitors: Faults,
+        table: &Table<f64, 2>,
+        seed: u64,
+    ) -> Result<Option<Evidence>, SimError> {
+        let Method::Lockstep(run) = self.method else { return Ok(None) };
+        let mut evidence = Evidence::default();
+        run(&Trial { table, seed, without: monitors }, &mut evidence)?;
+        Ok(Some(evidence))
     }
 }
 

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
 use firmware::io::{CommandSink, SampleSource, run_tick};
 use firmware::schedule::Schedule;
-use firmware::{Controller, Mode, Settings, SettingsError, State};
+use firmware::{Controller, Faults, Inputs, Mode, Settings, SettingsError, State};
 use nalgebra::Vector2;
 use rand_pcg::Pcg64;
 
@@ -50,6 +50,8 @@ pub struct Setup {
     pub paddle: [f64; 2],
     /// Seed of all noise.
     pub seed: u64,
+    /// Monitors of the controller that are off, to see that somebody notices.
+    pub without: Faults,
 }
 
 impl Setup {
@@ -68,6 +70,7 @@ impl Setup {
             shuttles: false,
             paddle: [0.0; 2],
             seed,
+            without: Faults::NONE,
         }
     }
 }
@@ -160,7 +163,7 @@ impl<'t> ClosedLoop<'t> {
     /// What the controller refuses.
     pub fn new(table: &'t Table<f64, 2>, setup: Setup) -> Result<Self, SettingsError> {
         let settings = &setup.settings;
-        let controller = Controller::new(table, settings)?;
+        let controller = Controller::new(table, settings)?.without(setup.without);
         Ok(Self {
             controller,
             state: State::new(),
@@ -193,6 +196,11 @@ impl<'t> ClosedLoop<'t> {
     /// Number of the next tick of the plant.
     pub fn now(&self) -> u64 {
         self.tick
+    }
+
+    /// What a wall clock beside the loop shows, ns since it was right.
+    pub fn wall_clock_ns(&self) -> i64 {
+        (self.tick * self.setup.settings.loop_period_ns).cast_signed() + self.wall_offset_ns
     }
 
     /// Depth of the needle, length.
@@ -244,6 +252,11 @@ impl<'t> ClosedLoop<'t> {
     /// Ticks of the plant until a command satisfies `condition`, that tick included; none within `limit`.
     pub fn until(&mut self, limit: u64, condition: impl Fn(&PaddleCommand) -> bool) -> Option<u64> {
         (1..=limit).find(|_| self.step().is_some_and(|exchange| condition(&exchange.command)))
+    }
+
+    /// What the controller would answer to `inputs` now. Nothing changes.
+    pub fn foresee(&self, inputs: &Inputs) -> PaddleCommand {
+        self.controller.step(&mut self.state.clone(), inputs)
     }
 
     /// Mode of the last command.

@@ -13,6 +13,7 @@ pub mod closed_loop;
 pub mod evidence;
 pub mod fault;
 pub mod invariants;
+pub mod monitors;
 mod processes;
 pub mod random;
 pub mod report;

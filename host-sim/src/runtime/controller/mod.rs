@@ -3,6 +3,8 @@
 pub mod process;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use firmware::contract::PaddleCommand;
@@ -54,6 +56,8 @@ pub struct ControlLoop<'c> {
     tripped: bool,
     /// Where every tick is recorded while it happens.
     recorder: Option<Box<dyn TickRecorder>>,
+    /// Where somebody who has looked asks for a re-arming.
+    rearming: Arc<AtomicBool>,
     /// Tick with a panic on purpose.
     panic_at: Option<u64>,
 }
@@ -79,6 +83,7 @@ impl<'c> ControlLoop<'c> {
             last: PaddleCommand::default(),
             tripped: false,
             recorder: None,
+            rearming: Arc::default(),
             panic_at: None,
         }
     }
@@ -87,6 +92,13 @@ impl<'c> ControlLoop<'c> {
     #[must_use]
     pub fn recorded_by(mut self, recorder: Box<dyn TickRecorder>) -> Self {
         self.recorder = Some(recorder);
+        self
+    }
+
+    /// Re-arms a controller in SAFE before the tick that finds this set; in any other mode nothing happens.
+    #[must_use]
+    pub fn rearmed_by(mut self, asked: Arc<AtomicBool>) -> Self {
+        self.rearming = asked;
         self
     }
 
@@ -227,6 +239,10 @@ impl<'c> ControlLoop<'c> {
             // A panic in the step must not end the commands: the paddle's owner hears SAFE from then on.
             let step = || {
                 assert!(self.panic_at.is_none_or(|at| tick < at), "panic on purpose in tick {tick}");
+                let asked = self.rearming.swap(false, Ordering::Relaxed);
+                if asked && self.last.state == Mode::Safe as u32 {
+                    self.executor.rearm()?;
+                }
                 let inputs =
                     Inputs { tick, time_ns, needle: ports.needle(), target: ports.target(), paddle: ports.paddle() };
                 self.executor.step(&inputs).map(|command| (inputs, command))

@@ -38,6 +38,7 @@ fn cut_off_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
 
 /// Row 33: the simulator is killed at 200 seeded phases, from its first millisecond on.
 pub(crate) fn plant_killed(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+    undisturbed(stage, evidence)?;
     let repetitions = stage.repetitions(200);
     let shared = Mutex::new(evidence);
     let next = AtomicU64::new(0);
@@ -75,7 +76,9 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Result<
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
     std::thread::sleep(ms(phase));
     plant.kill();
-    evidence.injected += 1;
+    let killed = plant.was_killed();
+    evidence.require(killed, || format!("{}: it had ended before: {}", what(), plant.message()));
+    evidence.injected += u64::from(killed);
     let code = controller.code();
     evidence.require(code == Some(1), || format!("{}: the controller ended with {code:?}", what()));
     // Without accounts the plant had not been there yet: nothing was to be made safe.
@@ -96,7 +99,7 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Result<
                     evidence.ticks_to_detect = evidence.ticks_to_detect.max(Some(ticks));
                     evidence.final_state = Some(Mode::Safe);
                 }
-                evidence.detected += 1;
+                evidence.detected += u64::from(code == Some(1) && state == Some(expected));
             }
             Err(error) => evidence.require(false, || format!("{}: its record: {error}", what())),
         }
@@ -158,6 +161,7 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
         }
         controller.kill();
         kills += 1;
+        evidence.require(controller.was_killed(), || format!("{}: it had ended before", what()));
         evidence.injected += 1;
         match cut_off_and_replayed(&record) {
             Ok(records) => takes_over_gently(&records, evidence, &what),
@@ -205,22 +209,49 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
 pub(crate) fn killed_at_start(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = Pcg64::new(u128::from(stage.seed), 35);
     let link = stage.link();
+    let space = crate::exchange::Space::new(&link)?;
+    // How long an undisturbed one takes to its first mark in shared memory, so that kills fall around it.
+    let mark_us = {
+        let empty = space.traces();
+        let started = std::time::Instant::now();
+        let (mut controller, ..) = stage.controller(&link, &[])?;
+        wait_until(ms(5000), || space.traces() != empty || controller.wait(ms(0)).is_some());
+        u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX).min(1_000_000)
+    };
+    let mut in_the_middle = 0;
     for trial in 0..stage.repetitions(100) {
         crate::runtime::signals::check()?;
+        let before = space.traces();
         let mut process =
             if trial % 2 == 0 { stage.controller(&link, &[])?.0 } else { stage.plant(&link, &["--duration", "60"])?.0 };
-        // The services are made within the first milliseconds.
-        std::thread::sleep(std::time::Duration::from_micros(below(&mut random, 30_000)));
+        std::thread::sleep(std::time::Duration::from_micros(below(&mut random, 3 * mark_us)));
         process.kill();
+        evidence.require(process.was_killed(), || format!("it had ended before: {}", process.message()));
         evidence.injected += 1;
+        in_the_middle += u64::from(space.traces() != before);
     }
+    // The witness: some had left marks when they died.
+    evidence.require(in_the_middle > 0, || "none was killed while it made its services".to_owned());
     let started = std::time::Instant::now();
+    let failed = evidence.failed;
     pair_works(stage, &link, evidence)?;
-    evidence.detected += evidence.injected;
+    evidence.detected += if evidence.failed == failed { evidence.injected } else { 0 };
     let took = started.elapsed().as_secs_f64();
-    evidence.notes.push(format!("the pair after them took {took:.2} s for an insertion of 0.5 s"));
+    evidence.notes.push(format!(
+        "{in_the_middle} of {} had left marks; the pair after them took {took:.2} s for an insertion of 0.5 s",
+        evidence.injected
+    ));
     let left = left_behind(&link)?;
     evidence.require(left.is_empty(), || format!("left behind {left:?}"));
+    Ok(())
+}
+
+/// The control: where nothing is killed, both end well.
+fn undisturbed(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+    let mut own = Evidence::default();
+    pair_works(stage, &stage.link(), &mut own)?;
+    own.require(own.final_state == Some(Mode::Run), || "without the fault it does not end in RUN".to_owned());
+    evidence.merge(Evidence { final_state: None, ..own });
     Ok(())
 }
 

@@ -16,7 +16,7 @@ use rustix::process::Signal;
 
 use super::stage::{Stage, TIMEOUT, left_behind, ms, read_json, unaccounted, wait_until};
 use crate::bench::error::SimError;
-use crate::bench::faults::evidence::Evidence;
+use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::{below, between};
 use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 use crate::record::recording::Recording;
@@ -203,27 +203,37 @@ fn garbage_on(
         let time_ns = tick * 1_000_000;
         let time = |random: &mut Pcg64| if below(random, 4) == 0 { below(random, u64::MAX) } else { time_ns };
         let sequence = |random: &mut Pcg64| if below(random, 4) == 0 { any_u32(random) } else { tick as u32 };
-        ports.needle.send(NeedleSample {
+        let needle = NeedleSample {
             sequence: sequence(random),
             reserved: any_u32(random),
             time_ns: time(random),
             depth: any_number(random),
             velocity: any_number(random),
-        })?;
-        ports.paddle.send(PaddleSample {
+        };
+        let paddle = PaddleSample {
             sequence: sequence(random),
             paddle_index: if below(random, 100) == 0 { any_u32(random) } else { 3 },
             time_ns: time(random),
             displacement: [any_number(random), any_number(random)],
-        })?;
-        ports.target.send(TargetSample {
+        };
+        let target = TargetSample {
             sequence: sequence(random),
             flags: any_u32(random) | TARGET_VISIBLE,
             time_ns: time(random),
             displacement: [any_number(random), any_number(random)],
-        })?;
+        };
+        // The witness: what is garbage, by numbers of this function only.
+        let is_garbage = |number: u32, stamp: u64, values: [f64; 2]| {
+            let plausible = values.iter().all(|value| *value == 0.0 || (value.is_normal() && value.abs() <= 0.1));
+            u64::from(number != tick as u32 || stamp != time_ns || !plausible)
+        };
+        evidence.injected += is_garbage(needle.sequence, needle.time_ns, [needle.depth, needle.velocity])
+            + is_garbage(paddle.sequence, paddle.time_ns, paddle.displacement)
+            + is_garbage(target.sequence, target.time_ns, target.displacement);
+        ports.needle.send(needle)?;
+        ports.paddle.send(paddle)?;
+        ports.target.send(target)?;
         ports.clock.send(ClockFrame::new(ClockKind::Step, tick, time_ns))?;
-        evidence.injected += 3;
         let mut answer = None;
         wait_until_spinning(|| {
             answer = ports.command.oldest().ok().flatten();
@@ -337,7 +347,14 @@ pub(crate) fn panic_in_step(stage: &Stage<'_>, evidence: &mut Evidence) -> Resul
         let seen = !after.is_empty() && watchdog;
         evidence.require(seen, || format!("panic in tick {tick}: {} commands after it, not all SAFE", after.len()));
         evidence.detected += u64::from(seen);
-        evidence.ticks_to_detect = Some(1);
+        // The witness is what the process said; the control, the ticks before it.
+        let message = controller.message();
+        evidence.require(message.contains("panic on purpose"), || format!("no panic: {message}"));
+        let early = records.iter().take(place.unwrap_or(0));
+        let alarms = early.filter(|record| carries(Faults::WATCHDOG)(&record.tick.command)).count();
+        evidence.require(alarms == 0, || format!("panic in tick {tick}: {alarms} commands of the watchdog before it"));
+        let answered = after.first().map(|record| record.tick.inputs.tick - tick + 1);
+        evidence.ticks_to_detect = evidence.ticks_to_detect.max(answered);
         nothing_left(&link, evidence)?;
     }
     evidence.final_state = Some(Mode::Safe);

@@ -50,6 +50,11 @@ pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<
             stage.table_file.display(),
         )
     };
+    // The control: with room, both go through.
+    let mut process = in_own_namespace(stage, &pair("64m", ""))?;
+    let ended = process.code().is_some();
+    let message = process.message();
+    evidence.require(ended && message.contains("codes 0 0."), || format!("64m: {message}"));
     for size in ["4k", "64k", "256k", "1m", "2m", "4000k"] {
         let mut process = in_own_namespace(stage, &pair(size, ""))?;
         evidence.injected += 1;
@@ -83,6 +88,8 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
         let removed = if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) };
         evidence.injected += u64::from(removed.is_ok());
     }
+    let kept = space.traces();
+    evidence.require(kept.is_empty() && evidence.injected > 0, || format!("still there: {kept:?}"));
     let records = || {
         let bytes = std::fs::read(&record).unwrap_or_default();
         crate::record::recording::Recording::whole_records(&bytes)
@@ -93,9 +100,9 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
     std::thread::sleep(ms(500));
     let now = records();
     let running = now.last().is_some_and(|record| record.tick.command.state == Mode::Run as u32);
-    evidence.require(now.len() > before + 200 && running, || {
-        format!("{} ticks in 500 ms after the deletion, in RUN: {running}", now.len() - before)
-    });
+    let went_on = now.len() > before + 200 && running;
+    evidence
+        .require(went_on, || format!("{} ticks in 500 ms after the deletion, in RUN: {running}", now.len() - before));
     plant.kill();
     std::thread::sleep(ms(700));
     // Its marks are gone, so that nobody can tell that the plant is dead; the age of its samples can.
@@ -109,7 +116,7 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
         evidence.require(safe, || format!("ended in {:?}", result.accounts.final_state));
         evidence.unaccounted += unaccounted(&result, None);
         evidence.final_state = safe.then_some(Mode::Safe);
-        evidence.detected += evidence.injected;
+        evidence.detected += if went_on && safe { evidence.injected } else { 0 };
     }
     let left = left_behind(&link)?;
     evidence.require(left.is_empty(), || format!("left behind {left:?}"));

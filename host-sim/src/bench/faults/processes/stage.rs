@@ -1,7 +1,7 @@
 //! Real processes under observation: started, signalled, waited for, and nothing of them left behind.
 
 use std::os::unix::fs::PermissionsExt;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -173,6 +173,11 @@ impl Process {
     /// Its exit code; none when a signal ended it, or nothing did.
     pub(super) fn code(&mut self) -> Option<i32> {
         self.wait(TIMEOUT).and_then(|status| status.code())
+    }
+
+    /// Whether it ended by SIGKILL: the kernel's word that a fault took place.
+    pub(super) fn was_killed(&mut self) -> bool {
+        self.child.try_wait().ok().flatten().is_some_and(|status| status.signal() == Some(Signal::KILL.as_raw()))
     }
 
     /// What it said on stderr, in one line.

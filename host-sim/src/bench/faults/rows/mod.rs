@@ -8,7 +8,7 @@ pub(crate) mod time;
 pub(crate) mod values;
 
 use firmware::contract::Table;
-use firmware::{Mode, State};
+use firmware::{Faults, Mode, State};
 use rand_pcg::Pcg64;
 
 use super::closed_loop::{ClosedLoop, Setup};
@@ -23,6 +23,8 @@ pub(crate) struct Trial<'t> {
     pub(crate) table: &'t Table<f64, 2>,
     /// Seed of noise and phases.
     pub(crate) seed: u64,
+    /// Monitors of the controller that are off.
+    pub(crate) without: Faults,
 }
 
 impl<'t> Trial<'t> {
@@ -32,7 +34,7 @@ impl<'t> Trial<'t> {
     }
 
     fn setup(&self) -> Setup {
-        Setup::new(self.table, self.seed)
+        Setup { without: self.without, ..Setup::new(self.table, self.seed) }
     }
 
     /// A bench in RUN, in the middle of an insertion, at a phase drawn from `random`.

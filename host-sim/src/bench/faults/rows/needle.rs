@@ -58,14 +58,21 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(),
         let period_s = bench.setup().settings.loop_period_ns as f64 * 1e-9;
         let slope = trial.table.knots.iter().map(|knot| knot.paddle_path_slope.norm()).fold(0.0, f64::max);
         bench.inject(Fault::NeedleSpeed(factor), 400);
-        evidence.injected += 1;
+        let (started_at, mut least, mut turned, mut heard) = (bench.depth(), bench.depth(), None, None);
         // A step: more than feed-forward at this speed and one correction of the feedback explain.
         let direction = trial.table.knots.iter().filter_map(|knot| knot.jacobian.try_inverse());
         let measure = direction.map(|inverse| (inverse * trial.table.orthogonal).norm()).fold(0.0, f64::max);
         let mut last = bench.last.map(|last| Vector2::from(last.command.displacement));
-        for _ in 0..600 {
-            let error = bench.max_error;
+        for tick in 1..=600u64 {
+            let (error, before) = (bench.max_error, bench.depth());
             let Some(exchange) = bench.step() else { continue };
+            if bench.depth() < before {
+                turned = turned.or(Some(tick));
+            }
+            if exchange.inputs.needle.is_some_and(|needle| needle.velocity < 0.0) {
+                heard = heard.or(Some(tick));
+            }
+            least = least.min(bench.depth());
             let now = Vector2::from(exchange.command.displacement);
             let speed = bench.setup().speed * factor.abs();
             let noise = 8.0 * bench.setup().noise;
@@ -74,7 +81,10 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(),
             evidence.require(step <= explained, || format!("{}: step of {step}, {explained} explained", what()));
             last = Some(now);
         }
-        evidence.detected += 1;
+        // The needle itself has turned, and the controller, which heard of it at once, has gone on.
+        evidence.detect(heard.zip(turned).map(|(heard, turned)| heard.saturating_sub(turned) + 1), 2, what);
+        let back = 0.2 * bench.setup().speed * factor.abs();
+        evidence.require(started_at - least > back, || format!("{}: back by {} only", what(), started_at - least));
         evidence.expect_mode(&bench, Mode::Run, what);
         evidence.close(&bench, what);
     }

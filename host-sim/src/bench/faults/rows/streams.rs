@@ -176,9 +176,16 @@ pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), S
         // The command has to go away from where it was.
         (Stream::Paddle, Faults::FROZEN, 1500),
     ] {
-        let mut bench = trial.running(&mut random)?;
+        let [mut healthy, mut bench] = trial.twins(&mut random)?;
+        let (depth, injected) = (bench.depth(), bench.injected);
         bench.inject(Fault::Frozen(stream), FOR_EVER);
-        evidence.detect(bench.until(3000, carries(code)), limit, || format!("{stream:?}"));
+        let found = bench.until(3000, carries(code));
+        evidence.detect(found, limit, || format!("{stream:?}"));
+        // The witnesses: samples were changed on their way, while the needle itself went on.
+        let moved = bench.depth() - depth;
+        evidence.require(bench.injected > injected && moved > 0.0, || format!("{stream:?}: nothing was frozen"));
+        let alarm = healthy.until(found.unwrap_or(limit), carries(code));
+        evidence.require(alarm.is_none(), || format!("{stream:?}: {code} without the fault after {alarm:?} ticks"));
         let stopped = bench.mode() == Mode::Safe || bench.until(500, is_in(Mode::Safe)).is_some();
         evidence.require(stopped, || format!("{stream:?}: no SAFE"));
         evidence.close(&bench, || format!("{stream:?}"));

@@ -1,7 +1,7 @@
 //! Rows 1 to 6: overruns, clocks, counters.
 
 use firmware::detection::{MAX_SUCCESSIVE_OVERRUNS, TICKS_TO_HOLD};
-use firmware::{Faults, Mode};
+use firmware::{Faults, Inputs, Mode};
 
 use super::{Trial, comes_back, integral_bits, stays_safe_until_rearmed};
 use crate::bench::error::SimError;
@@ -84,27 +84,52 @@ pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
     Ok(())
 }
 
-/// Row 4: jumps of the wall clock by an hour leave no trace in the record: the same bytes.
+/// Row 4: jumps of the wall clock by an hour leave no trace in the record: the same bytes. A steady clock that jumps as
+/// far does leave one.
 pub(crate) fn wall_clock(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     const HOUR_NS: i64 = 3_600_000_000_000;
     let mut random = trial.random(4);
-    let mut recordings = Vec::new();
-    for jumps in [&[] as &[i64], &[HOUR_NS], &[-HOUR_NS], &[HOUR_NS, -HOUR_NS]] {
-        let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
-        for by_ns in jumps {
-            let from = below(&mut random, 2000);
-            bench.inject_at(Event { fault: Fault::WallClock(*by_ns), from, until: from + 1 });
-            evidence.injected += 1;
-        }
-        let exchanges: Vec<ControllerTick> = (0..2000).filter_map(|_| bench.step()).collect();
-        evidence.expect_mode(&bench, Mode::Run, || "wall clock".to_owned());
-        evidence.close(&bench, || "wall clock".to_owned());
-        recordings.push(recording(trial, &bench, &exchanges));
+    let untouched = run_with(trial, &[], evidence)?;
+    for jumps in [&[HOUR_NS] as &[i64], &[-HOUR_NS], &[HOUR_NS, -HOUR_NS], &[2 * HOUR_NS]] {
+        let mut from = 0;
+        let events: Vec<Event> = jumps
+            .iter()
+            .map(|by_ns| {
+                from += 1 + below(&mut random, 900);
+                Event { fault: Fault::WallClock(*by_ns), from, until: from + 1 }
+            })
+            .collect();
+        let run = run_with(trial, &events, evidence)?;
+        // The witness: a clock that the controller does not know.
+        let jumped = run.wall_ns - untouched.wall_ns;
+        evidence.require(jumps.last() == Some(&jumped), || format!("the wall clock is off by {jumped} ns"));
+        evidence.injected += jumps.len() as u64;
+        evidence.require(run.record == untouched.record, || format!("{jumps:?}: the records differ"));
     }
-    let same = recordings.iter().all(|bytes| *bytes == recordings[0]);
-    evidence.require(same, || "the records differ".to_owned());
+    let back = Event { fault: Fault::ClockBack(HOUR_NS.cast_unsigned()), from: 1000, until: 1001 };
+    let mut not_required = Evidence::default();
+    let steady = run_with(trial, &[back], &mut not_required)?;
+    evidence.require(steady.record != untouched.record, || "a jump of the steady clock leaves no trace".to_owned());
     evidence.notes.push("no code reads the wall clock: forbidden by .clippy.toml".to_owned());
     Ok(())
+}
+
+/// What is left of 2000 ticks.
+struct Run {
+    record: Vec<u8>,
+    /// What a wall clock shows at the end, ns.
+    wall_ns: i64,
+}
+
+fn run_with(trial: &Trial<'_>, events: &[Event], evidence: &mut Evidence) -> Result<Run, SimError> {
+    let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
+    for event in events {
+        bench.inject_at(*event);
+    }
+    let exchanges: Vec<ControllerTick> = (0..2000).filter_map(|_| bench.step()).collect();
+    evidence.expect_mode(&bench, Mode::Run, || "wall clock".to_owned());
+    evidence.close(&bench, || "wall clock".to_owned());
+    Ok(Run { record: recording(trial, &bench, &exchanges), wall_ns: bench.wall_clock_ns() })
 }
 
 fn recording(trial: &Trial<'_>, bench: &ClosedLoop<'_>, exchanges: &[ControllerTick]) -> Vec<u8> {
@@ -119,7 +144,7 @@ fn recording(trial: &Trial<'_>, bench: &ClosedLoop<'_>, exchanges: &[ControllerT
     Recording { header, records }.encode()
 }
 
-/// Row 5: a tick from the past is rejected: SAFE at once, nothing of it is used.
+/// Row 5: a tick from the past, or from the far future, is rejected: SAFE at once, nothing of it is used.
 pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     const MS: u64 = 1_000_000;
     let mut random = trial.random(5);
@@ -135,6 +160,19 @@ pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
         evidence.require(untouched, || format!("{}: the rejected tick changed something", what()));
         stays_safe_until_rearmed(&mut bench, evidence, what);
         evidence.close(&bench, what);
+    }
+    let bench = trial.running(&mut random)?;
+    let Some(last) = bench.last else { return Ok(()) };
+    for ahead_ns in [0, 300 * MS, 3_600_000 * MS, 1 << 62] {
+        let inputs =
+            Inputs { tick: last.inputs.tick + 1, time_ns: last.inputs.time_ns + MS + ahead_ns, ..Inputs::default() };
+        let command = bench.foresee(&inputs);
+        let rejected = carries(Faults::CLOCK_JUMPED)(&command) && is_in(Mode::Safe)(&command);
+        if ahead_ns > 0 {
+            evidence.detect(rejected.then_some(1), 1, || format!("{ahead_ns} ns ahead"));
+        } else {
+            evidence.require(!rejected, || "a tick in time is taken for a jump".to_owned());
+        }
     }
     Ok(())
 }

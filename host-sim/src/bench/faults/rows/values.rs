@@ -4,10 +4,10 @@ use firmware::detection::NEEDLE_SPEED_MARGIN;
 use firmware::inputs::Discard;
 use firmware::{Faults, Mode};
 
-use super::{Trial, integral_bits, same_motion};
+use super::{Trial, comes_back, integral_bits, same_motion};
 use crate::bench::error::SimError;
-use crate::bench::faults::closed_loop::ClosedLoop;
-use crate::bench::faults::evidence::Evidence;
+use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
+use crate::bench::faults::evidence::{Evidence, carries, is_in};
 use crate::bench::faults::fault::{Fault, Stream, below, between};
 
 fn refusals(bench: &ClosedLoop<'_>, stream: Stream, reason: Discard) -> u64 {
@@ -88,8 +88,9 @@ pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
     Ok(())
 }
 
-/// Row 14: finite numbers that cannot be are refused.
+/// Row 14: finite numbers that cannot be are refused, and no start is made from a place where no paddle can rest.
 pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+    not_adopted(trial, evidence)?;
     let mut random = trial.random(14);
     let reasons = [Discard::OutOfRange, Discard::Innovation];
     for value in [1e3, -1e3, 1e300, f64::MAX, f64::MIN, 1.0, -1.0] {
@@ -115,6 +116,39 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
         evidence.expect_mode(&bench, Mode::Run, || format!("velocity {value}"));
         evidence.close(&bench, || format!("velocity {value}"));
     }
+    Ok(())
+}
+
+/// The start: HOLD until the paddle is known to rest where it may be commanded to.
+fn not_adopted(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+    let range = trial.table.paddle.max_displacement;
+    let at = |part: f64| Setup { paddle: [part * range, 0.0], ..trial.setup() };
+    let mut healthy = ClosedLoop::new(trial.table, at(0.5))?;
+    let first = healthy.step().map(|exchange| exchange.command);
+    let waits = first.is_some_and(|command| is_in(Mode::Hold)(&command) && !command.is_valid());
+    evidence.require(waits, || "does not start in HOLD".to_owned());
+    let alarm = healthy
+        .until(100, |command| carries(Faults::PADDLE_MOVING)(command) || carries(Faults::PADDLE_BEYOND_LIMIT)(command));
+    evidence.require(alarm.is_none(), || "a paddle at rest within its limit is not adopted".to_owned());
+
+    let mut outside = ClosedLoop::new(trial.table, at(1.05))?;
+    let found = outside.until(100, carries(Faults::PADDLE_BEYOND_LIMIT));
+    evidence.detect(found, 20, || "paddle beyond its limit".to_owned());
+    evidence.expect_mode(&outside, Mode::Hold, || "paddle beyond its limit".to_owned());
+
+    let mut pushed = ClosedLoop::new(trial.table, at(0.5))?;
+    let mut found = None;
+    for tick in 1..=40 {
+        if tick % 2 == 0 {
+            pushed.inject(Fault::Scaled(Stream::Paddle, 0.9), 1);
+        }
+        let command = pushed.step().map(|exchange| exchange.command);
+        if command.is_some_and(|command| carries(Faults::PADDLE_MOVING)(&command)) {
+            found = found.or(Some(tick));
+        }
+    }
+    evidence.detect(found, 5, || "paddle that somebody moves".to_owned());
+    comes_back(&mut pushed, 100, evidence, || "paddle that somebody has moved".to_owned());
     Ok(())
 }
 
@@ -187,7 +221,7 @@ fn jump_trial(
     let mut random = trial.random(17);
     let mut bench = trial.running_with(setup, &mut random)?;
     let refusals = |bench: &ClosedLoop<'_>| refusals(bench, Stream::Target, Discard::Innovation);
-    let (mut accepted, mut detected) = (0, 0);
+    let (mut accepted, mut detected, mut slowest) = (0, 0, None);
     bench.max_error = 0.0;
     let start = refusals(&bench);
     for jump in 0..400 {
@@ -196,16 +230,25 @@ fn jump_trial(
         let away = [angle.cos(), angle.sin()].map(|part| part * sigmas * setup.noise);
         bench.run(PER_TARGET * (10 + below(&mut random, 5)));
         let before = refusals(&bench);
-        bench.inject(Fault::WrongTarget(away), PER_TARGET).run(PER_TARGET);
-        let refused = refusals(&bench) > before;
+        let injected = bench.injected;
+        bench.inject(Fault::WrongTarget(away), PER_TARGET);
+        let mut refused = None;
+        for tick in 1..=PER_TARGET {
+            bench.step();
+            if refused.is_none() && refusals(&bench) > before {
+                refused = Some(tick);
+            }
+        }
+        evidence.require(bench.injected == injected + 1, || format!("{name}: jump {jump} hit no sample, or several"));
         if sigmas > 8.0 {
-            detected += u64::from(refused);
-            accepted += u64::from(!refused);
+            detected += u64::from(refused.is_some());
+            accepted += u64::from(refused.is_none());
+            slowest = slowest.max(refused);
         }
     }
     evidence.injected += 200;
     evidence.detected += detected;
-    evidence.ticks_to_detect = Some(PER_TARGET);
+    evidence.ticks_to_detect = evidence.ticks_to_detect.max(slowest);
     // What was accepted moves the target by the gain's part of it, once; noise adds its own.
     let bound = bench.loop_gain() * 50.0 * setup.noise + 4.0 * setup.noise;
     evidence.require(bench.max_error < bound, || format!("{name}: error {:e}, at most {bound:e}", bench.max_error));
