@@ -17,7 +17,7 @@ fn three_tolerances_have_three_answers_and_each_is_kept() {
     for tolerance in [0.05, 0.01, 0.002] {
         let reference = Reference::compute(&scene, 0.2 * tolerance).unwrap();
         let mut rejected = Vec::new();
-        let (candidate, outcome, verified) = discretization(&scene, tolerance, &reference, 1, &mut rejected).unwrap();
+        let (candidate, outcome, verified) = discretization(&scene, tolerance, &reference, &mut rejected).unwrap();
         let found = errors(&outcome.responses, &limits);
         println!("{tolerance}: {candidate:?}, {} nodes, {found:?}, verified {verified:.5}", outcome.nodes);
         assert!(found.controllability <= tolerance && found.displacement <= tolerance, "{tolerance}: {found:?}");

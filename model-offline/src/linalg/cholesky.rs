@@ -7,7 +7,8 @@ use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
 use faer::sparse::linalg::cholesky::{
-    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -52,6 +53,22 @@ impl SymbolicFactor {
     /// Entries of a factor.
     pub fn entries(&self) -> usize {
         self.symbolic.len_val()
+    }
+
+    /// Floating-point operations that a factorisation takes.
+    pub fn flops(&self) -> f64 {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(columns) => {
+                columns.col_ptr().windows(2).map(|column| f64::from(column[1] - column[0]).powi(2)).sum()
+            }
+            SymbolicCholeskyRaw::Supernodal(nodes) => (0..nodes.n_supernodes())
+                .map(|s| {
+                    let own = f64::from(nodes.supernode_end()[s] - nodes.supernode_begin()[s]);
+                    let below = nodes.supernode(s).pattern().len() as f64;
+                    own * (own * own / 3.0 + own * below + below * below)
+                })
+                .sum(),
+        }
     }
 }
 

@@ -6,7 +6,7 @@ use crate::mechanics::ConstrainedRows;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::mechanics::stabilisation;
 use crate::model::{ModelError, TissueModel};
-use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
+use crate::solver::equilibrium::{Equilibrium, Failure, FailureReason, NewtonSettings};
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
 /// The condensed body. Retained, in this order: needle depth, paddle x and y (where one is attached), target x and y.
@@ -42,7 +42,11 @@ impl Condensed {
             }
         }
         let target = stiffness.fixed_view::<2, 2>(controls, controls).into_owned();
-        let inverse = target.try_inverse().unwrap_or_else(Matrix2::zeros);
+        let inverse = target.try_inverse().ok_or_else(|| Failure {
+            reason: FailureReason::SingularTangent,
+            reached: 0.0,
+            detail: "nothing resists the target: move it inside the body, or hold more of it".into(),
+        })?;
         let mut response = [Vector2::zeros(); 3];
         for (c, r) in response.iter_mut().enumerate().take(controls) {
             *r = -inverse * Vector2::new(stiffness[(controls, c)], stiffness[(controls + 1, c)]);

@@ -2,8 +2,7 @@
 
 use crate::material::Material as _;
 use crate::mechanics::Tissue;
-use crate::model::{ModelError, TissueModel};
-use crate::solver::equilibrium::NewtonSettings;
+use crate::model::{Body, ModelError, TissueModel};
 use nalgebra::{Matrix2, Matrix4, Vector2, Vector4};
 
 /// What moves the body: needle depth, and paddle displacement x and y where one is attached.
@@ -17,22 +16,25 @@ pub(super) fn control_values(depth: f64, paddle: Vector2<f64>) -> [f64; 3] {
 }
 
 /// Coefficients of the response at rest to unit rates of every control: they meet the prescribed values exactly, so that
-/// whatever is added to them may vanish there.
+/// whatever is added to them may vanish there. `at_rest` is the body with the paddle at this place attached.
 ///
 /// # Errors
 /// [`ModelError::Unsupported`] where Nitsche's method holds the body (its prescribed values are met only weakly);
 /// [`ModelError::Solve`] when the body is not held.
-pub(super) fn lifting(model: &TissueModel, paddle: Option<usize>) -> Result<Vec<Vec<f64>>, ModelError> {
+pub(super) fn lifting(
+    model: &TissueModel,
+    paddle: Option<usize>,
+    mut at_rest: Body<'_>,
+) -> Result<Vec<Vec<f64>>, ModelError> {
     if model.constrained_rows(paddle).is_none() {
         return Err(imposed_weakly());
     }
-    let mut body = model.body(paddle, NewtonSettings::default())?;
     (0..controls(paddle))
         .map(|control| {
             let mut unit = [0.0; 3];
             unit[control] = 1.0;
             let rates = model.prescribed_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
-            Ok(body.equilibrium_mut().sensitivity(&rates)?)
+            Ok(at_rest.equilibrium_mut().sensitivity(&rates)?)
         })
         .collect()
 }

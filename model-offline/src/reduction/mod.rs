@@ -11,6 +11,8 @@ pub mod condensed;
 mod lifting;
 mod nnls;
 pub mod online;
+mod snapshots;
+mod space;
 pub mod train;
 
 pub use condensed::Condensed;

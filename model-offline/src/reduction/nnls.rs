@@ -6,91 +6,187 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 /// Columns that were tried and would have got a negative weight are skipped until another one has changed the set.
 const FEASIBLE: f64 = 1e-12;
 
-/// Weights `x ≥ 0` with `‖A x − b‖ ≤ tolerance ‖b‖`, or as close as non-negative weights come. Returns the positive ones
-/// as (column, weight), by column.
-pub(super) fn non_negative_fit(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Vec<(usize, f64)> {
-    let columns = a.ncols();
-    let mut active: Vec<usize> = Vec::new();
-    let mut weights: Vec<f64> = Vec::new();
-    let mut refused = vec![false; columns];
-    let mut residual = b.clone();
-    let scale: Vec<f64> = (0..columns).map(|c| a.column(c).norm()).collect();
-    let goal = tolerance * b.norm();
-    while residual.norm() > goal && active.len() < columns.min(a.nrows()) {
-        // The column best aligned with what is left.
-        let descent = |c: usize| if scale[c] > 0.0 { a.column(c).dot(&residual) / scale[c] } else { 0.0 };
-        let best = (0..columns)
-            .filter(|c| !refused[*c] && !active.contains(c))
-            .map(|c| (c, descent(c)))
-            .max_by(|x, y| x.1.total_cmp(&y.1));
-        let Some((entering, _)) = best.filter(|(_, d)| *d > FEASIBLE * b.norm()) else {
-            break;
-        };
-        active.push(entering);
-        weights.push(0.0);
-        let before = residual.norm();
-        settle(a, b, &mut active, &mut weights);
-        residual = b - active.iter().zip(&weights).fold(DVector::zeros(b.len()), |sum, (&c, w)| sum + a.column(c) * *w);
-        if active.contains(&entering) && residual.norm() < before {
-            refused.fill(false);
-        } else {
-            refused[entering] = true;
-        }
-    }
-    let mut fit: Vec<(usize, f64)> = active.into_iter().zip(weights).collect();
-    fit.sort_unstable_by_key(|entry| entry.0);
-    fit
+/// Weights `x ≥ 0` that bring `A x` near `b`, better and better.
+#[derive(Debug)]
+pub(super) struct NonNegativeFit<'a> {
+    a: &'a DMatrix<f64>,
+    b: &'a DVector<f64>,
+    active: Vec<usize>,
+    weights: Vec<f64>,
+    /// Products of the active columns with each other, and with `b`.
+    gram: DMatrix<f64>,
+    right: Vec<f64>,
+    residual: DVector<f64>,
+    scale: Vec<f64>,
+    /// Columns that are never taken, and those that cannot be taken now.
+    excluded: Vec<bool>,
+    refused: Vec<bool>,
 }
 
-/// Least squares on the active columns; those whose weight would turn negative leave, one after the other.
-fn settle(a: &DMatrix<f64>, b: &DVector<f64>, active: &mut Vec<usize>, weights: &mut Vec<f64>) {
-    while !active.is_empty() {
-        let n = active.len();
-        let mut normal =
-            DMatrix::from_fn(n, n, |i, j| if i >= j { a.column(active[i]).dot(&a.column(active[j])) } else { 0.0 });
-        normal.fill_upper_triangle_with_lower_triangle();
-        let largest = normal.diagonal().max();
-        for i in 0..n {
-            normal[(i, i)] += 1e-14 * largest;
-        }
-        let right = DVector::from_iterator(n, active.iter().map(|&c| a.column(c).dot(b)));
-        let Some(solution) = Cholesky::new(normal).map(|factor| factor.solve(&right)) else {
-            // The last column depends on the others.
-            active.pop();
-            weights.pop();
-            continue;
+impl<'a> NonNegativeFit<'a> {
+    /// No weight yet; the columns `excluded` never get one.
+    pub(super) fn new(a: &'a DMatrix<f64>, b: &'a DVector<f64>, excluded: impl Iterator<Item = usize>) -> Self {
+        let columns = a.ncols();
+        let mut fit = Self {
+            a,
+            b,
+            active: Vec::new(),
+            weights: Vec::new(),
+            gram: DMatrix::zeros(0, 0),
+            right: Vec::new(),
+            residual: b.clone(),
+            scale: (0..columns).map(|c| a.column(c).norm()).collect(),
+            excluded: vec![false; columns],
+            refused: vec![false; columns],
         };
-        if solution.iter().all(|x| *x > 0.0) {
-            weights.copy_from_slice(solution.as_slice());
-            return;
+        excluded.for_each(|c| fit.excluded[c] = true);
+        fit
+    }
+
+    /// Takes up weights found before, for a looser tolerance.
+    pub(super) fn start_from(&mut self, weights: &[(usize, f64)]) {
+        for &(column, _) in weights {
+            self.enter(column);
         }
-        // As far towards the solution as all stay non-negative.
-        let step = weights
+        self.settle();
+        self.update_residual();
+    }
+
+    /// The positive weights as (column, weight), by column.
+    pub(super) fn weights(&self) -> Vec<(usize, f64)> {
+        let mut fit: Vec<(usize, f64)> = self.active.iter().copied().zip(self.weights.iter().copied()).collect();
+        fit.sort_unstable_by_key(|entry| entry.0);
+        fit
+    }
+
+    /// Takes more columns until `‖A x − b‖ ≤ tolerance ‖b‖`, or as close as non-negative weights come.
+    pub(super) fn improve(&mut self, tolerance: f64) {
+        let goal = tolerance * self.b.norm();
+        let most = self.a.ncols().min(self.a.nrows());
+        while self.residual.norm() > goal && self.active.len() < most {
+            let Some(entering) = self.best_column() else {
+                break;
+            };
+            let before = self.residual.norm();
+            self.enter(entering);
+            self.settle();
+            self.update_residual();
+            if self.active.contains(&entering) && self.residual.norm() < before {
+                self.refused.fill(false);
+            } else {
+                self.refused[entering] = true;
+            }
+        }
+    }
+
+    fn update_residual(&mut self) {
+        self.residual.copy_from(self.b);
+        for (&c, w) in self.active.iter().zip(&self.weights) {
+            self.residual.axpy(-w, &self.a.column(c), 1.0);
+        }
+    }
+
+    /// The column best aligned with what is left.
+    fn best_column(&self) -> Option<usize> {
+        let descent = |c: usize| {
+            if self.scale[c] > 0.0 { self.a.column(c).dot(&self.residual) / self.scale[c] } else { 0.0 }
+        };
+        let best = (0..self.a.ncols())
+            .filter(|c| !self.excluded[*c] && !self.refused[*c] && !self.active.contains(c))
+            .map(|c| (c, descent(c)))
+            .max_by(|x, y| x.1.total_cmp(&y.1));
+        best.filter(|(_, d)| *d > FEASIBLE * self.b.norm()).map(|(c, _)| c)
+    }
+
+    fn enter(&mut self, column: usize) {
+        let n = self.active.len();
+        self.active.push(column);
+        self.weights.push(0.0);
+        self.right.push(self.a.column(column).dot(self.b));
+        self.gram.resize_mut(n + 1, n + 1, 0.0);
+        for i in 0..=n {
+            let product = self.a.column(self.active[i]).dot(&self.a.column(column));
+            (self.gram[(i, n)], self.gram[(n, i)]) = (product, product);
+        }
+    }
+
+    fn leave(&mut self, place: usize) {
+        self.active.remove(place);
+        self.weights.remove(place);
+        self.right.remove(place);
+        self.gram = std::mem::take(&mut self.gram).remove_row(place).remove_column(place);
+    }
+
+    /// Least squares on the active columns; those whose weight would turn negative leave.
+    fn settle(&mut self) {
+        while !self.active.is_empty() {
+            let n = self.active.len();
+            let mut normal = self.gram.clone();
+            let largest = normal.diagonal().max();
+            for i in 0..n {
+                normal[(i, i)] += 1e-14 * largest;
+            }
+            let right = DVector::from_column_slice(&self.right);
+            let Some(solution) = Cholesky::new(normal).map(|factor| factor.solve(&right)) else {
+                // The last column depends on the others.
+                self.leave(n - 1);
+                continue;
+            };
+            if solution.iter().all(|x| *x > 0.0) {
+                self.weights.copy_from_slice(solution.as_slice());
+                return;
+            }
+            self.step_towards(&solution);
+        }
+    }
+
+    /// As far towards the solution as all stay non-negative; those that reach zero leave.
+    fn step_towards(&mut self, solution: &DVector<f64>) {
+        let step = self
+            .weights
             .iter()
             .zip(solution.iter())
             .filter(|(_, s)| **s <= 0.0)
             .map(|(w, s)| if w - s > 0.0 { w / (w - s) } else { 0.0 })
             .fold(1.0, f64::min);
-        for (w, s) in weights.iter_mut().zip(solution.iter()) {
+        for (w, s) in self.weights.iter_mut().zip(solution.iter()) {
             *w += step * (s - *w);
         }
-        let keep: Vec<bool> = weights.iter().zip(solution.iter()).map(|(w, s)| *w > FEASIBLE || *s > 0.0).collect();
-        // Rounding may leave the blocking weight a hair above zero.
-        let blocked = if keep.iter().all(|k| *k) {
-            (0..n).filter(|&i| solution[i] <= 0.0).min_by(|&i, &j| weights[i].total_cmp(&weights[j]))
-        } else {
-            None
-        };
-        let mut index = 0;
-        active.retain(|_| (keep[index] && Some(index) != blocked, index += 1).0);
-        index = 0;
-        weights.retain(|_| (keep[index] && Some(index) != blocked, index += 1).0);
+        let n = self.active.len();
+        let mut leaving: Vec<usize> = (0..n).filter(|&i| self.weights[i] <= FEASIBLE && solution[i] <= 0.0).collect();
+        if leaving.is_empty() {
+            // Rounding may leave the blocking weight a hair above zero.
+            let blocking = (0..n).filter(|&i| solution[i] <= 0.0);
+            leaving.extend(blocking.min_by(|&i, &j| self.weights[i].total_cmp(&self.weights[j])));
+        }
+        for place in leaving.into_iter().rev() {
+            self.leave(place);
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn non_negative_fit(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Vec<(usize, f64)> {
+        let mut fit = NonNegativeFit::new(a, b, std::iter::empty());
+        // By way of a looser one, which must not matter.
+        fit.improve(0.5);
+        fit.improve(tolerance);
+        fit.weights()
+    }
+
+    #[test]
+    fn excluded_columns_get_no_weight() {
+        let a = DMatrix::from_fn(60, 30, |i, k| (k as f64 * (i as f64 + 0.5) * std::f64::consts::PI / 60.0).cos());
+        let b = a.column(2) * 3.0 + a.column(7) * 0.5;
+        let mut fit = NonNegativeFit::new(&a, &b, [7].into_iter());
+        fit.improve(1e-10);
+        assert!(fit.weights().iter().all(|(c, _)| *c != 7));
+        // What the excluded column is needed for stays: the others are orthogonal to it.
+        assert!((fit.residual.norm() - 0.5 * a.column(7).norm()).abs() < 1e-9);
+    }
 
     #[test]
     fn a_sum_of_few_columns_is_found_again() {

@@ -4,10 +4,12 @@
 //! plus modes that vanish there. The energy is summed over a few integration points with weights of their own,
 //! `E(q) = Σ_s ξ_s w_s W(I + Σ_c c H_sc + Σ_m q_m H_sm)`, and a step is Newton's method on it: r unknowns, no mesh.
 //!
-//! **Error.** The residual on guard modes, which the solution has not used, measures what is missing; solved with the
-//! tangent at rest it becomes a target displacement (a hierarchical estimate, Bank & Smith 1993). To it is added the
-//! largest part of the error that the estimate missed on the validation states, so that it was an upper bound on all of
-//! them.
+//! **Error.** A second sample of points, none of them in the first, adds up the residual at the solution once more: on
+//! guard modes, which the solution has not used, it measures what the modes miss (a hierarchical estimate, Bank & Smith
+//! 1993), on the used modes, where the first sample says zero, what the samples miss. Solved with the tangent at rest it
+//! becomes a target displacement. Its scale is calibrated on states of the full model: the largest ratio of error to
+//! estimate on n of them bounds that of one more, drawn like them, with probability n/(n + 1) (split conformal
+//! prediction, Vovk, Gammerman & Shafer 2005).
 
 use crate::material::Material as _;
 use crate::mechanics::Tissue;
@@ -18,6 +20,8 @@ use std::sync::Arc;
 const MAX_ITERATIONS: u32 = 20;
 /// Last step over the largest mode amplitude seen in training at convergence: the step after it would be its square.
 const STEP_TOLERANCE: f64 = 1e-7;
+/// Pieces of the way from rest where neither the last state nor rest is a start near enough.
+const PIECES: u32 = 8;
 /// A kept tangent is renewed when an iteration gains less than this.
 const CONTRACTION: f64 = 0.1;
 
@@ -81,17 +85,18 @@ pub struct ReducedModel {
     pub(super) modes: usize,
     pub(super) guards: usize,
     pub(super) tissue: Tissue,
-    pub(super) points: Vec<SampledPoint>,
-    /// Displacement gradients: point by point, component by component (row-major), column by column.
-    pub(super) gradients: Vec<f64>,
+    /// The points that the solution is computed with, and those that judge it.
+    pub(super) sample: Sample,
+    pub(super) control: Sample,
     /// Constant stabilisation between all columns.
     pub(super) stabilisation: DMatrix<f64>,
     /// Target displacement of every column.
     pub(super) target: Vec<Vector2<f64>>,
-    /// Target displacement per residual on the guard modes (2 × guards).
-    pub(super) guard_response: DMatrix<f64>,
-    /// What to add to the estimate, length.
-    pub(super) underestimate: f64,
+    /// Target displacement per residual on modes and guard modes (2 × both).
+    pub(super) residual_response: DMatrix<f64>,
+    /// What the raw estimate is multiplied with, and what is added to it before, length.
+    pub(super) scale: f64,
+    pub(super) floor: f64,
     /// Largest error estimate that is accepted, length.
     pub(super) tolerance: f64,
     /// Largest norm of q in training.
@@ -99,6 +104,14 @@ pub struct ReducedModel {
     pub(super) domain: Domain,
     /// Nodal coefficients of controls and modes.
     pub(super) columns: Vec<Vec<f64>>,
+}
+
+/// Weighted integration points that stand for all.
+#[derive(Debug, Clone)]
+pub(super) struct Sample {
+    pub points: Vec<SampledPoint>,
+    /// Displacement gradients: point by point, component by component (row-major), column by column.
+    pub gradients: Vec<f64>,
 }
 
 /// An integration point that was kept.
@@ -117,7 +130,7 @@ impl ReducedModel {
 
     /// Integration points that are left.
     pub fn points(&self) -> usize {
-        self.points.len()
+        self.sample.points.len()
     }
 
     /// Where it was trained.
@@ -137,7 +150,7 @@ impl ReducedModel {
             amplitudes: vec![0.0; self.controls + self.modes],
             residual: vec![0.0; self.modes + self.guards],
             factor: None,
-            estimate: self.underestimate,
+            estimate: self.scale * self.floor,
         }
     }
 
@@ -147,7 +160,13 @@ impl ReducedModel {
 
     /// Adds up the residual on modes and guard modes at these amplitudes, and the tangent on the modes where asked for.
     /// False when the configuration is not admissible.
-    fn evaluate(&self, amplitudes: &[f64], residual: &mut [f64], mut tangent: Option<&mut DMatrix<f64>>) -> bool {
+    fn evaluate(
+        &self,
+        sample: &Sample,
+        amplitudes: &[f64],
+        residual: &mut [f64],
+        mut tangent: Option<&mut DMatrix<f64>>,
+    ) -> bool {
         let (width, used) = (self.width(), self.controls + self.modes);
         for (row, r) in residual.iter_mut().enumerate() {
             let along = self.stabilisation.row(self.controls + row);
@@ -157,7 +176,7 @@ impl ReducedModel {
             k.copy_from(&self.stabilisation.view((self.controls, self.controls), (self.modes, self.modes)));
         }
         let mut response = vec![0.0; 4 * self.modes];
-        for (point, gradients) in self.points.iter().zip(self.gradients.chunks_exact(4 * width)) {
+        for (point, gradients) in sample.points.iter().zip(sample.gradients.chunks_exact(4 * width)) {
             let component = |k: usize| &gradients[k * width..(k + 1) * width];
             let along = |k: usize| component(k)[..used].iter().zip(amplitudes).map(|(g, a)| g * a).sum::<f64>();
             let h = Matrix2::new(along(0), along(1), along(2), along(3));
@@ -227,10 +246,9 @@ impl ReducedBody {
             return Err(Invalid::OutsideDomain { depth, x: paddle.x, y: paddle.y, max_depth, max_paddle });
         }
         let before = self.amplitudes.clone();
-        self.amplitudes[..model.controls]
-            .copy_from_slice(&super::lifting::control_values(depth, paddle)[..model.controls]);
-        let outcome = if self.converge() || self.converge_from_rest() {
-            self.check()
+        self.set_controls(depth, paddle);
+        let outcome = if self.converge() || self.converge_from_rest(depth, paddle) {
+            self.check(depth)
         } else {
             Err(Invalid::NoEquilibrium { depth })
         };
@@ -241,6 +259,11 @@ impl ReducedBody {
         outcome
     }
 
+    fn set_controls(&mut self, depth: f64, paddle: Vector2<f64>) {
+        let controls = self.model.controls;
+        self.amplitudes[..controls].copy_from_slice(&super::lifting::control_values(depth, paddle)[..controls]);
+    }
+
     /// Newton's method on the modes, with the last tangent as long as it serves.
     fn converge(&mut self) -> bool {
         let model = Arc::clone(&self.model);
@@ -249,11 +272,11 @@ impl ReducedBody {
             let renewed = self.factor.is_none();
             if renewed {
                 let mut tangent = DMatrix::zeros(model.modes, model.modes);
-                if !model.evaluate(&self.amplitudes, &mut self.residual, Some(&mut tangent)) {
+                if !model.evaluate(&model.sample, &self.amplitudes, &mut self.residual, Some(&mut tangent)) {
                     return false;
                 }
                 self.factor = Cholesky::new(tangent);
-            } else if !model.evaluate(&self.amplitudes, &mut self.residual, None) {
+            } else if !model.evaluate(&model.sample, &self.amplitudes, &mut self.residual, None) {
                 return false;
             }
             let Some(factor) = &self.factor else {
@@ -276,24 +299,42 @@ impl ReducedBody {
         false
     }
 
-    /// After a long way the last amplitudes are a bad start, and the response at rest is a better one.
-    fn converge_from_rest(&mut self) -> bool {
-        self.amplitudes[self.model.controls..].fill(0.0);
-        self.factor = None;
-        self.converge()
+    /// After a long way the last amplitudes are a bad start, and the response at rest is a better one; or, where that is
+    /// too far as well, the way from rest in pieces.
+    fn converge_from_rest(&mut self, depth: f64, paddle: Vector2<f64>) -> bool {
+        let restart = |body: &mut Self| {
+            body.amplitudes[body.model.controls..].fill(0.0);
+            body.factor = None;
+        };
+        restart(self);
+        if self.converge() {
+            return true;
+        }
+        restart(self);
+        (1..=PIECES).all(|piece| {
+            let share = f64::from(piece) / f64::from(PIECES);
+            self.set_controls(share * depth, paddle * share);
+            self.converge()
+        })
     }
 
-    fn check(&mut self) -> Result<(), Invalid> {
-        let model = &self.model;
-        let mut correction = Vector2::zeros();
-        for (column, residual) in model.guard_response.column_iter().zip(&self.residual[model.modes..]) {
-            correction += Vector2::new(column[0], column[1]) * *residual;
-        }
-        self.estimate = correction.norm() + model.underestimate;
+    fn check(&mut self, depth: f64) -> Result<(), Invalid> {
+        let model = Arc::clone(&self.model);
+        let raw = self.raw_estimate().ok_or(Invalid::NoEquilibrium { depth })?;
+        self.estimate = model.scale * (raw + model.floor);
         if self.estimate > model.tolerance {
             return Err(Invalid::TooInaccurate { estimate: self.estimate, tolerance: model.tolerance });
         }
         Ok(())
+    }
+
+    /// Target displacement of what the second sample has left over, length; none where it is not admissible.
+    fn raw_estimate(&mut self) -> Option<f64> {
+        let model = Arc::clone(&self.model);
+        if !model.evaluate(&model.control, &self.amplitudes, &mut self.residual, None) {
+            return None;
+        }
+        Some((&model.residual_response * DVector::from_column_slice(&self.residual)).norm())
     }
 
     /// Target displacement.

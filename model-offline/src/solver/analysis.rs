@@ -36,6 +36,11 @@ impl Analysis {
         &self.pattern
     }
 
+    /// Elimination order and size of the factor.
+    pub fn symbolic(&self) -> &SymbolicFactor {
+        &self.symbolic
+    }
+
     /// Where the rule's blocks go.
     pub fn blocks(&self) -> &BlockPositions {
         &self.blocks

@@ -1,25 +1,31 @@
 //! The smallest model that a scene needs: chosen from the cheapest up, each rejection with its number.
 //!
-//! 1. **Discretization**: every family of candidates from coarse to fine until one keeps the tolerance (worst error of
-//!    controllability and small-depth displacement against an extrapolated reference, plus what the reference leaves
-//!    open); the fastest of those wins, if the next finer model confirms it.
-//! 2. **Law and plant**: the linear law, condensed, if its displacement over the whole insertion keeps the tolerance;
-//!    else a reduced model, if one can be trained to it; else the full one.
-//! 3. **Table**: the fewest knots that interpolate the densest table within the tolerance, and single precision if its
+//! 1. **Discretization**: every family of candidates from coarse to fine until one keeps its share of the tolerance (worst
+//!    error of controllability and small-depth displacement against an extrapolated reference, plus what the reference
+//!    leaves open) and the next finer model confirms it; of those the cheapest, by operations counted.
+//! 2. **Law and plant**: the linear law, condensed, if its displacement over the whole insertion keeps its share; else a
+//!    reduced model, if one can be trained to it; else the full one.
+//! 3. **Table**: the fewest knots that interpolate the densest table within its share, and single precision if its
 //!    rounding does.
+//! 4. **End to end**: the plant against the full model two levels finer, along the insertion.
+//!
+//! No decision looks at a clock, so that the answer is the same on every run.
 
-use super::candidates::{Measured, families, measure};
+use super::candidates::{Measured, families, measure, solved};
+use super::cost::cost;
 use super::extent::Extent;
 use super::insertion::{TICK_SETTINGS, linear_profile, profile, profile_distance, time_ticks, with_mesh_limit};
 use super::measurement::Linearity;
+use super::search::{Trials, Verdict, cheapest};
 use crate::discretization::{Basis, Discretization, Integration, Resolution};
 use crate::model::{ModelError, TissueModel, graded_model};
-use crate::placement::adaptive::Reference;
+use crate::placement::adaptive::{Reference, distance};
+use crate::placement::rest::rest_responses;
 use crate::placement::study::best_dynamic;
 use crate::reduction::{Condensed, Invalid, TrainingOptions, train};
 use crate::scene::Scene;
 use crate::scene::schema::{FitSection, PlantModel, TableScalar};
-use crate::solver::equilibrium::Failure;
+use crate::solver::equilibrium::{Failure, NewtonSettings};
 use crate::table::{TableBuildError, TableOptions, build as build_table};
 use firmware::contract::Table;
 use nalgebra::Vector2;
@@ -27,12 +33,16 @@ use serde::Serialize;
 use std::convert::Infallible;
 use std::time::Instant;
 
-/// Part of the tolerance that the reference may leave open.
+/// Shares of the tolerance; they add up to the whole.
+const DISCRETIZATION_SHARE: f64 = 0.5;
+const PLANT_SHARE: f64 = 0.3;
+const TABLE_SHARE: f64 = 0.2;
+/// Part of the discretization's share that the reference may leave open.
 const REFERENCE_SHARE: f64 = 0.2;
-/// Runs per candidate; the best counts.
+/// Runs of the chosen model, to report its time; the best counts.
 const REPEATS: u32 = 5;
-/// A family that is this many times slower than the best so far is not refined further: it cannot win.
-const HOPELESS: f64 = 1.5;
+/// Depths at which the plant is held against a finer model.
+const STATIONS: u32 = 10;
 /// Knots of the table that the others are held against, and the numbers tried.
 const DENSE_KNOTS: usize = 65;
 const KNOTS: [usize; 6] = [2, 3, 5, 9, 17, 33];
@@ -95,6 +105,18 @@ pub struct Rejected {
     pub reason: String,
 }
 
+/// The chosen plant's target displacement along the insertion, the best paddle held still, against the full nonlinear model
+/// two levels finer.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EndToEnd {
+    /// Worst error over the largest displacement; none where the finer model cannot be had or goes nowhere.
+    pub error: Option<f64>,
+    /// Depth up to which both went, length units.
+    pub depth: f64,
+    /// Nodes of the finer model.
+    pub nodes: usize,
+}
+
 /// The answer.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Fit {
@@ -112,6 +134,8 @@ pub struct Fit {
     pub error_estimate: f64,
     /// Distance from the next finer model.
     pub verified_error: f64,
+    /// The plant against a finer model.
+    pub end_to_end: EndToEnd,
     /// Time of the chosen model for all Jacobians, one thread, s.
     pub wall_s: f64,
     /// Time of one step of the chosen plant, µs.
@@ -127,12 +151,16 @@ pub struct Fit {
 pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelError> {
     let start = Instant::now();
     let mut rejected = Vec::new();
-    let reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
-    let (candidate, outcome, verified_error) = discretization(scene, tolerance, &reference, REPEATS, &mut rejected)?;
+    let share = DISCRETIZATION_SHARE * tolerance;
+    let reference = Reference::compute(scene, REFERENCE_SHARE * share)?;
+    let (candidate, outcome, verified_error) = discretization(scene, share, &reference, &mut rejected)?;
+    let outcome = Measured { wall_s: measure(candidate, scene, &reference, REPEATS)?.wall_s, ..outcome };
     let error_estimate = worst(&outcome, &reference);
     let model = build(scene, &candidate)?;
-    let PlantChoice { law, plant, depth: plant_depth, step_us } = plant(&model, tolerance, threads, &mut rejected)?;
-    let (table_knots, table_scalar) = table(&model, tolerance, &mut rejected)?;
+    let found = plant(&model, PLANT_SHARE * tolerance, threads, &mut rejected)?;
+    let end_to_end = end_to_end(scene, &candidate, &found)?;
+    let PlantChoice { law, plant, depth: plant_depth, step_us, .. } = found;
+    let (table_knots, table_scalar) = table(&model, TABLE_SHARE * tolerance, &mut rejected)?;
     let chosen = Chosen {
         integration: candidate.method.integration,
         basis: candidate.method.displacement_basis(),
@@ -155,6 +183,7 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, ModelEr
         rejected,
         error_estimate,
         verified_error,
+        end_to_end,
         wall_s: outcome.wall_s,
         step_us,
         fit_wall_s: start.elapsed().as_secs_f64(),
@@ -165,8 +194,8 @@ fn worst(outcome: &Measured, reference: &Reference) -> f64 {
     outcome.errors.0.max(outcome.errors.1) + reference.open
 }
 
-/// The fastest candidate within the tolerance that the next finer one confirms, with what it measured (best of `repeats`
-/// runs) and how far the finer one is away; fills `rejected`.
+/// The cheapest candidate within the tolerance that the next finer one confirms, with what was found out about it and how
+/// far the finer one is away; fills `rejected`.
 ///
 /// # Errors
 /// [`ModelError::ToleranceNotReached`] when no candidate keeps it.
@@ -174,81 +203,63 @@ pub fn discretization(
     scene: &Scene,
     tolerance: f64,
     reference: &Reference,
-    repeats: u32,
     rejected: &mut Vec<Rejected>,
 ) -> Result<(Discretization, Measured, f64), ModelError> {
-    let mut measured: Vec<(Discretization, Measured)> = Vec::new();
-    let mut unusable = Vec::new();
-    let mut best_wall = f64::INFINITY;
-    let mut best_error = f64::INFINITY;
     // Elements first: they are cheapest, so that dearer families are given up early.
     let mut families = families(scene, Extent::Full);
     families.sort_by_key(|family| !family.first().is_some_and(|d| d.method.integration.is_element()));
-    for family in families {
-        for candidate in family {
-            let outcome = match measure(candidate, scene, reference, repeats) {
-                Ok(outcome) => outcome,
-                Err(error) => {
-                    let reason = format!("does not work: {error}");
-                    unusable.push(rejection(Decision::Discretization, candidate.to_string(), f64::NAN, reason));
-                    break;
-                }
-            };
-            let (wall_s, error) = (outcome.wall_s, worst(&outcome, reference));
+    let mut trials = Candidates { scene, reference, built: None };
+    let (best, verdicts) = cheapest(&families, tolerance, &mut trials);
+    let chosen_cost = best.as_ref().map_or(f64::NAN, |b| b.cost);
+    let mut best_error = f64::INFINITY;
+    for (candidate, verdict) in verdicts {
+        let (number, reason) = match verdict {
+            Verdict::TooWrong(error) => (error, "estimated error".to_owned()),
+            Verdict::Unconfirmed(apart) => (apart, "distance from the next finer model".to_owned()),
+            Verdict::Dearer(cost) => (cost / chosen_cost, "times the cost of the chosen one".to_owned()),
+            Verdict::Unusable(ref why) => (f64::NAN, format!("does not work: {why}")),
+        };
+        if let Verdict::TooWrong(error) | Verdict::Unconfirmed(error) = verdict {
             best_error = best_error.min(error);
-            if error <= tolerance {
-                best_wall = best_wall.min(wall_s);
-            }
-            measured.push((candidate, outcome));
-            if error <= tolerance || wall_s > HOPELESS * best_wall {
-                break;
-            }
         }
+        rejected.push(rejection(Decision::Discretization, candidate.to_string(), number, reason));
     }
-    measured.sort_by(|a, b| a.1.wall_s.total_cmp(&b.1.wall_s));
-    let mut chosen: Option<(Discretization, Measured, f64)> = None;
-    for (candidate, outcome) in measured {
-        let error = worst(&outcome, reference);
-        let name = candidate.to_string();
-        match &chosen {
-            Some(best) if error <= tolerance => {
-                let times = outcome.wall_s / best.1.wall_s;
-                rejected.push(rejection(
-                    Decision::Discretization,
-                    name,
-                    times,
-                    "times the time of the chosen one".into(),
-                ));
-            }
-            // Dearer and worse: nothing to say about it.
-            Some(_) => {}
-            None if error > tolerance => {
-                rejected.push(rejection(Decision::Discretization, name, error, "estimated error".into()));
-            }
-            None => {
-                let finer = Discretization { resolution: candidate.resolution.finer(), ..candidate };
-                let finer = build(scene, &finer).and_then(|m| crate::placement::rest::rest_responses(&m));
-                let apart = finer.map(|finer| crate::placement::adaptive::distance(&outcome.responses, &finer));
-                match apart {
-                    Ok((measure, displacement)) if measure.max(displacement) <= tolerance => {
-                        chosen = Some((candidate, outcome, measure.max(displacement)));
-                    }
-                    Ok((measure, displacement)) => rejected.push(rejection(
-                        Decision::Discretization,
-                        name,
-                        measure.max(displacement),
-                        "distance from the next finer model".into(),
-                    )),
-                    Err(error) => {
-                        let reason = format!("the next finer model does not work: {error}");
-                        rejected.push(rejection(Decision::Discretization, name, f64::NAN, reason));
-                    }
-                }
-            }
-        }
+    let best = best.ok_or(ModelError::ToleranceNotReached { tolerance, reached: best_error })?;
+    Ok((best.candidate, best.outcome, best.apart))
+}
+
+/// The candidates of a scene, asked one after the other.
+struct Candidates<'a> {
+    scene: &'a Scene,
+    reference: &'a Reference,
+    /// The model whose cost was asked for last.
+    built: Option<TissueModel>,
+}
+
+impl Trials<Discretization> for Candidates<'_> {
+    type Outcome = Measured;
+
+    fn cost(&mut self, candidate: &Discretization) -> Result<f64, String> {
+        let model = build(self.scene, candidate).map_err(|error| error.to_string())?;
+        Ok(cost(self.built.insert(model)))
     }
-    rejected.extend(unusable);
-    chosen.ok_or(ModelError::ToleranceNotReached { tolerance, reached: best_error })
+
+    fn solve(&mut self, candidate: &Discretization) -> Result<(f64, Measured), String> {
+        let outcome = match &self.built {
+            Some(model) => solved(model, self.reference),
+            None => measure(*candidate, self.scene, self.reference, 1),
+        };
+        let outcome = outcome.map_err(|error| error.to_string())?;
+        Ok((worst(&outcome, self.reference), outcome))
+    }
+
+    fn confirm(&mut self, candidate: &Discretization, outcome: &Measured) -> Result<f64, String> {
+        let finer = Discretization { resolution: candidate.resolution.finer(), ..*candidate };
+        let finer = build(self.scene, &finer).and_then(|model| rest_responses(&model));
+        let finer = finer.map_err(|error| format!("the next finer model: {error}"))?;
+        let (measure, displacement) = distance(&outcome.responses, &finer);
+        Ok(measure.max(displacement))
+    }
 }
 
 fn build(scene: &Scene, discretization: &Discretization) -> Result<TissueModel, ModelError> {
@@ -270,6 +281,35 @@ struct PlantChoice {
     depth: f64,
     /// Time of a step, µs.
     step_us: f64,
+    /// Paddle that the insertion is followed with, by its place.
+    paddle: Option<usize>,
+    /// Depths and target displacements along the insertion, that paddle held still.
+    path: Vec<(f64, Vector2<f64>)>,
+}
+
+/// Stations along an insertion to `depth`, as far as there is an answer.
+fn path<E>(depth: f64, mut at: impl FnMut(f64) -> Result<Vector2<f64>, E>) -> Vec<(f64, Vector2<f64>)> {
+    let stations = (1..=STATIONS).map(|k| depth * f64::from(k) / f64::from(STATIONS));
+    stations.map_while(|depth| Some((depth, at(depth).ok()?))).collect()
+}
+
+/// The plant's path against that of the full model two levels finer.
+fn end_to_end(scene: &Scene, chosen: &Discretization, plant: &PlantChoice) -> Result<EndToEnd, ModelError> {
+    let none = EndToEnd { error: None, depth: 0.0, nodes: 0 };
+    let finer = Discretization { resolution: chosen.resolution.finer().finer(), ..*chosen };
+    let Ok(model) = build(scene, &finer) else {
+        return Ok(none);
+    };
+    let mut body = model.body(plant.paddle, NewtonSettings::default())?;
+    let depth = plant.path.last().map_or(0.0, |station| station.0);
+    let truth = path(depth, |depth| body.drive(depth, Vector2::zeros()).map(|()| body.target_displacement()));
+    let largest = truth.iter().map(|station| station.1.norm()).fold(0.0, f64::max);
+    let apart = plant.path.iter().zip(&truth).map(|(a, b)| (a.1 - b.1).norm()).fold(0.0, f64::max);
+    let nodes = model.nodes();
+    Ok(match truth.last() {
+        Some(last) if largest > 0.0 => EndToEnd { error: Some(apart / largest), depth: last.0, nodes },
+        _ => EndToEnd { nodes, ..none },
+    })
 }
 
 /// The cheapest plant that keeps the tolerance on the model's scene; fills `rejected`.
@@ -288,7 +328,11 @@ fn plant(
         let step_us = step_us(scene, depth, |depth| -> Result<_, Infallible> {
             Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
         });
-        return Ok(PlantChoice { law: Linearity::Linear, plant: PlantModel::Condensed, depth, step_us });
+        let path = path(depth, |depth| -> Result<_, Infallible> {
+            Ok(condensed.target_displacement(depth, Vector2::zeros()))
+        });
+        let (law, plant) = (Linearity::Linear, PlantModel::Condensed);
+        return Ok(PlantChoice { law, plant, depth, step_us, paddle, path });
     }
     let reason = "error of the target displacement along the insertion by the linear law".to_owned();
     rejected.push(rejection(Decision::Law, "linear law, condensed plant".into(), law_error, reason));
@@ -297,11 +341,14 @@ fn plant(
         Ok((reduced, report)) => {
             let mut body = reduced.body();
             let depth = report.domain.depth;
+            let path = path(depth, |depth| body.drive(depth, Vector2::zeros()).map(|()| body.target_displacement()));
+            let mut body = reduced.body();
             let step_us = step_us(scene, depth, |depth| -> Result<_, Invalid> {
                 body.drive(depth, Vector2::zeros())?;
                 Ok(body.target_displacement())
             });
-            Ok(PlantChoice { law: Linearity::Nonlinear, plant: PlantModel::Reduced, depth, step_us })
+            let (law, plant) = (Linearity::Nonlinear, PlantModel::Reduced);
+            Ok(PlantChoice { law, plant, depth, step_us, paddle, path })
         }
         Err(error) => {
             rejected.push(rejection(Decision::Plant, "reduced plant".into(), f64::NAN, error.to_string()));
@@ -309,12 +356,15 @@ fn plant(
             // As far as the tissue goes.
             let _ = body.drive(scene.needle.depth, Vector2::zeros());
             let depth = body.depth();
+            let mut body = model.body(paddle, NewtonSettings::default())?;
+            let path = path(depth, |depth| body.drive(depth, Vector2::zeros()).map(|()| body.target_displacement()));
             let mut body = model.body(paddle, TICK_SETTINGS)?;
             let step_us = step_us(scene, depth, |depth| -> Result<_, Failure> {
                 body.drive(depth, Vector2::zeros())?;
                 Ok(body.target_displacement())
             });
-            Ok(PlantChoice { law: Linearity::Nonlinear, plant: PlantModel::Full, depth, step_us })
+            let (law, plant) = (Linearity::Nonlinear, PlantModel::Full);
+            Ok(PlantChoice { law, plant, depth, step_us, paddle, path })
         }
     }
 }
@@ -450,7 +500,7 @@ impl Fit {
         let mut out = format!(
             "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {} plant to depth {:.4}; {} table knots, {}\n\
              estimated error {:.3} %, distance from the next finer model {:.3} %\n\
-             all Jacobians in {:.2} ms, one step of the plant in {:.2} µs (fitted in {:.1} s)\n\nrejected:\n",
+             all Jacobians in {:.2} ms, one step of the plant in {:.2} µs (fitted in {:.1} s)\n",
             self.scene,
             self.tissue,
             self.tolerance,
@@ -467,6 +517,20 @@ impl Fit {
             self.step_us,
             self.fit_wall_s,
         );
+        let _ = match self.end_to_end {
+            EndToEnd { error: Some(error), depth, nodes } => {
+                let beyond = if error > self.tolerance { ": ABOVE the tolerance" } else { "" };
+                writeln!(
+                    out,
+                    "end to end, against the full model on {nodes} nodes, to depth {depth:.4}: {:.3} %{beyond}\n",
+                    100.0 * error
+                )
+            }
+            EndToEnd { error: None, nodes, .. } => {
+                writeln!(out, "end to end: nothing to compare with ({nodes} nodes go nowhere)\n")
+            }
+        };
+        out.push_str("rejected:\n");
         for r in &self.rejected {
             let number = if !r.number.is_finite() {
                 "–".to_owned()
