@@ -14,6 +14,8 @@ use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 
 /// Modes below this singular value, over the largest, are rounding.
 const NEGLIGIBLE: f64 = 1e-7;
+/// Misfit of the second sample over that of the first, which it judges: it is summed once per step, not once per iteration.
+const CONTROL_SHARE: f64 = 0.4;
 /// Numbers in the matrix that the sample is chosen by, at most.
 const LARGEST_FIT: usize = 8_000_000;
 
@@ -45,7 +47,7 @@ impl Sampling {
         first.improve(misfit);
         self.taken = first.weights();
         let mut second = NonNegativeFit::new(&self.forces, &self.sums, self.taken.iter().map(|(q, _)| *q));
-        second.improve(misfit);
+        second.improve(CONTROL_SHARE * misfit);
         [self.taken.clone(), second.weights()]
     }
 }

@@ -24,8 +24,8 @@ const FEWEST_GUARDS: usize = 1;
 /// to the response at rest that is a fraction of it, so that a few hundredths can be enough.
 const SAMPLING_TOLERANCES: [f64; 3] = [3e-2, 1e-2, 3e-3];
 /// Part of the tolerance that is added to every raw estimate before it is scaled, so that an estimate that is small by
-/// accident does not decide the scale.
-const FLOOR: f64 = 0.05;
+/// accident does not decide the scale. (Whatever it is, the probability of the bound is the same; the bound is tighter.)
+const FLOOR: f64 = 0.25;
 /// Modes onto which the states cannot be projected within this multiple of the tolerance are not tried: the equilibrium
 /// on them may be nearer than the projection, but not by more.
 const HOPELESS: f64 = 2.0;
@@ -135,11 +135,13 @@ pub enum TrainingError {
     },
     /// No number of modes passes the trial.
     #[error(
-        "the best reduced model is wrong by {worst_error:.2e} of the largest target displacement, {tolerance:.2e} was asked for; ask for that, or train for less depth or a smaller paddle range"
+        "the best reduced model is wrong by {worst_error:.2e} of the largest target displacement and bounds its error by {worst_estimate:.2e}, {tolerance:.2e} was asked for; ask for that bound, or train for less depth or a smaller paddle range"
     )]
     TooInaccurate {
         /// Worst error of the best try.
         worst_error: f64,
+        /// Its largest bound; infinite where the snapshots themselves could not be told apart well enough to try.
+        worst_estimate: f64,
         /// Error asked for.
         tolerance: f64,
     },
@@ -191,10 +193,11 @@ fn smallest(
     if available < MODES[0] + FEWEST_GUARDS {
         return Err(TrainingError::TooFewModes { modes: available });
     }
-    let mut best = f64::INFINITY;
+    let mut best = (f64::INFINITY, f64::INFINITY);
     for modes in MODES.into_iter().filter(|modes| modes + FEWEST_GUARDS <= available) {
-        if space.projection_error(&states.drawn, modes) > HOPELESS * tolerance * scale {
-            best = best.min(space.projection_error(&states.drawn, modes));
+        let projected = space.projection_error(&states.drawn, modes);
+        if projected > HOPELESS * tolerance * scale {
+            best.0 = best.0.min(projected);
             continue;
         }
         let size = Size { modes, guards: GUARDS.min(available - modes) };
@@ -206,7 +209,9 @@ fn smallest(
             let Some(trial) = trial(&mut reduced, &states.drawn) else {
                 continue;
             };
-            best = best.min(trial.worst_error);
+            if trial.worst_estimate < best.1 {
+                best = (trial.worst_error, trial.worst_estimate);
+            }
             if trial.worst_estimate <= reduced.tolerance && trial.worst_error <= reduced.tolerance {
                 let report = TrainingReport {
                     modes,
@@ -225,8 +230,9 @@ fn smallest(
             }
         }
     }
-    match best.is_finite() {
-        true => Err(TrainingError::TooInaccurate { worst_error: best / scale, tolerance }),
+    let (worst_error, worst_estimate) = (best.0 / scale, best.1 / scale);
+    match worst_error.is_finite() {
+        true => Err(TrainingError::TooInaccurate { worst_error, worst_estimate, tolerance }),
         false => Err(TrainingError::NoEquilibrium { depth: states.domain.depth }),
     }
 }

@@ -36,6 +36,9 @@ pub(super) struct Kept<C, T> {
     pub apart: f64,
 }
 
+/// What was kept, if anything, and what was not.
+pub(super) type Searched<C, T> = (Option<Kept<C, T>>, Vec<(C, Verdict)>);
+
 /// Goes through families, each from coarse to fine and from cheap to dear, until one of its candidates is kept, or none
 /// can be cheaper than the best so far. A candidate that its finer neighbour refutes is passed over like one that is too
 /// wrong: the search goes on behind it. The families' order matters to the time it takes, not to the answer.
@@ -43,7 +46,7 @@ pub(super) fn cheapest<C: Clone, J: Trials<C>>(
     families: &[Vec<C>],
     tolerance: f64,
     trials: &mut J,
-) -> (Option<Kept<C, J::Outcome>>, Vec<(C, Verdict)>) {
+) -> Searched<C, J::Outcome> {
     let mut best: Option<Kept<C, J::Outcome>> = None;
     let mut rejected = Vec::new();
     for candidate_family in families {
