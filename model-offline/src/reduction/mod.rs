@@ -8,6 +8,7 @@
 //! - [`mod@train`]: makes one from snapshots of the full model, and measures it on states that it was not trained on.
 
 pub mod condensed;
+mod error;
 mod lifting;
 mod nnls;
 pub mod online;

@@ -1,8 +1,8 @@
 //! States of the full model: those that a reduced model is made of, and those that it is judged by.
 
+use super::error::TrainingError;
 use super::lifting::control_values;
 use super::online::Domain;
-use super::train::TrainingError;
 use crate::model::Body;
 use crate::parallel;
 use crate::solver::equilibrium::{Failure, LinearSolver, NewtonSettings};

@@ -1,17 +1,22 @@
 //! The space that a reduced model lives in: modes of the snapshots, what the full model says about them, and the points
 //! that stand for all.
 
+use super::error::TrainingError;
 use super::lifting::{flat, tangent_at_rest};
 use super::nnls::NonNegativeFit;
 use super::online::{Domain, ReducedModel, Sample, SampledPoint};
 use super::snapshots::Snapshot;
-use super::train::{GUARDS, MODES, TrainingError};
+
 use crate::material::Material as _;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::mechanics::stabilisation;
 use crate::model::TissueModel;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 
+/// Numbers of modes that are tried, until the trial is passed.
+pub(super) const MODES: [usize; 7] = [2, 4, 6, 8, 12, 16, 20];
+/// Modes beyond those used that the error estimate looks at.
+pub(super) const GUARDS: usize = 4;
 /// Modes below this singular value, over the largest, are rounding.
 const NEGLIGIBLE: f64 = 1e-7;
 /// Misfit of the second sample over that of the first, which it judges: it is summed once per step, not once per iteration.

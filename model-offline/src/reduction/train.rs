@@ -1,13 +1,13 @@
 //! Making a reduced model: snapshots, modes, samples, and a trial on states that it has not seen.
 
 use super::condensed::Condensed;
+pub use super::error::TrainingError;
 use super::lifting::lifting;
 use super::online::{Domain, Invalid, ReducedModel};
 use super::snapshots::{SNAPSHOT_SETTINGS, Snapshot, States, states};
-use super::space::{Size, Space};
+use super::space::{GUARDS, MODES, Size, Space};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::controllability::best_direction;
-use crate::solver::equilibrium::Failure;
 use nalgebra::Vector2;
 use serde::Serialize;
 use std::sync::Arc;
@@ -15,10 +15,7 @@ use std::sync::Arc;
 /// States that the estimate is calibrated on, and fresh ones that then judge it.
 const CALIBRATION: usize = 24;
 const FRESH: usize = 12;
-/// Numbers of modes that are tried, until the trial is passed.
-pub(super) const MODES: [usize; 7] = [2, 4, 6, 8, 12, 16, 20];
-/// Modes beyond those used that the error estimate looks at, and how many it cannot do without.
-pub(super) const GUARDS: usize = 4;
+/// Guard modes that the error estimate cannot do without.
 const FEWEST_GUARDS: usize = 1;
 /// Misfits of the sampled forces that the weights may leave, tried in this order: forces on the modes cause a correction
 /// to the response at rest that is a fraction of it, so that a few hundredths can be enough.
@@ -89,72 +86,6 @@ pub struct TrainingReport {
     pub domain: Domain,
 }
 
-/// Why there is no reduced model.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TrainingError {
-    /// The full model fails.
-    #[error(transparent)]
-    Model(#[from] ModelError),
-    /// The full model loses stability before any depth worth training.
-    #[error(
-        "the full model reaches depth {reached:.4} of {asked:.4} only: nothing to train on; ask for less depth, or give the law a barrier"
-    )]
-    TooShallow {
-        /// Depth that every snapshot reached.
-        reached: f64,
-        /// Depth asked for.
-        asked: f64,
-    },
-    /// The full model has no stable equilibrium somewhere in the range, however much it was shrunk.
-    #[error(
-        "the full model has no stable equilibrium at depth {depth:.4} with the paddle displaced by ({x:.4}, {y:.4}): {failure}; train for less depth or a smaller paddle range, or give the law a barrier"
-    )]
-    Unstable {
-        /// Needle depth.
-        depth: f64,
-        /// Paddle displacement.
-        x: f64,
-        /// Paddle displacement.
-        y: f64,
-        /// What the full model said.
-        failure: Failure,
-    },
-    /// The tangent on the modes is singular: no residual says what the error is.
-    #[error("the stiffness on {modes} modes is singular, so that no error could be estimated: hold more of the body")]
-    Singular {
-        /// Modes, guard modes included.
-        modes: usize,
-    },
-    /// The snapshots span too few modes for any to be left to watch the others.
-    #[error(
-        "the snapshots span {modes} modes, too few to use some and estimate the error with others; train for more depth"
-    )]
-    TooFewModes {
-        /// Modes above rounding.
-        modes: usize,
-    },
-    /// No number of modes passes the trial.
-    #[error(
-        "the best reduced model is wrong by {worst_error:.2e} of the largest target displacement and bounds its error by {worst_estimate:.2e}, {tolerance:.2e} was asked for; ask for that bound, or train for less depth or a smaller paddle range"
-    )]
-    TooInaccurate {
-        /// Worst error of the best try.
-        worst_error: f64,
-        /// Its largest bound; infinite where the snapshots themselves could not be told apart well enough to try.
-        worst_estimate: f64,
-        /// Error asked for.
-        tolerance: f64,
-    },
-    /// No reduced model had an equilibrium at all states that it was tried on.
-    #[error(
-        "no reduced model has an equilibrium at every state tried, up to depth {depth:.4}; train for less depth or a smaller paddle range"
-    )]
-    NoEquilibrium {
-        /// Depth asked for.
-        depth: f64,
-    },
-}
-
 /// Trains a reduced model of the body with the paddle at this place of the scene's list attached, or none.
 ///
 /// # Errors
@@ -206,7 +137,7 @@ fn smallest(
             let mut reduced = space.reduce(model, size, points.next(misfit), states.domain)?;
             reduced.tolerance = tolerance * scale;
             reduced.floor = FLOOR * tolerance * scale;
-            let Some(trial) = trial(&mut reduced, &states.drawn) else {
+            let Some(trial) = trial(&mut reduced, &states.snapshots, &states.drawn) else {
                 continue;
             };
             if trial.worst_estimate < best.1 {
@@ -254,12 +185,13 @@ struct Trial {
     effectivity: Effectivity,
 }
 
-/// Calibrates the scale of the estimate on the first states and judges it on the others; none when there is a state
-/// without an equilibrium on the modes.
-fn trial(reduced: &mut ReducedModel, states: &[Snapshot]) -> Option<Trial> {
+/// Calibrates the scale of the estimate on the snapshots, which hold the ends of the domain, and on the first of the drawn
+/// states; judges it on the others. None when there is a state without an equilibrium on the modes.
+fn trial(reduced: &mut ReducedModel, snapshots: &[Snapshot], drawn: &[Snapshot]) -> Option<Trial> {
     let uncalibrated = Arc::new(ReducedModel { scale: 1.0, tolerance: f64::INFINITY, ..reduced.clone() });
-    let outcomes: Vec<(f64, f64)> = states
+    let outcomes: Vec<(f64, f64)> = snapshots
         .iter()
+        .chain(drawn)
         .map(|state| -> Result<(f64, f64), Invalid> {
             let mut body = uncalibrated.body();
             body.drive(state.controls[0], Vector2::new(state.controls[1], state.controls[2]))?;
@@ -267,7 +199,7 @@ fn trial(reduced: &mut ReducedModel, states: &[Snapshot]) -> Option<Trial> {
         })
         .collect::<Result<_, _>>()
         .ok()?;
-    let (calibration, fresh) = outcomes.split_at(CALIBRATION.min(outcomes.len()));
+    let (calibration, fresh) = outcomes.split_at(outcomes.len() - FRESH.min(outcomes.len()));
     reduced.scale = conformal_scale(calibration);
     let worst = |part: fn(&(f64, f64)) -> f64| outcomes.iter().map(part).fold(0.0, f64::max);
     let ratios = || fresh.iter().map(|(error, estimate)| reduced.scale * estimate / error.max(f64::MIN_POSITIVE));
