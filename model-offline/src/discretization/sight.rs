@@ -1,7 +1,7 @@
 //! Which nodes a point of a body sees: kernels do not reach across notches and slots (the visibility criterion of
 //! Belytschko, Lu & Gu, Int. J. Numer. Meth. Eng. 37, 1994). In a convex body every point sees every other.
 
-use crate::geometry::{Location, Point, Point2, Polygon, cross};
+use crate::geometry::{Location, Point, Point2, Polygon, cross, distance_to_segment};
 use rstar::primitives::{GeomWithData, Line};
 use rstar::{AABB, RTree};
 
@@ -59,13 +59,28 @@ impl Sight<2> for OutlineSight {
         let margin = Point2::repeat(self.tolerance);
         let (low, high) = (low - margin, high + margin);
         let window = AABB::from_corners([low.x, low.y], [high.x, high.y]);
-        let mut near = self.edges.locate_in_envelope_intersecting(&window).peekable();
-        if near.peek().is_none() {
+        let near: Vec<_> = self.edges.locate_in_envelope_intersecting(&window).map(|edge| edge.data).collect();
+        near.iter().all(|edge| !self.cross((a, b), *edge)) && self.inside_between_corners(a, b, &near)
+    }
+}
+
+impl OutlineSight {
+    /// Whether the way is inside on every piece between the corners that it touches: from wall to wall, and along the mouth
+    /// of a slot, it crosses nothing and leads through the void all the same.
+    fn inside_between_corners(&self, a: &Point2, b: &Point2, near: &[(Point2, Point2)]) -> bool {
+        if near.is_empty() {
             return true;
         }
-        // Between two points of the outline there may be nothing but the void.
-        near.all(|edge| !self.cross((a, b), edge.data))
-            && self.outline.locate((a + b) * 0.5, self.tolerance) != Location::Outside
+        let along = b - a;
+        let on_the_way = |corner: &&Point2| distance_to_segment(**corner, *a, *b) <= self.tolerance;
+        let corners = near.iter().flat_map(|(p, q)| [p, q]).filter(on_the_way);
+        let mut stations: Vec<f64> = corners.map(|c| (c - a).dot(&along) / along.norm_squared()).collect();
+        stations.extend([0.0, 1.0]);
+        stations.sort_by(f64::total_cmp);
+        stations.windows(2).all(|piece| {
+            let middle = a + along * (0.5 * (piece[0] + piece[1]));
+            self.outline.locate(middle, self.tolerance) != Location::Outside
+        })
     }
 }
 
