@@ -43,6 +43,7 @@ const HOST_SIM: [(&str, &str); 15] = [
     ("faults", "--only 7 --seeds 1 --out OUT/faults"),
     ("stability", "--quick --out OUT/stability"),
     ("tables", "--out OUT/tables"),
+    ("rearm", "1"),
     ("replay", "IN/paper.rec"),
     ("board", "IN/paper.rec"),
     ("export", "IN/paper.rec --csv OUT/a.csv"),

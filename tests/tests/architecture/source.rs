@@ -157,6 +157,12 @@ impl Crate {
     }
 
     fn walk_glob(&self, module: usize, glob: &[String], path: &[String], depth: usize) -> Option<usize> {
+        // What begins with a name that is none here comes from another crate.
+        let first = glob.first()?;
+        let is_known = ["crate", "self", "super"].contains(&first.as_str());
+        if !is_known && !self.modules[module].names.contains_key(first) {
+            return None;
+        }
         let from = self.resolve(module, glob, depth)?;
         (from != module).then(|| self.walk(from, path, depth)).flatten()
     }

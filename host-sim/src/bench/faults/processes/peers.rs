@@ -185,6 +185,43 @@ pub(crate) fn garbage(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), 
     Ok(())
 }
 
+/// Samples of one tick with numbers of all kinds in all places.
+fn garbage(tick: u64, time_ns: u64, random: &mut Pcg64) -> (NeedleSample, TargetSample, PaddleSample) {
+    let time = |random: &mut Pcg64| if below(random, 4) == 0 { below(random, u64::MAX) } else { time_ns };
+    let sequence = |random: &mut Pcg64| if below(random, 4) == 0 { any_u32(random) } else { tick as u32 };
+    let needle = NeedleSample {
+        sequence: sequence(random),
+        reserved: any_u32(random),
+        time_ns: time(random),
+        depth: any_number(random),
+        velocity: any_number(random),
+    };
+    let paddle = PaddleSample {
+        sequence: sequence(random),
+        paddle_index: if below(random, 100) == 0 { any_u32(random) } else { 3 },
+        time_ns: time(random),
+        displacement: [any_number(random), any_number(random)],
+    };
+    let target = TargetSample {
+        sequence: sequence(random),
+        flags: any_u32(random) | TARGET_VISIBLE,
+        time_ns: time(random),
+        displacement: [any_number(random), any_number(random)],
+    };
+    (needle, target, paddle)
+}
+
+/// The witness: how many samples of a tick are garbage, by arithmetic of this bench only.
+fn garbage_among(tick: u64, time_ns: u64, needle: &NeedleSample, target: &TargetSample, paddle: &PaddleSample) -> u64 {
+    let is_garbage = |number: u32, stamp: u64, values: [f64; 2]| {
+        let plausible = values.iter().all(|value| *value == 0.0 || (value.is_normal() && value.abs() <= 0.1));
+        u64::from(number != tick as u32 || stamp != time_ns || !plausible)
+    };
+    is_garbage(needle.sequence, needle.time_ns, [needle.depth, needle.velocity])
+        + is_garbage(paddle.sequence, paddle.time_ns, paddle.displacement)
+        + is_garbage(target.sequence, target.time_ns, target.displacement)
+}
+
 fn garbage_on(
     stage: &Stage<'_>,
     space: &Space,
@@ -201,35 +238,8 @@ fn garbage_on(
     let mut last: Option<PaddleCommand> = None;
     for tick in 0..TICKS {
         let time_ns = tick * 1_000_000;
-        let time = |random: &mut Pcg64| if below(random, 4) == 0 { below(random, u64::MAX) } else { time_ns };
-        let sequence = |random: &mut Pcg64| if below(random, 4) == 0 { any_u32(random) } else { tick as u32 };
-        let needle = NeedleSample {
-            sequence: sequence(random),
-            reserved: any_u32(random),
-            time_ns: time(random),
-            depth: any_number(random),
-            velocity: any_number(random),
-        };
-        let paddle = PaddleSample {
-            sequence: sequence(random),
-            paddle_index: if below(random, 100) == 0 { any_u32(random) } else { 3 },
-            time_ns: time(random),
-            displacement: [any_number(random), any_number(random)],
-        };
-        let target = TargetSample {
-            sequence: sequence(random),
-            flags: any_u32(random) | TARGET_VISIBLE,
-            time_ns: time(random),
-            displacement: [any_number(random), any_number(random)],
-        };
-        // The witness: what is garbage, by numbers of this function only.
-        let is_garbage = |number: u32, stamp: u64, values: [f64; 2]| {
-            let plausible = values.iter().all(|value| *value == 0.0 || (value.is_normal() && value.abs() <= 0.1));
-            u64::from(number != tick as u32 || stamp != time_ns || !plausible)
-        };
-        evidence.injected += is_garbage(needle.sequence, needle.time_ns, [needle.depth, needle.velocity])
-            + is_garbage(paddle.sequence, paddle.time_ns, paddle.displacement)
-            + is_garbage(target.sequence, target.time_ns, target.displacement);
+        let (needle, target, paddle) = garbage(tick, time_ns, random);
+        evidence.injected += garbage_among(tick, time_ns, &needle, &target, &paddle);
         ports.needle.send(needle)?;
         ports.paddle.send(paddle)?;
         ports.target.send(target)?;
