@@ -54,7 +54,7 @@ impl fmt::Display for Mode {
 /// let seen = Faults::TARGET_LOST | Faults::NEEDLE_TOO_FAST;
 /// assert!(seen.contains(Faults::TARGET_LOST));
 /// assert_eq!(Faults::from_bits(seen.bits()), seen);
-/// assert_eq!(seen.to_string(), "NEEDLE_TOO_FAST | TARGET_LOST");
+/// assert_eq!(seen.to_string(), "TARGET_LOST | NEEDLE_TOO_FAST");
 /// ```
 #[derive(Clone, Copy, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Faults(u64);
