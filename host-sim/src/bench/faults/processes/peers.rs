@@ -186,7 +186,7 @@ pub(crate) fn garbage(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), 
 }
 
 /// Samples of one tick with numbers of all kinds in all places.
-fn garbage(tick: u64, time_ns: u64, random: &mut Pcg64) -> (NeedleSample, TargetSample, PaddleSample) {
+fn garbage_samples(tick: u64, time_ns: u64, random: &mut Pcg64) -> (NeedleSample, TargetSample, PaddleSample) {
     let time = |random: &mut Pcg64| if below(random, 4) == 0 { below(random, u64::MAX) } else { time_ns };
     let sequence = |random: &mut Pcg64| if below(random, 4) == 0 { any_u32(random) } else { tick as u32 };
     let needle = NeedleSample {
@@ -238,7 +238,7 @@ fn garbage_on(
     let mut last: Option<PaddleCommand> = None;
     for tick in 0..TICKS {
         let time_ns = tick * 1_000_000;
-        let (needle, target, paddle) = garbage(tick, time_ns, random);
+        let (needle, target, paddle) = garbage_samples(tick, time_ns, random);
         evidence.injected += garbage_among(tick, time_ns, &needle, &target, &paddle);
         ports.needle.send(needle)?;
         ports.paddle.send(paddle)?;
