@@ -34,7 +34,7 @@ const AT_WORK: Duration = Duration::from_secs(2);
 const HANGS: Duration = Duration::from_secs(20);
 
 /// What every command is called with to do something short; options that name outputs name them in `OUT`.
-const HOST_SIM: [(&str, &str); 15] = [
+const HOST_SIM: [(&str, &str); 16] = [
     ("run", "--tissue homogeneous --mode lockstep --insertion-time 0.05 --quiet --out OUT/report"),
     ("controller", "--table IN/paper.table --link LINK --patience 0.05 --record OUT/a.rec --json OUT/a.json"),
     ("plant", "--link LINK --paddle 3 --patience 0.05 --insertion-time 0.05 --json OUT/a.json"),
