@@ -1,6 +1,6 @@
 //! Scenes of many kinds, none of which the methods were tuned on: slabs, notches, slots, inner needles, thin parts,
-//! inclusions on the edge, other units, origins far away. The default rule reaches 1 % on each, and its estimated errors hold,
-//! against quadratic triangles refined until they leave next to nothing open.
+//! inclusions on the edge, other units, origins far away. The default rule reaches 1 % on all but the neck, which it
+//! refuses, and its estimated errors hold against quadratic triangles refined until they leave next to nothing open.
 
 use model_offline::model::ModelError;
 use model_offline::placement::adaptive::{ErrorEstimate, Judged, Reference, discretise_judged};
@@ -62,8 +62,8 @@ fn check(text: &str) {
 
 #[test]
 fn a_neck_between_two_blocks_is_refused_with_what_was_reached() {
-    // Half the strain of the paddle's answer is in two inner corners that the gradings know no better than others: forty
-    // thousand nodes leave 1.2 %, and quadratic triangles are what the program advises.
+    // Half the strain of the paddle's answer is in two inner corners that the gradings know no better than others: 1.2 %
+    // are left, and quadratic triangles are what the program advises.
     match outcome(include_str!("../scenes/neck.toml")) {
         Err(ModelError::ToleranceNotReached { reached, .. }) => {
             assert!((TOLERANCE..0.02).contains(&reached), "{reached}")
