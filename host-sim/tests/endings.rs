@@ -210,16 +210,19 @@ fn a_process_without_descriptors_removes_nobodys_link() {
     assert_eq!(traces(&link), Vec::<PathBuf>::new());
 }
 
+/// The table of the paper's scene as a file.
+fn paper_table_in(folder: &Path) -> PathBuf {
+    let path = folder.join("paper.table");
+    let table = host_sim::bench::paper_table::paper_table().unwrap();
+    std::fs::write(&path, model_offline::table::to_bytes(&table).unwrap()).unwrap();
+    path
+}
+
 #[test]
 fn a_controller_that_stops_before_run_is_given_up() {
     let link = format!("test-patience-{}", std::process::id());
     let folder = tempfile::tempdir().unwrap();
-    let table = folder.path().join("paper.table");
-    std::fs::write(
-        &table,
-        model_offline::table::to_bytes(&host_sim::bench::paper_table::paper_table().unwrap()).unwrap(),
-    )
-    .unwrap();
+    let table = paper_table_in(folder.path());
     let free_run = ["--mode", "free-run", "--link", &link, "--rate", "100"];
     let controller = start(&[&["controller", "--table", table.to_str().unwrap()], &free_run[..]].concat());
     // It has opened its side and waits; from here on it says nothing.
@@ -241,12 +244,7 @@ fn a_controller_that_stops_before_run_is_given_up() {
 #[test]
 fn two_sides_by_hand_compare_their_scenes() {
     let folder = tempfile::tempdir().unwrap();
-    let table = folder.path().join("paper.table");
-    std::fs::write(
-        &table,
-        model_offline::table::to_bytes(&host_sim::bench::paper_table::paper_table().unwrap()).unwrap(),
-    )
-    .unwrap();
+    let table = paper_table_in(folder.path());
     let text = model_offline::scene::BUNDLED[0].1;
     let scene = folder.path().join("softer.toml");
     std::fs::write(&scene, text.replacen("stiffness = 100.0", "stiffness = 50.0", 1)).unwrap();

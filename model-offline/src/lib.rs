@@ -51,6 +51,7 @@ pub mod model;
 pub mod output;
 pub mod parallel;
 pub mod placement;
+mod random;
 pub mod reduction;
 pub mod scene;
 pub mod solver;

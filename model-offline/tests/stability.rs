@@ -4,8 +4,8 @@ use assert_cmd::Command;
 use model_offline::discretization::{Integration, Method};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::FailureReason;
-use model_offline::study::stability::plan::{Setting, base};
-use model_offline::study::stability::probe::{Outcome, Reason, run};
+use model_offline::study::stability::plan::{Experiment, base};
+use model_offline::study::stability::probe::{ExperimentResult, StopReason, run};
 use model_offline::study::stability::zero_energy;
 use std::path::Path;
 
@@ -14,10 +14,10 @@ fn paper() -> Scene {
 }
 
 /// Plain Newton, ten increments over the scene's depth of 0.1.
-fn plain(integration: Integration, spacing: f64, paddle: u32) -> Outcome {
+fn plain(integration: Integration, spacing: f64, paddle: u32) -> ExperimentResult {
     let scene = paper();
     let place = scene.paddles.iter().position(|p| p.index == paddle).unwrap();
-    let setting = Setting { line_search: false, cutback: false, ..base(&scene, integration, spacing) };
+    let setting = Experiment { line_search: false, cutback: false, ..base(&scene, integration, spacing) };
     run(&scene, place, &setting)
 }
 
@@ -39,7 +39,7 @@ fn depths_agree_with_an_independent_implementation() {
             let outcome = plain(integration, spacing, paddle);
             assert_eq!(outcome.nodes, nodes);
             assert!((outcome.depth - depth).abs() < 0.0101, "{integration:?} {spacing} paddle {paddle}: {outcome:?}");
-            assert!(matches!(outcome.reason, Reason::Solve(_)), "{outcome:?}");
+            assert!(matches!(outcome.reason, StopReason::Solve(_)), "{outcome:?}");
         }
     }
 }
@@ -54,7 +54,7 @@ fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
         for (place, depth) in [1, 3].into_iter().zip(depths) {
             let reached = (0..8).map(|seed| {
                 let regular = base(&scene, Integration::FemT6, spacing);
-                let setting = Setting { line_search: false, cutback: false, jitter: 0.01, seed, ..regular };
+                let setting = Experiment { line_search: false, cutback: false, jitter: 0.01, seed, ..regular };
                 let outcome = run(&scene, place, &setting);
                 assert_eq!(outcome.nodes, nodes);
                 outcome.depth
@@ -69,12 +69,12 @@ fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
 fn every_way_to_fail_has_its_type_and_names_its_place() {
     let scene = paper();
     let regular = base(&scene, Integration::Scni, 0.1);
-    let small = run(&scene, 2, &Setting { method: Method { support: 0.8, ..regular.method }, ..regular });
-    assert_eq!((small.reason, small.depth), (Reason::SingularMomentMatrix, 0.0));
+    let small = run(&scene, 2, &Experiment { method: Method { support: 0.8, ..regular.method }, ..regular });
+    assert_eq!((small.reason, small.depth), (StopReason::SingularMomentMatrix, 0.0));
     assert!(small.detail.contains("node"), "{}", small.detail);
-    let incompressible = run(&scene, 2, &Setting { poisson: Some(0.5), ..regular });
-    assert_eq!(incompressible.reason, Reason::UnstableLaw);
-    let leap = Setting {
+    let incompressible = run(&scene, 2, &Experiment { poisson: Some(0.5), ..regular });
+    assert_eq!(incompressible.reason, StopReason::UnstableLaw);
+    let leap = Experiment {
         increments: 1,
         line_search: false,
         cutback: false,
@@ -82,10 +82,10 @@ fn every_way_to_fail_has_its_type_and_names_its_place() {
         ..regular
     };
     let leap = run(&scene, 2, &leap);
-    assert_eq!((leap.reason, leap.depth), (Reason::Solve(FailureReason::ElementInverted), 0.0));
+    assert_eq!((leap.reason, leap.depth), (StopReason::Solve(FailureReason::ElementInverted), 0.0));
     assert!(leap.detail.contains("integration point"), "{}", leap.detail);
-    let guarded = run(&scene, 2, &Setting { barrier: Some(1.0), ..regular });
-    assert_eq!((guarded.reason, guarded.depth), (Reason::Reached, 0.2));
+    let guarded = run(&scene, 2, &Experiment { barrier: Some(1.0), ..regular });
+    assert_eq!((guarded.reason, guarded.depth), (StopReason::Reached, 0.2));
 }
 
 #[test]

@@ -6,9 +6,9 @@ use model_offline::geometry::{Point, Point2, Polygon};
 
 /// A small reproducible generator (PCG-XSH-RR 64/32, O'Neill 2014): tests must not change with a library's version.
 #[derive(Debug, Clone)]
-pub struct Scatter(u64);
+pub struct Pcg32(u64);
 
-impl Scatter {
+impl Pcg32 {
     /// A generator with its seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1))
@@ -47,7 +47,7 @@ pub fn jittered_rectangle(
     jitter: f64,
     seed: u64,
 ) -> Vec<Point<2>> {
-    let mut scatter = Scatter::new(seed);
+    let mut scatter = Pcg32::new(seed);
     let (dx, dy) = (width / columns as f64, height / rows as f64);
     (0..=rows)
         .flat_map(|j| (0..=columns).map(move |i| (i, j)))

@@ -16,17 +16,20 @@ fn three_tolerances_have_three_answers_and_each_is_kept() {
     let mut nodes = Vec::new();
     for tolerance in [0.05, 0.01, 0.002] {
         let reference = Reference::compute(&scene, 0.2 * tolerance).unwrap();
-        let mut rejected = Vec::new();
-        let (candidate, outcome, verified) = discretization(&scene, tolerance, &reference, &mut rejected).unwrap();
-        let found = errors(&outcome.responses, &limits);
-        println!("{tolerance}: {candidate:?}, {} nodes, {found:?}, verified {verified:.5}", outcome.nodes);
+        let chosen = discretization(&scene, tolerance, &reference).unwrap();
+        let (nodes_of_chosen, verified) = (chosen.assessment.nodes, chosen.verified_error);
+        let found = errors(&chosen.assessment.responses, &limits);
+        println!(
+            "{tolerance}: {:?}, {nodes_of_chosen} nodes, {found:?}, verified {verified:.5}",
+            chosen.discretization
+        );
         assert!(found.controllability <= tolerance && found.displacement <= tolerance, "{tolerance}: {found:?}");
         assert!(verified <= tolerance);
         // Something cheaper was tried, and it was its error that spoke against it, not its time.
-        let for_its_error = |r: &&Rejected| !r.reason.starts_with("times") && r.number > tolerance;
-        let cheaper: Vec<&Rejected> = rejected.iter().filter(for_its_error).collect();
-        assert!(!cheaper.is_empty(), "{tolerance}: {rejected:?}");
-        nodes.push(outcome.nodes);
+        let for_its_error = |r: &&Rejected| r.reason.error().is_some_and(|error| error > tolerance);
+        let cheaper: Vec<&Rejected> = chosen.rejected.iter().filter(for_its_error).collect();
+        assert!(!cheaper.is_empty(), "{tolerance}: {:?}", chosen.rejected);
+        nodes.push(nodes_of_chosen);
     }
     assert!(nodes[0] < nodes[1] && nodes[1] < nodes[2], "{nodes:?}");
 }
@@ -44,7 +47,7 @@ fn the_scene_that_is_written_is_the_model_that_was_chosen() {
     assert!(kept.controllability <= 0.05 && kept.displacement <= 0.05, "{kept:?}");
     // The paper's law at full depth is far from linear: the linear law is rejected with its number.
     assert_eq!(found.chosen.plant, PlantModel::Reduced);
-    assert!(found.rejected.iter().any(|r| r.decision == Decision::Law && r.number > 0.05));
+    assert!(found.rejected.iter().any(|r| r.candidate.decision() == Decision::Law && r.reason.number() > Some(0.05)));
     // Comments of the original survive.
     let comments = BUNDLED[0].1.lines().filter(|l| l.trim_start().starts_with('#')).count();
     assert!(comments > 0 && text.lines().filter(|l| l.trim_start().starts_with('#')).count() >= comments);

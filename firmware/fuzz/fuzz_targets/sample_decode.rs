@@ -1,6 +1,8 @@
 //! See `firmware/tests/entries/mod.rs`, which proptest calls with the same bytes.
 #![no_main]
 
+// A target calls one entry of several.
+#[allow(dead_code)]
 #[path = "../../tests/entries/mod.rs"]
 mod entries;
 

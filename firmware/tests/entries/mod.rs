@@ -1,6 +1,6 @@
 //! What outsiders can reach with bytes: one function per fuzz target. cargo-fuzz calls them under nightly, proptest in
 //! every `cargo test`.
-#![allow(dead_code, clippy::unwrap_used, clippy::indexing_slicing)]
+#![allow(clippy::unwrap_used, clippy::indexing_slicing)]
 
 use firmware::contract::{
     Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample, Units, Validity, decode,

@@ -41,7 +41,7 @@ pub(crate) enum CliError {
     Model(#[from] ModelError),
     /// The table cannot be made.
     #[error(transparent)]
-    Table(#[from] TableBuildError),
+    Table(TableBuildError),
     /// No equilibrium.
     #[error("no equilibrium: {failure}; last converged state at depth {depth:.4}")]
     #[diagnostic(help(
@@ -56,6 +56,15 @@ pub(crate) enum CliError {
     /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+}
+
+impl From<TableBuildError> for CliError {
+    fn from(error: TableBuildError) -> Self {
+        match error {
+            TableBuildError::Model(error) => Self::Model(error),
+            other => Self::Table(other),
+        }
+    }
 }
 
 impl From<LimitError> for CliError {
@@ -73,7 +82,7 @@ impl CliError {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
-            Self::Model(ModelError::Unsupported(_)) => 2,
+            Self::Model(error) if error.is_usage() => 2,
             Self::Table(TableBuildError::NoSuchPaddle(_) | TableBuildError::Knots(_)) => 2,
             _ => 1,
         }

@@ -29,7 +29,7 @@ pub(super) fn run(args: &ParetoArgs) -> Result<(), CliError> {
         pareto::compare(&scene, Extent::of_flag(args.quick), &|share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
     let (csv, svg) = (args.out.join("pareto.csv"), args.out.join("pareto.svg"));
-    output::write_whole(&csv, comparison.csv().as_bytes())?;
+    output::write_whole(&csv, &comparison.csv())?;
     output::write_whole(&svg, comparison.svg(&scene.name, scene.tissue()).as_bytes())?;
     if !args.common.quiet {
         print!("{}", comparison.table());

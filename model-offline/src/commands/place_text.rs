@@ -2,13 +2,16 @@
 
 use model_offline::model::ModelError;
 use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};
-use model_offline::placement::study::StaticStudy;
+use model_offline::placement::study::{Optimum, StaticStudy};
 use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PaddleResult, PlacementStudy};
 use std::fmt::Write as _;
 
 /// What stands where there is no number.
 const NONE: &str = "–";
+/// What marks the best of a column, and the others.
+const BEST: char = '*';
+const NOT_BEST: char = ' ';
 
 /// The study on a screen.
 pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
@@ -24,18 +27,17 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
     );
     for (i, paddle) in study.placement.paddles.iter().enumerate() {
         let errors = known.map(|known| &known.errors.paddles[i]);
-        let best = (optimum.static_paddle == paddle.index, optimum.dynamic_paddle == Some(paddle.index));
-        let _ = writeln!(out, "{}", paddle_row(paddle, errors, best));
+        let _ = writeln!(out, "{}", paddle_row(paddle, errors, optimum));
     }
     let none = &study.placement.no_paddle.static_study;
     let errors = known.map(|known| &known.errors.no_paddle);
-    let _ =
-        writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {}", static_part(none, errors, (false, Some(1.0))));
+    let none = static_part(none, errors, NOT_BEST, Some(1.0));
+    let _ = writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {none}");
     out.push_str(&notes(study, accuracy));
     out
 }
 
-fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, (fixture, dynamic): (bool, bool)) -> String {
+fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, optimum: Optimum) -> String {
     let measure = match paddle.best_direction {
         Some(_) => format!("{:8.4}", paddle.controllability_measure),
         None => format!("{NONE:>8}"),
@@ -43,19 +45,20 @@ fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, (fixture, dy
     let error = errors.and_then(|e| e.controllability_measure);
     let error = error.map_or(NONE.to_owned(), |e| format!("{:.2} %", 100.0 * e));
     let direction = paddle.best_direction.map_or(NONE.to_owned(), |[x, y]| format!("({x:8.4}, {y:8.4})"));
-    let mark = if dynamic { "*" } else { " " };
-    let rest =
-        static_part(&paddle.static_study, errors.map(|e| &e.static_study), (fixture, paddle.static_over_no_paddle));
+    let mark = if optimum.dynamic_paddle == Some(paddle.index) { BEST } else { NOT_BEST };
+    let mark_static = if optimum.static_paddle == paddle.index { BEST } else { NOT_BEST };
+    let errors = errors.map(|e| &e.static_study);
+    let rest = static_part(&paddle.static_study, errors, mark_static, paddle.static_over_no_paddle);
     format!("{:>7}  {measure}{mark} {error:>8}   {direction:<20}  {rest}", paddle.index)
 }
 
-/// Largest orthogonal displacement, its error, its share of that without a paddle, and why the insertion ended early.
-fn static_part(study: &StaticStudy, errors: Option<&StaticErrors>, (best, share): (bool, Option<f64>)) -> String {
+/// Largest orthogonal displacement with its mark, its error, its share of that without a paddle, and why the insertion ended
+/// early.
+fn static_part(study: &StaticStudy, errors: Option<&StaticErrors>, mark: char, share: Option<f64>) -> String {
     let error = errors.and_then(|e| e.max_orthogonal).map_or(NONE.to_owned(), |e| format!("{e:.6}"));
     let share = share.map_or(NONE.to_owned(), |share| format!("{share:.3}"));
     let stopped =
         study.failure.as_ref().map_or(String::new(), |f| format!("  stopped at depth {:.4}: {}", f.depth, f.reason));
-    let mark = if best { "*" } else { " " };
     format!("{:23.6}{mark} {error:>8}   {share:>12}{stopped}", study.max_orthogonal)
 }
 

@@ -47,8 +47,8 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
     let bar = args.common.progress(plan.runs() as u64);
     let result = plan.run(scene, paddle, args.common.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
-    output::write_whole(&args.out.join("stability.csv"), stability::csv(&result).as_bytes())?;
-    output::write_whole(&args.out.join("zero_energy.csv"), stability::zero_energy_csv(&result).as_bytes())?;
+    output::write_whole(&args.out.join("stability.csv"), &stability::csv(&result))?;
+    output::write_whole(&args.out.join("zero_energy.csv"), &stability::zero_energy_csv(&result))?;
     output::write_whole(&args.out.join("stability.svg"), stability::figure(&result).svg().as_bytes())?;
     if !args.common.quiet {
         print!("{}", stability::summary(&result));

@@ -25,7 +25,7 @@ pub(super) fn run(args: &SweepArgs) -> Result<(), CliError> {
     let found = sweep::sweep(&scene, args.common.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     let (csv, svg) = (args.out.join("sweep.csv"), args.out.join("sweep.svg"));
-    output::write_whole(&csv, found.csv().as_bytes())?;
+    output::write_whole(&csv, &found.csv())?;
     output::write_whole(&svg, found.svg().as_bytes())?;
     if !args.common.quiet {
         println!("{}\n{}\n{}", found.table(), csv.display(), svg.display());

@@ -3,7 +3,7 @@
 use super::common::{Common, SceneArgs, check_outputs};
 use super::error::CliError;
 use model_offline::output::{self, table_text};
-use model_offline::placement::{best_dynamic, discretise};
+use model_offline::placement::model_with_paddle;
 use model_offline::table::{self, TableOptions};
 use std::path::PathBuf;
 
@@ -28,9 +28,8 @@ pub(super) struct TableArgs {
 pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
     let scene = args.common.over(args.scene.read()?)?;
     check_outputs(&args.scene.scene, &[("--output", Some(&args.output))])?;
-    let (model, _) = discretise(&scene)?;
+    let (model, paddle) = model_with_paddle(&scene, args.paddle)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
-    let paddle = args.paddle.map_or_else(|| best_dynamic(&model), Ok)?;
     let table = table::build(&model, paddle, &options)?;
     let bytes = table::to_bytes(&table)?;
     output::write_whole(&args.output, &bytes)?;

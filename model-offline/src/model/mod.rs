@@ -12,6 +12,7 @@ use crate::discretization::{
     DiscretizationError, Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
 };
 use crate::geometry::{Point2, distance_to_polyline};
+use crate::material::MaterialError;
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
 use crate::scene::Scene;
@@ -34,7 +35,7 @@ pub enum ModelError {
     Solve(#[from] Failure),
     /// A constrained feature has no node on it.
     #[error("no node lies on the {0}; refine the discretization")]
-    NothingConstrained(String),
+    NothingConstrained(BoundaryPart),
     /// The paddle cannot move the target orthogonally to the needle.
     #[error(
         "paddle {paddle}: the actuation Jacobian is singular (condition number {condition:.1e}): this paddle cannot control the target"
@@ -66,9 +67,57 @@ pub enum ModelError {
         /// Best estimate.
         reached: f64,
     },
-    /// A choice of methods that does not exist yet.
-    #[error("{0}")]
-    Unsupported(String),
+    /// The scene's resolution is a tolerance where nodes are needed.
+    #[error("the resolution is a tolerance: refine to it with `placement::discretise`")]
+    ToleranceIsNoResolution,
+    /// A study that varies the spacing of a scene that has none.
+    #[error("the study varies a spacing: give one instead of a tolerance")]
+    NoSpacing,
+    /// No such paddle in the scene.
+    #[error("the scene has no paddle {0}")]
+    NoSuchPaddle(u32),
+    /// Nitsche's method for a needle that does not touch the boundary.
+    #[error(
+        "Nitsche's method holds boundary, and this needle contact is inside the body: use essential = \"transformation\""
+    )]
+    NitscheInside,
+    /// Boundary values are imposed weakly where they have to be exact.
+    #[error(
+        "this needs nodal values that are imposed exactly, and the scene imposes them weakly: use essential = \"transformation\""
+    )]
+    ImposedWeakly,
+    /// A law that was changed on the way is none.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+}
+
+impl ModelError {
+    /// Whether it is the question that was wrong, and not a computation that failed.
+    pub fn is_usage(&self) -> bool {
+        matches!(
+            self,
+            Self::ToleranceIsNoResolution
+                | Self::NoSpacing
+                | Self::NoSuchPaddle(_)
+                | Self::NitscheInside
+                | Self::ImposedWeakly
+                | Self::Material(_)
+        )
+    }
+}
+
+/// A part of the boundary on which displacements are prescribed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display)]
+pub enum BoundaryPart {
+    /// What does not move.
+    #[strum(to_string = "immobile part")]
+    Immobile,
+    /// Where the needle pushes.
+    #[strum(to_string = "needle contact")]
+    Needle,
+    /// Where the paddle of this index is attached.
+    #[strum(to_string = "paddle {0}")]
+    Paddle(u32),
 }
 
 /// The discrete model of a scene: everything that all paddles share.
@@ -113,18 +162,18 @@ struct Groups<T> {
 impl<T> Groups<T> {
     /// Collects each group by the polylines it lies on.
     fn collect(scene: &Scene, on: impl Fn(&[&[Point2]]) -> Result<Vec<T>, ShapeError>) -> Result<Self, ModelError> {
-        let some = |paths: &[&[Point2]], name: &str| -> Result<Vec<T>, ModelError> {
+        let some = |paths: &[&[Point2]], part: BoundaryPart| -> Result<Vec<T>, ModelError> {
             let found = on(paths)?;
-            if found.is_empty() { Err(ModelError::NothingConstrained(name.to_owned())) } else { Ok(found) }
+            if found.is_empty() { Err(ModelError::NothingConstrained(part)) } else { Ok(found) }
         };
         let immobile: Vec<&[Point2]> = scene.immobile.iter().map(Vec::as_slice).collect();
         Ok(Self {
-            immobile: some(&immobile, "immobile part")?,
-            needle: some(&[&scene.needle.contact], "needle contact")?,
+            immobile: some(&immobile, BoundaryPart::Immobile)?,
+            needle: some(&[&scene.needle.contact], BoundaryPart::Needle)?,
             paddles: scene
                 .paddles
                 .iter()
-                .map(|p| some(&[&p.segment], &format!("paddle {}", p.index)))
+                .map(|p| some(&[&p.segment], BoundaryPart::Paddle(p.index)))
                 .collect::<Result<_, _>>()?,
         })
     }
@@ -155,15 +204,13 @@ impl TissueModel {
     ///
     /// # Errors
     /// [`ModelError`]: shape functions that do not exist, features without nodes, methods that do not combine;
-    /// [`ModelError::Unsupported`] for a tolerance, which [`discretise`](crate::placement::discretise) refines to.
+    /// [`ModelError::ToleranceIsNoResolution`] for a tolerance, which [`discretise`](crate::placement::discretise) refines to.
     pub fn new(scene: &Scene) -> Result<Self, ModelError> {
         let spacing = match scene.discretization.resolution {
             Resolution::Spacing(spacing) => spacing,
             Resolution::Level(level) => return graded_model(scene, scene.discretization.method, level),
             Resolution::Tolerance(_) => {
-                return Err(ModelError::Unsupported(
-                    "the resolution is a tolerance: refine to it with `placement::discretise`".into(),
-                ));
+                return Err(ModelError::ToleranceIsNoResolution);
             }
         };
         let method = scene.discretization.method;
@@ -190,9 +237,7 @@ impl TissueModel {
             Essential::Nitsche => {
                 let contact = &scene.needle.contact;
                 if !contact.windows(2).all(|s| scene.outline.segment_on_boundary(s[0], s[1], tolerance)) {
-                    return Err(ModelError::Unsupported(
-                        "Nitsche's method holds boundary, and this needle contact is inside the body: use essential = \"transformation\"".into(),
-                    ));
+                    return Err(ModelError::NitscheInside);
                 }
                 EssentialBoundary::Points(Groups::collect(scene, |paths| {
                     paths

@@ -1,7 +1,8 @@
-//! What the model writes: JSON, VTU, figures. Every file is written whole or not at all.
+//! What the model writes: JSON, CSV, VTU, figures. Every file is written whole or not at all.
 
 pub mod body;
 pub mod chart;
+pub mod csv;
 mod preflight;
 pub mod table_text;
 pub mod terminal;

@@ -15,4 +15,4 @@ pub mod workflow;
 
 pub use adaptive::discretise;
 pub use study::{PaddleResult, Placement, PlacementOptions, StaticStudy, best_dynamic, place};
-pub use workflow::PlacementStudy;
+pub use workflow::{PlacementStudy, model_with_paddle};

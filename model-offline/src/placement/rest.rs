@@ -81,7 +81,7 @@ pub(super) fn for_each_paddle(
     let all: Vec<ConstrainedRows> = (0..model.scene().paddles.len())
         .map(|p| model.constrained_rows(Some(p)))
         .collect::<Option<_>>()
-        .ok_or_else(|| ModelError::Unsupported("these responses need essential = \"transformation\"".into()))?;
+        .ok_or(ModelError::ImposedWeakly)?;
     let analysis = model.analysis();
     let (mut state, mut force) = (State::default(), vec![0.0; unknowns]);
     internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)

@@ -27,12 +27,12 @@ pub fn verdict(placement: &Placement) -> Vec<String> {
     if hindered.len() == placement.paddles.len() {
         lines.push("no paddle of this scene can: move a paddle, turn the needle, or accept a static one".to_owned());
     }
-    lines.extend(fixtures_no_better_than_none(placement));
+    lines.extend(static_paddles_no_better_than_none(placement));
     lines
 }
 
 /// Says so where even the best static paddle moves the target more than no paddle does.
-fn fixtures_no_better_than_none(placement: &Placement) -> Option<String> {
+fn static_paddles_no_better_than_none(placement: &Placement) -> Option<String> {
     let best = placement.paddles.iter().find(|p| p.index == placement.optimum.static_paddle)?;
     let factor = best.static_over_no_paddle.filter(|factor| *factor > 1.0)?;
     Some(format!(

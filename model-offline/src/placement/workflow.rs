@@ -1,11 +1,12 @@
 //! From a scene to a placement, the one way that all commands go: discretise, refine if a tolerance is asked for, study every
-//! paddle, and judge the answer.
+//! paddle, and judge the answer. Who needs less stops earlier: [`model_with_paddle`] gives the model that the study would be
+//! of, and the paddle that it would advise.
 
 use super::accuracy::{Accuracy, accuracy};
 use super::adaptive::{ErrorEstimate, Judged, discretise_judged};
 use super::cross_check::{CrossCheck, cross_check};
 use super::reference::Reference;
-use super::study::{Placement, PlacementOptions, place};
+use super::study::{Placement, PlacementOptions, best_dynamic, place};
 use super::verdict::verdict;
 use crate::model::{ModelError, TissueModel};
 use crate::scene::Scene;
@@ -51,6 +52,20 @@ pub struct StudyAccuracy {
 
 /// What a reference may leave open, where the study asks for no tolerance.
 const REFERENCE_OPEN: f64 = 0.01;
+
+/// A scene's model and a paddle: the one that is asked for, else the best dynamic one.
+///
+/// # Errors
+/// [`ModelError::NoSuchPaddle`], and [`ModelError`] when the scene cannot be modelled, its tolerance not be reached, or no paddle
+/// controls the target.
+pub fn model_with_paddle(scene: &Scene, asked: Option<u32>) -> Result<(TissueModel, u32), ModelError> {
+    if let Some(index) = asked.filter(|index| scene.paddles.iter().all(|paddle| paddle.index != *index)) {
+        return Err(ModelError::NoSuchPaddle(index));
+    }
+    let model = discretise_judged(scene)?.model;
+    let paddle = asked.map_or_else(|| best_dynamic(&model), Ok)?;
+    Ok((model, paddle))
+}
 
 impl PlacementStudy {
     /// Discretises the scene at its resolution and studies every paddle.

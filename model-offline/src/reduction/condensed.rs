@@ -1,7 +1,7 @@
 //! Static condensation of the linear model: needle, paddle and target are retained, every other displacement is
 //! condensed out. `K_c = K_rr − K_rf K_ff⁻¹ K_fr` (Guyan 1965), exact for the law's small-strain limit.
 
-use super::lifting::{control_values, controls, flat, imposed_weakly, tangent_at_rest};
+use super::lifting::{control_values, controls, flat, tangent_at_rest};
 use crate::mechanics::ConstrainedRows;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::mechanics::stabilisation;
@@ -27,7 +27,7 @@ impl Condensed {
     pub fn new(model: &TissueModel, paddle: Option<usize>) -> Result<Self, ModelError> {
         let controls = controls(paddle);
         // The target is constrained too while the others are condensed out.
-        let rows = model.constrained_rows_with_target(paddle).ok_or_else(imposed_weakly)?;
+        let rows = model.constrained_rows_with_target(paddle).ok_or(ModelError::ImposedWeakly)?;
         let shapes = retained_responses(model, paddle, rows)?;
         let columns: Vec<&[f64]> = shapes.iter().map(Vec::as_slice).collect();
         let mut stiffness = stabilisation::project(model.rule(), model.tissue(), &columns);
@@ -149,6 +149,6 @@ mod tests {
         let mut scene = Scene::bundled("paper").unwrap();
         scene.discretization.essential = crate::discretization::Essential::Nitsche;
         let model = TissueModel::new(&scene).unwrap();
-        assert!(matches!(Condensed::new(&model, Some(0)), Err(ModelError::Unsupported(_))));
+        assert!(matches!(Condensed::new(&model, Some(0)), Err(ModelError::ImposedWeakly)));
     }
 }

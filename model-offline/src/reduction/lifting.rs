@@ -27,7 +27,7 @@ pub(super) fn lifting(
     mut at_rest: Body<'_>,
 ) -> Result<Vec<Vec<f64>>, ModelError> {
     if model.constrained_rows(paddle).is_none() {
-        return Err(imposed_weakly());
+        return Err(ModelError::ImposedWeakly);
     }
     (0..controls(paddle))
         .map(|control| {
@@ -37,13 +37,6 @@ pub(super) fn lifting(
             Ok(at_rest.equilibrium_mut().sensitivity(&rates)?)
         })
         .collect()
-}
-
-/// The refusal of bodies that Nitsche's method holds.
-pub(super) fn imposed_weakly() -> ModelError {
-    ModelError::Unsupported(
-        "reduced models need nodal values that are held exactly: use essential = \"transformation\"".into(),
-    )
 }
 
 /// A displacement gradient with its components in a row: xx, xy, yx, yy.

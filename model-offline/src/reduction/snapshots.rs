@@ -5,12 +5,12 @@ use super::lifting::control_values;
 use super::online::Domain;
 use crate::model::Body;
 use crate::parallel;
+use crate::random::SplitMix64;
 use crate::solver::equilibrium::{Failure, LinearSolver, NewtonSettings};
 use nalgebra::Vector2;
 use std::ops::Range;
 
-/// Depths of the snapshots over the trained depth, with a paddle (at nine places). Denser towards the end, where the
-/// response bends most.
+/// Depths of the snapshots over the trained depth, with a paddle. Denser towards the end, where the response bends most.
 const DEPTHS: [f64; 5] = [0.0, 0.3, 0.6, 0.8, 1.0];
 /// The same without a paddle, where depth is all there is: enough for modes that are used and modes that watch them.
 const DEPTHS_ALONE: [f64; 12] = [0.08, 0.17, 0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 0.75, 0.83, 0.92, 1.0];
@@ -40,6 +40,28 @@ pub(super) struct Snapshot {
     pub target: Vector2<f64>,
 }
 
+/// Where snapshots are taken, over the domain.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    /// Paddle positions over the domain's largest.
+    places: Vec<Vector2<f64>>,
+    /// Depths over the domain's.
+    depths: &'static [f64],
+}
+
+impl Grid {
+    /// For a body without a paddle.
+    pub(super) fn of_depths() -> Self {
+        Self { places: vec![Vector2::zeros()], depths: &DEPTHS_ALONE }
+    }
+
+    /// Three by three paddle positions, at every depth.
+    pub(super) fn with_paddle() -> Self {
+        let place = |k: i32| Vector2::new(f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0);
+        Self { places: (0..9).map(place).collect(), depths: &DEPTHS }
+    }
+}
+
 /// Everything that the full model is asked.
 pub(super) struct States {
     pub snapshots: Vec<Snapshot>,
@@ -54,17 +76,18 @@ pub(super) struct States {
 /// [`TrainingError::TooShallow`] or [`TrainingError::Unstable`].
 pub(super) fn states(
     at_rest: &Body<'_>,
-    with_paddle: bool,
+    grid: &Grid,
     mut asked: Domain,
-    (drawn, threads): (u32, usize),
+    drawn: u32,
+    threads: usize,
 ) -> Result<States, TrainingError> {
     let mut failed = None;
     for _ in 0..=SHRINKS {
-        let (mut snapshots, mut domain) = take_snapshots(at_rest, with_paddle, asked, threads)?;
+        let (mut snapshots, mut domain) = take_snapshots(at_rest, grid, asked, threads)?;
         if domain.depth < asked.depth {
             // The tissue does not reach the depth with the paddle everywhere: again, as far as it does.
             asked = domain;
-            (snapshots, domain) = take_snapshots(at_rest, with_paddle, asked, threads)?;
+            (snapshots, domain) = take_snapshots(at_rest, grid, asked, threads)?;
         }
         match draw(at_rest, domain, 0..drawn, threads) {
             Ok(drawn) => return Ok(States { snapshots, drawn, domain }),
@@ -78,22 +101,15 @@ pub(super) fn states(
 /// Full solutions on a grid of paddle positions and depths, and the domain that all of them reached.
 fn take_snapshots(
     at_rest: &Body<'_>,
-    with_paddle: bool,
+    grid: &Grid,
     asked: Domain,
     threads: usize,
 ) -> Result<(Vec<Snapshot>, Domain), TrainingError> {
-    let (places, depths): (Vec<Vector2<f64>>, &[f64]) = match with_paddle {
-        false => (vec![Vector2::zeros()], &DEPTHS_ALONE),
-        true => {
-            let place = |k: i32| Vector2::new(f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0) * asked.paddle;
-            ((0..9).map(place).collect(), &DEPTHS)
-        }
-    };
-    let runs = parallel::map(places.len(), threads, |k| {
+    let runs = parallel::map(grid.places.len(), threads, |k| {
         let mut body = at_rest.clone();
         let mut taken = Vec::new();
-        for depth in depths.iter().map(|share| share * asked.depth) {
-            if body.drive(depth, places[k]).is_err() {
+        for depth in grid.depths.iter().map(|share| share * asked.depth) {
+            if body.drive(depth, grid.places[k] * asked.paddle).is_err() {
                 break;
             }
             taken.push(snapshot(&body));
@@ -105,7 +121,7 @@ fn take_snapshots(
         return Err(TrainingError::TooShallow { reached, asked: asked.depth });
     }
     let complete = runs.iter().map(|run| run.0.len()).min().unwrap_or(0);
-    let depth = if complete == depths.len() { asked.depth } else { KEPT * reached };
+    let depth = if complete == grid.depths.len() { asked.depth } else { KEPT * reached };
     let kept = runs.into_iter().flat_map(|run| run.0.into_iter().take(complete));
     // The state at rest teaches nothing.
     let kept = kept.filter(|s| s.controls.iter().any(|c| *c != 0.0)).collect();
@@ -125,8 +141,8 @@ fn draw(at_rest: &Body<'_>, domain: Domain, which: Range<u32>, threads: usize) -
     let first = which.start;
     let states = parallel::map(which.len(), threads, |k| {
         let mut random = SplitMix64(u64::from(first) + k as u64);
-        let depth = random.next() * domain.depth;
-        let place = Vector2::new(2.0 * random.next() - 1.0, 2.0 * random.next() - 1.0) * domain.paddle;
+        let depth = random.unit() * domain.depth;
+        let place = Vector2::new(random.symmetric(), random.symmetric()) * domain.paddle;
         let mut body = at_rest.clone();
         body.equilibrium_mut().set_settings(NewtonSettings::default());
         body.drive(depth, place).map_err(|failure| unstable(depth, place, failure))?;
@@ -137,16 +153,4 @@ fn draw(at_rest: &Body<'_>, domain: Domain, which: Range<u32>, threads: usize) -
 
 fn unstable(depth: f64, place: Vector2<f64>, failure: Failure) -> TrainingError {
     TrainingError::Unstable { depth, x: place.x, y: place.y, failure }
-}
-
-/// Steele, Lea & Flood, OOPSLA 2014; as numbers in [0, 1).
-struct SplitMix64(u64);
-
-impl SplitMix64 {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
 }

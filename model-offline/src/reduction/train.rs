@@ -4,7 +4,7 @@ use super::condensed::Condensed;
 pub use super::error::TrainingError;
 use super::lifting::lifting;
 use super::online::{Domain, Invalid, ReducedModel};
-use super::snapshots::{SNAPSHOT_SETTINGS, Snapshot, States, states};
+use super::snapshots::{Grid, SNAPSHOT_SETTINGS, Snapshot, States, states};
 use super::space::{GUARDS, MODES, Size, Space};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::controllability::best_direction;
@@ -105,8 +105,8 @@ pub fn train(
             None => workspace(model, paddle)?,
         },
     };
-    let drawn = ((CALIBRATION + FRESH) as u32, options.threads);
-    let states = states(&at_rest, paddle.is_some(), asked, drawn)?;
+    let grid = if paddle.is_some() { Grid::with_paddle() } else { Grid::of_depths() };
+    let states = states(&at_rest, &grid, asked, (CALIBRATION + FRESH) as u32, options.threads)?;
     drop(at_rest);
     let space = Space::new(model, &lifts, &states.snapshots);
     smallest(model, &space, &states, options.tolerance)
@@ -304,7 +304,7 @@ mod tests {
         let at_rest = model.body(Some(2), SNAPSHOT_SETTINGS).unwrap();
         let lifts = lifting(&model, Some(2), at_rest.clone()).unwrap();
         let domain = Domain { depth: 0.1, paddle: 0.02 };
-        let states = states(&at_rest, true, domain, (4, 1)).unwrap();
+        let states = states(&at_rest, &Grid::with_paddle(), domain, 4, 1).unwrap();
         let space = Space::new(&model, &lifts, &states.snapshots);
         let mut sampling = space.sampling(&model, Size { modes: 4, guards: 4 });
         for misfit in SAMPLING_TOLERANCES {

@@ -52,7 +52,7 @@ pub struct Unknowns<'a> {
 
 /// How well a system is solved that is not solved to rounding.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Accuracy {
+pub(super) struct SolveAccuracy {
     /// Error over the solution, in the norm of energy.
     pub relative: f64,
     /// Largest violation of the constraints, length units.
@@ -207,7 +207,7 @@ impl<const D: usize> ConstrainedSolver<D> {
         &mut self,
         rhs: &[f64],
         gap: &[f64],
-        accuracy: Accuracy,
+        accuracy: SolveAccuracy,
         solution: Unknowns<'_>,
     ) -> Result<u32, Breakdown> {
         self.first_right_side(rhs, gap, &solution);

@@ -9,7 +9,7 @@ use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
 use crate::reduction::{Condensed, Invalid, TrainingOptions, train};
 use crate::scene::Scene;
-use crate::solver::equilibrium::{Failure, LinearSolver, NewtonSettings};
+use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::Vector2;
 use std::convert::Infallible;
 use std::time::Instant;
@@ -26,7 +26,7 @@ const TICKS: u32 = 2000;
 /// body's law and the inclusions' own; and the barrier added, stress units.
 ///
 /// # Errors
-/// [`ModelError::Unsupported`] when the law cannot take a barrier.
+/// [`ModelError::Material`] when the law cannot take a barrier.
 pub fn with_mesh_limit(scene: &Scene) -> Result<(Scene, Option<f64>), ModelError> {
     if scene.material.has_mesh_limit() {
         return Ok((scene.clone(), None));
@@ -34,7 +34,7 @@ pub fn with_mesh_limit(scene: &Scene) -> Result<(Scene, Option<f64>), ModelError
     let beta = BARRIER_SHARE * Material::<2>::rest_stiffness(&scene.material);
     let with = |material: &Law| {
         let own = BARRIER_SHARE * Material::<2>::rest_stiffness(material);
-        material.clone().with_barrier(own).map_err(|e| ModelError::Unsupported(e.to_string()))
+        material.clone().with_barrier(own)
     };
     let mut limited = scene.clone();
     limited.material = with(&scene.material)?;
@@ -50,7 +50,7 @@ pub fn with_mesh_limit(scene: &Scene) -> Result<(Scene, Option<f64>), ModelError
 pub type Profile = Vec<Vec<Vector2<f64>>>;
 
 /// The insertion by every method, and the fine one that they are held against.
-pub(super) struct Insertion {
+pub(super) struct InsertionComparison {
     pub points: Vec<Point>,
     pub reference: Profile,
     /// Distance of the reference's two levels.
@@ -105,7 +105,7 @@ fn build(scene: &Scene, discretization: Discretization) -> Result<TissueModel, M
 }
 
 /// Runs the insertion with each method, by the nonlinear law and by the linear one.
-pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertion, ModelError> {
+pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<InsertionComparison, ModelError> {
     let finest = extent.choose(2, 1);
     let model = build(scene, fine(scene, finest))?;
     let (reference, coarser) = (profile(&model)?, profile(&build(scene, fine(scene, finest - 1))?)?);
@@ -144,7 +144,7 @@ pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertio
             }
         }
     }
-    Ok(Insertion { points, reference, open, reference_nodes: model.nodes() })
+    Ok(InsertionComparison { points, reference, open, reference_nodes: model.nodes() })
 }
 
 /// Times one tick of a simulated insertion with each kind of plant.
@@ -161,7 +161,7 @@ pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) ->
         let paddle = best_dynamic(&model)?;
         let reference = vec![reference[paddle].clone()];
         let ticks = extent.choose(TICKS, 200);
-        let mut body = model.body(Some(paddle), TICK_SETTINGS)?;
+        let mut body = model.body(Some(paddle), NewtonSettings::SMALL_STEPS)?;
         let full = time_ticks(scene, ticks, |depth| -> Result<_, Failure> {
             body.drive(depth, Vector2::zeros())?;
             Ok(body.target_displacement())
@@ -207,18 +207,6 @@ fn timed<E: std::fmt::Display>(mut point: Point, reference: &Profile, measured: 
     }
     point
 }
-
-/// Newton's method for the small steps of a simulator: the last factor nearly always does.
-pub(super) const TICK_SETTINGS: NewtonSettings = NewtonSettings {
-    residual_tolerance: 1e-7,
-    step_tolerance: 1e-6,
-    max_iterations: 25,
-    max_cutbacks: 8,
-    line_search: true,
-    require_stability: true,
-    reuse_tangent: true,
-    linear_solver: LinearSolver::BySize,
-};
 
 fn best_dynamic(model: &TissueModel) -> Result<usize, ModelError> {
     let index = crate::placement::study::best_dynamic(model)?;

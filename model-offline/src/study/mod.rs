@@ -1,7 +1,6 @@
 //! Studies of the methods themselves: which is fast, which is accurate, and where each stops working.
 
 pub mod candidates;
-mod cost;
 pub mod extent;
 pub mod fit;
 pub mod insertion;
@@ -9,7 +8,6 @@ mod looks;
 pub mod measurement;
 pub mod pareto;
 mod pareto_chart;
-mod search;
 pub mod stability;
 pub mod sweep;
 

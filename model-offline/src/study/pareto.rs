@@ -7,12 +7,13 @@
 //!   by the linear one; on a law that has a mesh limit at finite depth.
 //! - `step`: one tick of a simulator: the full, the reduced and the condensed model, against the same fine insertion.
 
-use super::candidates::{families, measure};
+use super::candidates::{assess, families};
 use super::extent::Extent;
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
 use super::measurement::{Job, Linearity, Point};
 use crate::discretization::Discretization;
 use crate::model::ModelError;
+use crate::output::csv::table;
 use crate::placement::adaptive::Reference;
 use crate::scene::Scene;
 use strum::VariantArray as _;
@@ -76,10 +77,10 @@ pub fn compare(scene: &Scene, extent: Extent, progress: &dyn Fn(f64)) -> Result<
 fn placement_point(discretization: Discretization, scene: &Scene, reference: &Reference) -> Point {
     let mut point = Point::new(Job::Placement, discretization, Linearity::Linear);
     let start = std::time::Instant::now();
-    match measure(discretization, scene, reference, REPEATS) {
-        Ok(measured) => {
-            (point.nodes, point.spacing, point.wall_s) = (measured.nodes, measured.spacing, measured.wall_s);
-            (point.error_cm, point.error_static) = measured.errors;
+    match assess(discretization, scene, reference, REPEATS) {
+        Ok(found) => {
+            (point.nodes, point.spacing, point.wall_s) = (found.nodes, found.spacing, found.wall_s);
+            (point.error_cm, point.error_static) = found.errors;
         }
         Err(error) => {
             point.wall_s = start.elapsed().as_secs_f64();
@@ -103,6 +104,26 @@ fn mark_front(points: &mut [Point], job: Job) {
     }
 }
 
+/// Columns of the CSV.
+const COLUMNS: [&str; 16] = [
+    "method",
+    "basis",
+    "integration",
+    "graded",
+    "spacing",
+    "support",
+    "nodes",
+    "dofs",
+    "law",
+    "wall_s",
+    "error_cm",
+    "error_static",
+    "failed",
+    "on_front",
+    "job",
+    "reason",
+];
+
 impl Pareto {
     /// The points of a job's front, fastest first.
     pub fn front(&self, job: Job) -> Vec<&Point> {
@@ -112,15 +133,12 @@ impl Pareto {
     }
 
     /// The comparison as CSV, one line per setting. Times in s; errors relative.
-    pub fn csv(&self) -> String {
-        let mut out = String::from(
-            "method,basis,integration,graded,spacing,support,nodes,dofs,law,wall_s,error_cm,error_static,failed,on_front,job,reason\n",
-        );
+    pub fn csv(&self) -> Vec<u8> {
         let number = |x: f64| if x.is_finite() { format!("{x:.6e}") } else { String::new() };
-        for p in &self.points {
+        table(COLUMNS, &self.points, |p| {
             let method = p.discretization.method;
             let element = method.integration.is_element();
-            let fields = [
+            [
                 p.method.to_string(),
                 method.displacement_basis().to_string(),
                 method.integration.to_string(),
@@ -136,13 +154,9 @@ impl Pareto {
                 p.failure.is_some().to_string(),
                 p.on_front.to_string(),
                 p.job.to_string(),
-                // One line, no quotes to escape.
-                p.failure.as_deref().unwrap_or("").replace([',', '"', '\n'], ";"),
-            ];
-            out.push_str(&fields.join(","));
-            out.push('\n');
-        }
-        out
+                p.failure.clone().unwrap_or_default(),
+            ]
+        })
     }
 }
 
@@ -179,8 +193,9 @@ mod tests {
             assert!(front.windows(2).all(|w| w[0].wall_s <= w[1].wall_s && w[0].error() > w[1].error()));
         }
         let csv = pareto.csv();
-        assert_eq!(csv.lines().count(), pareto.points.len() + 1);
-        assert!(csv.lines().all(|line| line.matches(',').count() == 15));
+        let mut lines = csv::Reader::from_reader(csv.as_slice());
+        assert_eq!(lines.headers().unwrap(), COLUMNS.as_slice());
+        assert_eq!(lines.records().map(Result::unwrap).count(), pareto.points.len());
         // The linear law is cheaper and, at full depth, worse than the nonlinear one on the same nodes.
         let by_law = |law: Linearity| {
             pareto.points.iter().find(|p| {

@@ -4,6 +4,7 @@ use super::candidates::base_spacing;
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Series};
+use crate::output::csv;
 use crate::parallel;
 use crate::placement::adaptive::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
@@ -19,7 +20,7 @@ const REFERENCE_SHARE: f64 = 2e-3;
 
 /// One mesh.
 #[derive(Debug, Clone)]
-pub struct Step {
+pub struct Mesh {
     /// The discretization.
     pub discretization: Discretization,
     /// Number of nodes.
@@ -33,7 +34,7 @@ pub struct Step {
 pub struct Sweep {
     scene: Scene,
     /// Every mesh, method by method from coarse to fine.
-    pub steps: Vec<Step>,
+    pub steps: Vec<Mesh>,
     /// The continuum limit that they go to.
     pub reference: Reference,
 }
@@ -57,13 +58,25 @@ pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Res
         let nodes = model.as_ref().map_or(0, TissueModel::nodes);
         let responses = model.and_then(|model| rest_responses(&model));
         progress();
-        Step { discretization, nodes, responses }
+        Mesh { discretization, nodes, responses }
     });
     Ok(Sweep { scene: scene.clone(), steps, reference })
 }
 
 /// Number of times [`sweep`] calls its progress function.
 pub const STEPS: u64 = 3 * SPACINGS.len() as u64 + 6;
+
+/// Columns of the CSV.
+const COLUMNS: [&str; 8] = [
+    "integration",
+    "mesh",
+    "nodes",
+    "paddle",
+    "controllability_measure",
+    "orthogonal_per_depth",
+    "best_static",
+    "best_dynamic",
+];
 
 impl Sweep {
     fn orthogonal(&self, response: &RestResponse) -> f64 {
@@ -94,25 +107,24 @@ impl Sweep {
     }
 
     /// One line per mesh and paddle.
-    pub fn csv(&self) -> String {
-        let mut out = String::from(
-            "integration,mesh,nodes,paddle,controllability_measure,orthogonal_per_depth,best_static,best_dynamic\n",
-        );
-        for (rule, mesh, nodes, responses) in self.rows() {
-            let (best_static, best_dynamic) = self.optima(responses);
-            for (paddle, response) in self.scene.paddles.iter().zip(responses) {
-                let _ = writeln!(
-                    out,
-                    "{rule},{mesh},{nodes},{},{:.6},{:.6},{},{}",
-                    paddle.index,
-                    response.controllability_measure,
-                    self.orthogonal(response),
-                    paddle.index == best_static,
-                    paddle.index == best_dynamic
-                );
-            }
-        }
-        out
+    pub fn csv(&self) -> Vec<u8> {
+        let lines = self.rows().flat_map(|(rule, mesh, nodes, responses)| {
+            let optima = self.optima(responses);
+            let paddles = self.scene.paddles.iter().zip(responses);
+            paddles.map(move |(paddle, response)| (rule.clone(), mesh.clone(), nodes, optima, paddle.index, response))
+        });
+        csv::table(COLUMNS, lines, |(rule, mesh, nodes, (best_static, best_dynamic), paddle, response)| {
+            [
+                rule,
+                mesh,
+                nodes.to_string(),
+                paddle.to_string(),
+                format!("{:.6}", response.controllability_measure),
+                format!("{:.6}", self.orthogonal(response)),
+                (paddle == best_static).to_string(),
+                (paddle == best_dynamic).to_string(),
+            ]
+        })
     }
 
     /// Best paddles, mesh by mesh.
@@ -134,7 +146,7 @@ impl Sweep {
     /// Best paddles on the coarsest and on the finest mesh of a rule, and in the limit.
     fn moves(&self, rule: Integration) -> [(u32, u32); 3] {
         let of_rule = || self.steps.iter().filter(|step| step.discretization.method.integration == rule);
-        let optima = |step: Option<&Step>| {
+        let optima = |step: Option<&Mesh>| {
             step.and_then(|step| step.responses.as_deref().ok()).map_or((0, 0), |responses| self.optima(responses))
         };
         [optima(of_rule().next()), optima(of_rule().next_back()), self.optima(self.reference.responses())]
@@ -223,6 +235,6 @@ mod tests {
             assert!(optima.iter().all(|o| o.1 == 3), "{rule:?}: {optima:?}");
         }
         assert_eq!(sweep.steps.len() as u64, STEPS);
-        assert_eq!(sweep.csv().lines().count(), 1 + 5 * (sweep.steps.len() + 1));
+        assert_eq!(sweep.csv().iter().filter(|&&byte| byte == b'\n').count(), 1 + 5 * (sweep.steps.len() + 1));
     }
 }

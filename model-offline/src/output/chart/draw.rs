@@ -1,11 +1,11 @@
 //! Panels as shapes: heading, axes, marks, legend, from top to bottom.
 
 use super::drawing::{Anchor, Drawing, MARKER, Px, TEXT, TITLE, text_width, wrap};
-use super::frame::Frame;
 use super::legend::{Key, Legend};
 use super::notes::{self, Box2};
 use super::number::number;
 use super::panel::{Bars, Dash, Panel, Place, ReferenceLine, Series};
+use super::plot_area::PlotArea;
 use super::style::Colour;
 
 /// Height of the rectangle between the axes, px.
@@ -65,7 +65,7 @@ pub(super) struct Layout {
     title: Vec<String>,
     ordinate: Vec<String>,
     abscissa: Vec<String>,
-    frame: Frame,
+    frame: PlotArea,
     width: f64,
     /// Height of the tick labels below the axes, px.
     ticks: f64,
@@ -90,7 +90,7 @@ impl Layout {
             ordinate: wrap(&y.label, width, TEXT),
             abscissa: wrap(&x.label, size[0], TEXT),
             ticks: LINE * rows as f64,
-            frame: Frame { x, y, corner: [left, 0.0], size, band },
+            frame: PlotArea { x, y, corner: [left, 0.0], size, band },
             width,
             legend: legend(panel),
         }
@@ -135,7 +135,7 @@ pub(super) fn draw(panel: &Panel, layout: &Layout, head: f64, legend: &Legend) -
     let height = head + PLOT + below + legend.height(layout.width - LEFT);
     let label = if panel.description.is_empty() { &panel.title } else { &panel.description };
     let mut drawing = Drawing::new([layout.width, height], label.clone());
-    let frame = Frame { corner: [layout.frame.corner[0], head], ..layout.frame.clone() };
+    let frame = PlotArea { corner: [layout.frame.corner[0], head], ..layout.frame.clone() };
     for (i, line) in layout.title.iter().enumerate() {
         drawing.text("title", [0.0, 13.0 + TITLE_LINE * i as f64], Anchor::Start, line);
     }
@@ -155,7 +155,7 @@ pub(super) fn draw(panel: &Panel, layout: &Layout, head: f64, legend: &Legend) -
     drawing
 }
 
-fn axes(drawing: &mut Drawing, frame: &Frame) {
+fn axes(drawing: &mut Drawing, frame: &PlotArea) {
     let [left, top] = frame.corner;
     let (right, bottom) = (frame.right(), frame.bottom());
     let mut free = f64::NEG_INFINITY;
@@ -194,7 +194,7 @@ fn axes(drawing: &mut Drawing, frame: &Frame) {
     drawing.line("axis", [left, frame.top()], [left, bottom]);
 }
 
-fn marks(drawing: &mut Drawing, panel: &Panel, frame: &Frame) {
+fn marks(drawing: &mut Drawing, panel: &Panel, frame: &PlotArea) {
     let (top, bottom) = (frame.top(), frame.bottom());
     for strip in &panel.strips {
         let [from, to] = strip.range.map(|x| frame.clamped((x, frame.y.range[0]))[0]);
@@ -235,7 +235,7 @@ fn marks(drawing: &mut Drawing, panel: &Panel, frame: &Frame) {
 }
 
 /// Draws a series and adds what it covers.
-fn draw_series(drawing: &mut Drawing, series: &Series, frame: &Frame, taken: &mut Vec<Box2>) {
+fn draw_series(drawing: &mut Drawing, series: &Series, frame: &PlotArea, taken: &mut Vec<Box2>) {
     if let Some(dash) = series.line {
         for piece in frame.pieces(&series.points) {
             drawing.polyline(&line_class(series.colour, dash), &piece);

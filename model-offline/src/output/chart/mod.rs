@@ -37,12 +37,12 @@ mod axis;
 mod draw;
 mod drawing;
 mod figure;
-mod frame;
 mod legend;
 mod notes;
 pub mod number;
 mod panel;
 mod plane;
+mod plot_area;
 mod ramp;
 pub mod style;
 

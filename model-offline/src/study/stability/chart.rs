@@ -2,7 +2,7 @@
 
 use super::super::looks::look;
 use super::plan::{Entry, Parameter, SOLVERS, base};
-use super::{Outcome, Stability};
+use super::{ExperimentResult, Stability};
 use crate::discretization::Integration;
 use crate::output::chart::number::plain;
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
@@ -31,11 +31,11 @@ fn empty_series(integration: Integration) -> Series {
 }
 
 /// Where a run stands along an abscissa; none where it is not part of the panel.
-type Abscissa<'a> = &'a dyn Fn(&Entry, &Outcome) -> Option<f64>;
+type Abscissa<'a> = &'a dyn Fn(&Entry, &ExperimentResult) -> Option<f64>;
 
 /// One series per method of the rows that `place` puts on the x axis; several rows at one x become their median. A run
 /// without a model is a failure at depth 0.
-fn by_method(study: &Stability, place: Abscissa<'_>, height: fn(&Outcome) -> f64) -> Vec<Series> {
+fn by_method(study: &Stability, place: Abscissa<'_>, height: fn(&ExperimentResult) -> f64) -> Vec<Series> {
     let of_method = |&method: &Integration| {
         let mut groups: Vec<(f64, Vec<f64>)> = Vec::new();
         let mut series = empty_series(method);
@@ -107,7 +107,7 @@ fn named_axis(study: &Stability, quantity: &str, parameter: Parameter) -> Axis {
 }
 
 /// Where a value stands on [`named_axis`].
-fn named_place(study: &Stability, parameter: Parameter) -> impl Fn(&Entry, &Outcome) -> Option<f64> {
+fn named_place(study: &Stability, parameter: Parameter) -> impl Fn(&Entry, &ExperimentResult) -> Option<f64> {
     let values = values(study, parameter);
     let spacing = study.spacing;
     move |e, _| {
@@ -180,8 +180,8 @@ fn conclusion(study: &Stability) -> Option<String> {
 pub fn figure(study: &Stability) -> Figure {
     let unit = study.scene.length_unit.as_str();
     let same = |v: f64| v;
-    let spacing = |e: &Entry, _: &Outcome| (e.parameter == Parameter::Spacing).then_some(e.value);
-    let nodes = |e: &Entry, o: &Outcome| (e.parameter == Parameter::Spacing).then_some(o.nodes as f64);
+    let spacing = |e: &Entry, _: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(e.value);
+    let nodes = |e: &Entry, o: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(o.nodes as f64);
     let means = SOLVERS.iter().map(|s| s.replace("line-search", "search").replace("both+barrier", "both\n+barrier"));
     let mut panels = vec![
         depth_panel(study, "Node spacing", Axis::log("spacing", unit), &spacing),

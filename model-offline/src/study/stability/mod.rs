@@ -12,8 +12,8 @@ pub mod probe;
 pub mod zero_energy;
 
 mod chart;
+mod claim;
 mod files;
-mod verdict;
 
 use crate::discretization::Resolution;
 use crate::model::ModelError;
@@ -21,13 +21,13 @@ use crate::parallel;
 use crate::scene::Scene;
 use crate::study::extent::Extent;
 use law_limit::{Lateral, limit_stretch};
-use plan::{Entry, Setting};
-use probe::Outcome;
+use plan::{Entry, Experiment};
+use probe::ExperimentResult;
 use zero_energy::ZeroEnergy;
 
 pub use chart::figure;
+pub use claim::{ClaimCounts, Pairs, claim_counts, summary};
 pub use files::{csv, zero_energy_csv};
-pub use verdict::{Pairs, Verdict, summary, verdict};
 
 /// Whether the law with some factor c has a limit in compression, and where.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,7 +50,7 @@ pub struct Stability {
     /// Index of the paddle that was attached, static.
     pub paddle: u32,
     /// What was varied, and what came of it, in the order of the files.
-    pub rows: Vec<(Entry, Outcome)>,
+    pub rows: Vec<(Entry, ExperimentResult)>,
     /// Limits of the scene's law, and of the law with every c that was tried.
     pub limits: Vec<LawLimit>,
     /// Zero-energy modes by method.
@@ -59,8 +59,8 @@ pub struct Stability {
 
 impl Stability {
     /// Every setting once, however many sweeps it is part of.
-    pub fn distinct(&self) -> Vec<(Setting, &Outcome)> {
-        let mut distinct: Vec<(Setting, &Outcome)> = Vec::new();
+    pub fn distinct(&self) -> Vec<(Experiment, &ExperimentResult)> {
+        let mut distinct: Vec<(Experiment, &ExperimentResult)> = Vec::new();
         for (entry, outcome) in &self.rows {
             if !distinct.iter().any(|d| d.0 == entry.setting) {
                 distinct.push((entry.setting, outcome));
@@ -75,14 +75,14 @@ impl Stability {
 pub struct Plan {
     entries: Vec<Entry>,
     /// Settings that differ, finest first, so that long runs do not come last.
-    settings: Vec<Setting>,
+    settings: Vec<Experiment>,
 }
 
 impl Plan {
     /// What the study of a scene will run. Empty when the scene's resolution is not a spacing.
     pub fn new(scene: &Scene, extent: Extent) -> Self {
         let entries = plan::entries(scene, extent);
-        let mut settings: Vec<Setting> = Vec::new();
+        let mut settings: Vec<Experiment> = Vec::new();
         for entry in &entries {
             if !settings.contains(&entry.setting) {
                 settings.push(entry.setting);
@@ -110,13 +110,9 @@ impl Plan {
         progress: &(dyn Fn() + Sync),
     ) -> Result<Stability, ModelError> {
         let Resolution::Spacing(spacing) = scene.discretization.resolution else {
-            return Err(ModelError::Unsupported("the study varies a spacing: give one instead of a tolerance".into()));
+            return Err(ModelError::NoSpacing);
         };
-        let place = scene
-            .paddles
-            .iter()
-            .position(|p| p.index == paddle)
-            .ok_or_else(|| ModelError::Unsupported(format!("the scene has no paddle {paddle}")))?;
+        let place = scene.paddles.iter().position(|p| p.index == paddle).ok_or(ModelError::NoSuchPaddle(paddle))?;
         let outcomes = parallel::map(self.settings.len(), threads, |i| {
             let outcome = probe::run(scene, place, &self.settings[i]);
             progress();

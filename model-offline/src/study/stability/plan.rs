@@ -8,7 +8,7 @@ use strum::VariantArray as _;
 
 /// Everything that decides a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setting {
+pub struct Experiment {
     /// Method.
     pub method: Method,
     /// Node spacing, length units.
@@ -87,7 +87,7 @@ pub struct Entry {
     /// Its value.
     pub value: f64,
     /// All of the setting.
-    pub setting: Setting,
+    pub setting: Experiment,
 }
 
 impl Entry {
@@ -101,8 +101,8 @@ impl Entry {
 }
 
 /// The scene's own setting with a method at a spacing.
-pub fn base(scene: &Scene, integration: Integration, spacing: f64) -> Setting {
-    Setting {
+pub fn base(scene: &Scene, integration: Integration, spacing: f64) -> Experiment {
+    Experiment {
         method: Method { integration, ..scene.discretization.method },
         spacing,
         jitter: 0.0,
@@ -198,50 +198,50 @@ fn stress_scale(scene: &Scene) -> f64 {
     (1e12 * scale).round() / 1e12
 }
 
-fn sweeps(scene: &Scene, base: Setting, values: &Values, out: &mut Vec<Entry>) {
+fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>) {
     let mut push = |parameter, value, setting| out.push(Entry { parameter, value, setting });
     if !base.method.integration.is_element() {
         for &support in &values.support {
-            push(Parameter::Support, support, Setting { method: Method { support, ..base.method }, ..base });
+            push(Parameter::Support, support, Experiment { method: Method { support, ..base.method }, ..base });
         }
     }
     for &percent in values.jitter {
         // Without jitter every seed gives the same nodes.
         for seed in 0..if percent == 0.0 { 1 } else { values.seeds } {
-            push(Parameter::Jitter, percent, Setting { jitter: 0.01 * percent, seed, ..base });
+            push(Parameter::Jitter, percent, Experiment { jitter: 0.01 * percent, seed, ..base });
         }
     }
     if !scene.inclusions.is_empty() {
         for &contrast in values.contrast {
-            push(Parameter::Contrast, contrast, Setting { contrast: Some(contrast), ..base });
+            push(Parameter::Contrast, contrast, Experiment { contrast: Some(contrast), ..base });
         }
     }
     if scene.material.with_poisson_ratio(0.3).is_some() {
         for &poisson in values.poisson {
-            push(Parameter::Poisson, poisson, Setting { poisson: Some(poisson), ..base });
+            push(Parameter::Poisson, poisson, Experiment { poisson: Some(poisson), ..base });
         }
     }
     if scene.material.with_exponential_factor(0.0).is_some() {
         for c in values.c.iter().map(|c| c * stress_scale(scene)) {
-            push(Parameter::C, c, Setting { c: Some(c), ..base });
+            push(Parameter::C, c, Experiment { c: Some(c), ..base });
         }
     }
-    let plain = Setting { line_search: false, cutback: false, ..base };
+    let plain = Experiment { line_search: false, cutback: false, ..base };
     for &increments in values.increments {
-        push(Parameter::Increments, f64::from(increments), Setting { increments, ..base });
-        push(Parameter::IncrementsPlain, f64::from(increments), Setting { increments, ..plain });
+        push(Parameter::Increments, f64::from(increments), Experiment { increments, ..base });
+        push(Parameter::IncrementsPlain, f64::from(increments), Experiment { increments, ..plain });
     }
     let means = [
         plain,
-        Setting { cutback: false, ..base },
-        Setting { line_search: false, ..base },
+        Experiment { cutback: false, ..base },
+        Experiment { line_search: false, ..base },
         base,
-        Setting { barrier: Some(1.0), ..base },
+        Experiment { barrier: Some(1.0), ..base },
     ];
     for (place, setting) in means.into_iter().enumerate() {
         push(Parameter::Solver, place as f64, setting);
     }
     for &barrier in values.barrier {
-        push(Parameter::Barrier, barrier, Setting { barrier: Some(barrier), ..base });
+        push(Parameter::Barrier, barrier, Experiment { barrier: Some(barrier), ..base });
     }
 }

@@ -1,11 +1,12 @@
 //! One run: the needle goes in until something gives.
 
-use super::plan::Setting;
+use super::plan::Experiment;
 use crate::discretization::lattice::lattice_nodes;
 use crate::discretization::{DiscretizationError, Planar};
 use crate::geometry::{Location, Point2, distance_to_polyline};
 use crate::material::{Law, Material as _, MaterialError};
 use crate::model::{ModelError, TissueModel};
+use crate::random::SplitMix64;
 use crate::scene::Scene;
 use crate::solver::equilibrium::{FailureReason, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
@@ -18,7 +19,7 @@ const MAX_CUTBACKS: u32 = 4;
 
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Reason {
+pub enum StopReason {
     /// It did not: the needle went as far as it was driven.
     #[error("reached")]
     Reached,
@@ -44,13 +45,13 @@ pub enum Reason {
 
 /// What came of a run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct ExperimentResult {
     /// Nodes of the model; those asked for when there is none.
     pub nodes: usize,
     /// Depth of the last converged state, length units.
     pub depth: f64,
     /// Why it ended there.
-    pub reason: Reason,
+    pub reason: StopReason,
     /// Numbers behind the reason.
     pub detail: String,
     /// Smallest principal stretch at the integration points of the last converged state.
@@ -63,8 +64,8 @@ pub struct Outcome {
 }
 
 /// Runs a setting with the paddle at this place of the scene's list static.
-pub fn run(scene: &Scene, paddle: usize, setting: &Setting) -> Outcome {
-    let stopped = |nodes: usize, error: ModelError| Outcome {
+pub fn run(scene: &Scene, paddle: usize, setting: &Experiment) -> ExperimentResult {
+    let stopped = |nodes: usize, error: ModelError| ExperimentResult {
         nodes,
         depth: 0.0,
         reason: reason_of(&error),
@@ -76,8 +77,7 @@ pub fn run(scene: &Scene, paddle: usize, setting: &Setting) -> Outcome {
     let scene = match varied(scene, setting) {
         Ok(scene) => scene,
         Err(error) => {
-            let none = stopped(0, ModelError::Unsupported(error.to_string()));
-            return Outcome { reason: Reason::UnstableLaw, ..none };
+            return ExperimentResult { reason: StopReason::UnstableLaw, ..stopped(0, error.into()) };
         }
     };
     let nodes = jittered(&scene, setting);
@@ -95,16 +95,16 @@ pub fn run(scene: &Scene, paddle: usize, setting: &Setting) -> Outcome {
         Ok(body) => body,
         Err(failure) => return stopped(model.nodes(), failure.into()),
     };
-    let (mut reason, mut detail) = (Reason::Reached, String::new());
+    let (mut reason, mut detail) = (StopReason::Reached, String::new());
     for increment in 1..=BEYOND * setting.increments {
         let depth = scene.needle.depth * f64::from(increment) / f64::from(setting.increments);
         if let Err(failure) = body.drive(depth, Vector2::zeros()) {
-            (reason, detail) = (Reason::Solve(failure.reason), failure.detail);
+            (reason, detail) = (StopReason::Solve(failure.reason), failure.detail);
             break;
         }
     }
     let gradients = body.equilibrium().state().displacement_gradients();
-    Outcome {
+    ExperimentResult {
         nodes: model.nodes(),
         depth: body.depth(),
         reason,
@@ -138,20 +138,20 @@ fn smallest_acoustic(law: &Law, h: &Matrix2<f64>) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-fn reason_of(error: &ModelError) -> Reason {
+fn reason_of(error: &ModelError) -> StopReason {
     match error {
         ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_)) => {
-            Reason::SingularMomentMatrix
+            StopReason::SingularMomentMatrix
         }
-        ModelError::Discretization(DiscretizationError::Triangulation(_)) => Reason::NoTriangulation,
-        ModelError::Solve(failure) => Reason::Solve(failure.reason),
-        ModelError::NothingConstrained(_) => Reason::NothingConstrained,
-        _ => Reason::Unsupported,
+        ModelError::Discretization(DiscretizationError::Triangulation(_)) => StopReason::NoTriangulation,
+        ModelError::Solve(failure) => StopReason::Solve(failure.reason),
+        ModelError::NothingConstrained(_) => StopReason::NothingConstrained,
+        _ => StopReason::Unsupported,
     }
 }
 
 /// The scene with the setting's material and inclusions.
-pub(super) fn varied(scene: &Scene, setting: &Setting) -> Result<Scene, MaterialError> {
+pub(super) fn varied(scene: &Scene, setting: &Experiment) -> Result<Scene, MaterialError> {
     let mut law = scene.material.clone();
     if let Some(poisson) = setting.poisson {
         law = law.with_poisson_ratio(poisson).unwrap_or(Ok(law))?;
@@ -173,15 +173,15 @@ pub(super) fn varied(scene: &Scene, setting: &Setting) -> Result<Scene, Material
 }
 
 /// Lattice nodes, those inside the body moved at random; nodes on the boundary and on what is held stay.
-fn jittered(scene: &Scene, setting: &Setting) -> Vec<Point2> {
+fn jittered(scene: &Scene, setting: &Experiment) -> Vec<Point2> {
     let mut nodes = lattice_nodes(&scene.features(), setting.spacing);
     if setting.jitter == 0.0 {
         return nodes;
     }
     let tolerance = 1e-9 * scene.outline.size();
-    let mut state = setting.seed;
+    let mut random = SplitMix64(setting.seed);
     for x in &mut nodes {
-        let shift = Point2::new(uniform(&mut state), uniform(&mut state)) * (setting.jitter * setting.spacing);
+        let shift = Point2::new(random.symmetric(), random.symmetric()) * (setting.jitter * setting.spacing);
         let inside = scene.outline.locate(*x, tolerance) == Location::Inside;
         if inside && distance_to_polyline(*x, &scene.needle.contact) > tolerance {
             *x += shift;
@@ -190,16 +190,7 @@ fn jittered(scene: &Scene, setting: &Setting) -> Vec<Point2> {
     nodes
 }
 
-/// The next number in [−1, 1) of SplitMix64 (Steele, Lea & Flood 2014): the same on every machine and in every version.
-fn uniform(state: &mut u64) -> f64 {
-    *state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let mut z = *state;
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-}
-
-fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Setting) -> Result<TissueModel, ModelError> {
+fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Experiment) -> Result<TissueModel, ModelError> {
     let planar =
         Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(setting.spacing), setting.method)?;
     TissueModel::on(scene, planar, setting.spacing)
@@ -209,7 +200,7 @@ fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Setting) -> Result<Ti
 ///
 /// # Errors
 /// [`ModelError`] when there is none.
-pub(super) fn model(scene: &Scene, setting: &Setting) -> Result<TissueModel, ModelError> {
+pub(super) fn model(scene: &Scene, setting: &Experiment) -> Result<TissueModel, ModelError> {
     let scene = scene.without_inclusions();
     let nodes = jittered(&scene, setting);
     discretise(&scene, nodes, setting)

@@ -1,7 +1,7 @@
 //! Deformations that a rule does not feel: eigenvalues of the unconstrained tangent at rest, and the energy of
 //! displacements that alternate from node to node.
 
-use super::plan::{self, Setting};
+use super::plan::{self, Experiment};
 use super::{bloch, probe};
 use crate::discretization::finite_element::Elements;
 use crate::discretization::triangulation::triangulate;
@@ -53,17 +53,17 @@ pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelErro
     [0.0, 0.4]
         .into_iter()
         .flat_map(|jitter| {
-            Integration::VARIANTS.iter().map(move |m| Setting { jitter, ..plan::base(scene, *m, spacing) })
+            Integration::VARIANTS.iter().map(move |m| Experiment { jitter, ..plan::base(scene, *m, spacing) })
         })
         .map(|setting| measure_one(scene, &setting))
         .collect()
 }
 
-fn measure_one(scene: &Scene, setting: &Setting) -> Result<ZeroEnergy, ModelError> {
+fn measure_one(scene: &Scene, setting: &Experiment) -> Result<ZeroEnergy, ModelError> {
     let (integration, spacing) = (setting.method.integration, setting.spacing);
     let model = probe::model(scene, setting)?;
     // The lattice before it was jittered: what the checkerboard alternates on.
-    let lattice = probe::model(scene, &Setting { jitter: 0.0, ..*setting })?.positions().to_vec();
+    let lattice = probe::model(scene, &Experiment { jitter: 0.0, ..*setting })?.positions().to_vec();
     let law = scene.material.tangent(&Matrix2::zeros());
     let everywhere = |_: u32| true;
     let stiffness = dense_tangent(model.rule(), &law, model.nodes(), &everywhere);
@@ -134,7 +134,7 @@ fn energy(k: &DMatrix<f64>, field: &[f64]) -> f64 {
 fn accurate_rule(
     scene: &Scene,
     nodes: &[Point2],
-    setting: &Setting,
+    setting: &Experiment,
 ) -> Result<(Quadrature<2>, Vec<NodalCell>), ModelError> {
     let cloud = NodeCloud::new(nodes.to_vec(), vec![setting.spacing * setting.method.support; nodes.len()]);
     let shape = ShapeFunctions::new(&cloud, setting.method.basis);

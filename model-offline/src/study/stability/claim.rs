@@ -1,7 +1,7 @@
 //! The claim that meshfree methods are more stable than finite elements under large deformation, counted.
 
-use super::plan::{Parameter, Setting};
-use super::{Outcome, Stability};
+use super::plan::{Experiment, Parameter};
+use super::{ExperimentResult, Stability};
 use crate::discretization::{Integration, Method};
 use std::fmt::Write as _;
 use strum::VariantArray as _;
@@ -56,7 +56,7 @@ impl Pairs {
 
 /// The claim's answer by element.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct ClaimCounts {
     /// Against linear triangles, which have the same nodes: equal spacing and equal degrees of freedom.
     pub linear: Pairs,
     /// Against quadratic triangles of the same spacing, which have about four times the nodes.
@@ -70,14 +70,14 @@ pub struct Verdict {
 }
 
 /// A setting with what came of it.
-type Run<'a, 's> = &'a (Setting, &'s Outcome);
+type Run<'a, 's> = &'a (Experiment, &'s ExperimentResult);
 
 /// Counts every pair of runs that differ in the method only (and, for equal degrees of freedom, in the spacing).
 /// Meshfree runs of every support are compared; a run counts once, however many sweeps it is part of.
-pub fn verdict(study: &Stability) -> Verdict {
+pub fn claim_counts(study: &Stability) -> ClaimCounts {
     let distinct = study.distinct();
-    let alike = |m: &Setting, e: &Setting| {
-        let stripped = |s: &Setting| Setting { method: Method::new(Integration::Dni), spacing: 0.0, ..*s };
+    let alike = |m: &Experiment, e: &Experiment| {
+        let stripped = |s: &Experiment| Experiment { method: Method::new(Integration::Dni), spacing: 0.0, ..*s };
         stripped(m) == stripped(e)
     };
     let pairs = |element, matches: &dyn Fn(Run<'_, '_>, Run<'_, '_>) -> bool| {
@@ -98,9 +98,9 @@ pub fn verdict(study: &Stability) -> Verdict {
     };
     let [linear, quadratic] = [Integration::FemT3, Integration::FemT6];
     let started: Vec<Run<'_, '_>> = distinct.iter().filter(|d| d.1.depth > 0.0).collect();
-    let limited: Vec<(f64, &Outcome)> =
+    let limited: Vec<(f64, &ExperimentResult)> =
         started.iter().filter_map(|(setting, outcome)| Some((limit_of(study, setting)?, *outcome))).collect();
-    Verdict {
+    ClaimCounts {
         linear: pairs(linear, &equal_spacing),
         quadratic_equal_spacing: pairs(quadratic, &equal_spacing),
         quadratic_equal_nodes: pairs(quadratic, &equal_nodes),
@@ -110,7 +110,7 @@ pub fn verdict(study: &Stability) -> Verdict {
 }
 
 /// The law's limit under a setting; none where a barrier or another Poisson ratio makes it another law.
-pub(super) fn limit_of(study: &Stability, setting: &Setting) -> Option<f64> {
+pub(super) fn limit_of(study: &Stability, setting: &Experiment) -> Option<f64> {
     if setting.barrier.is_some_and(|b| b > 0.0) || setting.poisson.is_some() {
         return None;
     }
@@ -185,7 +185,7 @@ fn write_depths(study: &Stability, out: &mut String) {
 
 /// The claim's answer, and what the law itself does.
 fn write_claim(study: &Stability, out: &mut String) {
-    let v = verdict(study);
+    let v = claim_counts(study);
     out.push_str(
         "\n\"Meshfree is more stable than finite elements under large deformation\" (5 % counts as the same):\n",
     );

@@ -3,19 +3,23 @@
 
 /// What is asked about candidates.
 pub(super) trait Trials<C> {
-    /// What a solution leaves.
-    type Outcome;
+    /// What solving leaves.
+    type Solution;
+    /// Why a candidate cannot be built or solved.
+    type Error;
     /// Cost, in any unit, before anything is solved; it grows within a family.
-    fn cost(&mut self, candidate: &C) -> Result<f64, String>;
-    /// Estimated error.
-    fn solve(&mut self, candidate: &C) -> Result<(f64, Self::Outcome), String>;
+    fn cost(&mut self, candidate: &C) -> Result<f64, Self::Error>;
+    /// Solves.
+    fn solve(&mut self, candidate: &C) -> Result<Self::Solution, Self::Error>;
+    /// Estimated error of a solution.
+    fn error(&self, solution: &Self::Solution) -> f64;
     /// Distance from the next finer candidate.
-    fn confirm(&mut self, candidate: &C, outcome: &Self::Outcome) -> Result<f64, String>;
+    fn confirm(&mut self, candidate: &C, solution: &Self::Solution) -> Result<f64, Self::Error>;
 }
 
 /// Why a candidate was not chosen.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Verdict {
+pub(super) enum Unfit<E> {
     /// Its estimated error is above the tolerance.
     TooWrong(f64),
     /// It is farther from the next finer one than the tolerance.
@@ -23,21 +27,29 @@ pub(super) enum Verdict {
     /// It costs this much, more than what was chosen.
     Dearer(f64),
     /// It does not work.
-    Unusable(String),
+    Unusable(E),
+    /// Its finer neighbour does not work.
+    Unconfirmable(E),
 }
 
 /// A candidate that keeps the tolerance, and is confirmed.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Kept<C, T> {
+pub(super) struct Kept<C, S> {
     pub candidate: C,
     pub cost: f64,
-    pub outcome: T,
+    pub solution: S,
     /// Distance from the next finer candidate.
     pub apart: f64,
 }
 
-/// What was kept, if anything, and what was not.
-pub(super) type Searched<C, T> = (Option<Kept<C, T>>, Vec<(C, Verdict)>);
+/// How a search ended.
+#[derive(Debug)]
+pub(super) struct Search<C, S, E> {
+    /// What was kept, if anything.
+    pub best: Option<Kept<C, S>>,
+    /// What was not, in the order of the search.
+    pub refused: Vec<(C, Unfit<E>)>,
+}
 
 /// Goes through families, each from coarse to fine and from cheap to dear, until one of its candidates is kept, or none
 /// can be cheaper than the best so far. A candidate that its finer neighbour refutes is passed over like one that is too
@@ -46,22 +58,22 @@ pub(super) fn cheapest<C: Clone, J: Trials<C>>(
     families: &[Vec<C>],
     tolerance: f64,
     trials: &mut J,
-) -> Searched<C, J::Outcome> {
-    let mut best: Option<Kept<C, J::Outcome>> = None;
-    let mut rejected = Vec::new();
+) -> Search<C, J::Solution, J::Error> {
+    let mut best: Option<Kept<C, J::Solution>> = None;
+    let mut refused = Vec::new();
     for candidate_family in families {
         for candidate in candidate_family {
             let limit = best.as_ref().map_or(f64::INFINITY, |b| b.cost);
             match judge(candidate, limit, tolerance, trials) {
                 Ok(kept) => {
                     if let Some(dearer) = best.replace(kept) {
-                        rejected.push((dearer.candidate, Verdict::Dearer(dearer.cost)));
+                        refused.push((dearer.candidate, Unfit::Dearer(dearer.cost)));
                     }
                     break;
                 }
-                Err(verdict) => {
-                    let last = matches!(verdict, Verdict::Dearer(_) | Verdict::Unusable(_));
-                    rejected.push((candidate.clone(), verdict));
+                Err(refusal) => {
+                    let last = !matches!(refusal, Unfit::TooWrong(_) | Unfit::Unconfirmed(_));
+                    refused.push((candidate.clone(), refusal));
                     if last {
                         break;
                     }
@@ -69,7 +81,7 @@ pub(super) fn cheapest<C: Clone, J: Trials<C>>(
             }
         }
     }
-    (best, rejected)
+    Search { best, refused }
 }
 
 fn judge<C: Clone, J: Trials<C>>(
@@ -77,20 +89,21 @@ fn judge<C: Clone, J: Trials<C>>(
     limit: f64,
     tolerance: f64,
     trials: &mut J,
-) -> Result<Kept<C, J::Outcome>, Verdict> {
-    let cost = trials.cost(candidate).map_err(Verdict::Unusable)?;
+) -> Result<Kept<C, J::Solution>, Unfit<J::Error>> {
+    let cost = trials.cost(candidate).map_err(Unfit::Unusable)?;
     if cost >= limit {
-        return Err(Verdict::Dearer(cost));
+        return Err(Unfit::Dearer(cost));
     }
-    let (error, outcome) = trials.solve(candidate).map_err(Verdict::Unusable)?;
+    let solution = trials.solve(candidate).map_err(Unfit::Unusable)?;
+    let error = trials.error(&solution);
     if error.is_nan() || error > tolerance {
-        return Err(Verdict::TooWrong(error));
+        return Err(Unfit::TooWrong(error));
     }
-    let apart = trials.confirm(candidate, &outcome).map_err(Verdict::Unusable)?;
+    let apart = trials.confirm(candidate, &solution).map_err(Unfit::Unconfirmable)?;
     if apart.is_nan() || apart > tolerance {
-        return Err(Verdict::Unconfirmed(apart));
+        return Err(Unfit::Unconfirmed(apart));
     }
-    Ok(Kept { candidate: candidate.clone(), cost, outcome, apart })
+    Ok(Kept { candidate: candidate.clone(), cost, solution, apart })
 }
 
 #[cfg(test)]
@@ -100,30 +113,40 @@ mod tests {
     /// Name, cost, error, distance from the next finer.
     type Made = (&'static str, f64, f64, f64);
 
+    #[derive(Debug, PartialEq)]
+    struct Broken;
+
+    /// What was kept, what was refused, what was solved.
+    type Found = (Option<&'static str>, Vec<(&'static str, Unfit<Broken>)>, Vec<&'static str>);
+
     #[derive(Default)]
     struct MadeUp {
         solved: Vec<&'static str>,
     }
 
     impl Trials<Made> for MadeUp {
-        type Outcome = ();
-        fn cost(&mut self, candidate: &Made) -> Result<f64, String> {
-            if candidate.1.is_finite() { Ok(candidate.1) } else { Err("broken".into()) }
+        type Solution = f64;
+        type Error = Broken;
+        fn cost(&mut self, candidate: &Made) -> Result<f64, Broken> {
+            if candidate.1.is_finite() { Ok(candidate.1) } else { Err(Broken) }
         }
-        fn solve(&mut self, candidate: &Made) -> Result<(f64, ()), String> {
+        fn solve(&mut self, candidate: &Made) -> Result<f64, Broken> {
             self.solved.push(candidate.0);
-            Ok((candidate.2, ()))
+            Ok(candidate.2)
         }
-        fn confirm(&mut self, candidate: &Made, (): &()) -> Result<f64, String> {
-            Ok(candidate.3)
+        fn error(&self, solution: &f64) -> f64 {
+            *solution
+        }
+        fn confirm(&mut self, candidate: &Made, _: &f64) -> Result<f64, Broken> {
+            if candidate.3 < 0.0 { Err(Broken) } else { Ok(candidate.3) }
         }
     }
 
-    fn search(families: &[Vec<Made>]) -> (Option<&'static str>, Vec<(&'static str, Verdict)>, Vec<&'static str>) {
+    fn search(families: &[Vec<Made>]) -> Found {
         let mut trials = MadeUp::default();
-        let (best, rejected) = cheapest(families, 0.01, &mut trials);
-        let rejected = rejected.into_iter().map(|(candidate, verdict)| (candidate.0, verdict)).collect();
-        (best.map(|b| b.candidate.0), rejected, trials.solved)
+        let Search { best, refused } = cheapest(families, 0.01, &mut trials);
+        let refused = refused.into_iter().map(|(candidate, refusal)| (candidate.0, refusal)).collect();
+        (best.map(|b| b.candidate.0), refused, trials.solved)
     }
 
     #[test]
@@ -132,7 +155,7 @@ mod tests {
         let family = vec![("coarse", 1.0, 0.005, 0.2), ("middle", 2.0, 0.03, 0.0), ("fine", 4.0, 0.004, 0.003)];
         let (best, rejected, _) = search(&[family]);
         assert_eq!(best, Some("fine"));
-        assert_eq!(rejected, [("coarse", Verdict::Unconfirmed(0.2)), ("middle", Verdict::TooWrong(0.03))]);
+        assert_eq!(rejected, [("coarse", Unfit::Unconfirmed(0.2)), ("middle", Unfit::TooWrong(0.03))]);
     }
 
     #[test]
@@ -142,13 +165,17 @@ mod tests {
         let broken = vec![("e", f64::NAN, 0.0, 0.0), ("never", 0.1, 0.0, 0.0)];
         let (first, rejected, solved) = search(&[cheap.clone(), dear.clone(), broken.clone()]);
         assert_eq!((first, solved), (Some("d"), vec!["c", "d", "a"]));
-        assert!(
-            rejected.contains(&("b", Verdict::Dearer(9.0)))
-                && rejected.contains(&("e", Verdict::Unusable("broken".into())))
-        );
+        assert!(rejected.contains(&("b", Unfit::Dearer(9.0))) && rejected.contains(&("e", Unfit::Unusable(Broken))));
         let (second, rejected, solved) = search(&[broken, dear, cheap]);
         assert_eq!((second, solved), (Some("d"), vec!["a", "b", "c", "d"]));
-        assert!(rejected.contains(&("b", Verdict::Dearer(9.0))));
+        assert!(rejected.contains(&("b", Unfit::Dearer(9.0))));
+    }
+
+    #[test]
+    fn what_nothing_finer_can_confirm_is_not_kept() {
+        let (best, rejected, solved) = search(&[vec![("last", 1.0, 0.0, -1.0), ("never", 2.0, 0.0, 0.0)]]);
+        assert!(best.is_none() && solved == ["last"]);
+        assert_eq!(rejected, [("last", Unfit::Unconfirmable(Broken))]);
     }
 
     #[test]

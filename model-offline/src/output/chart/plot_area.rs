@@ -5,7 +5,7 @@ use super::drawing::Px;
 
 /// Two settled axes and the rectangle between them.
 #[derive(Clone, Debug)]
-pub(super) struct Frame {
+pub(super) struct PlotArea {
     pub(super) x: Settled,
     pub(super) y: Settled,
     /// Upper left corner, px.
@@ -16,7 +16,7 @@ pub(super) struct Frame {
     pub(super) band: f64,
 }
 
-impl Frame {
+impl PlotArea {
     pub(super) fn right(&self) -> f64 {
         self.corner[0] + self.size[0]
     }
@@ -110,9 +110,9 @@ mod tests {
     use super::super::axis::Axis;
     use super::*;
 
-    fn frame() -> Frame {
+    fn frame() -> PlotArea {
         let unit = || Axis::linear("", "").range(0.0, 1.0).settle(std::iter::empty());
-        Frame { x: unit(), y: unit(), corner: [10.0, 20.0], size: [100.0, 50.0], band: 16.0 }
+        PlotArea { x: unit(), y: unit(), corner: [10.0, 20.0], size: [100.0, 50.0], band: 16.0 }
     }
 
     #[test]

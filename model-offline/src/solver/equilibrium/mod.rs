@@ -1,0 +1,316 @@
+//! Static equilibrium under prescribed nodal values: Newton's method on the total Lagrangian weak form, with line search on
+//! the energy and adaptive cutback of the increment.
+//!
+//! Loading is by prescribed displacement and dead loads, so an equilibrium is a stationary point of the potential energy over the
+//! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
+//! tangent is not positive definite is reported as lost stability, never passed off as an answer.
+//!
+//! Every converged state has a Cholesky factor, which proves that it is stable. On the way to the next state that factor is
+//! the preconditioner of conjugate gradients: tangents change little from one increment to the next, so that a few
+//! iterations, each the price of a back-substitution, replace a factorisation. Negative curvature on the way, or too many
+//! iterations, bring the factorisation back.
+
+mod newton;
+mod settings;
+
+pub use settings::{Effort, Failure, FailureReason, LinearSolver, NewtonSettings};
+
+use self::newton::Attempt;
+use super::analysis::Analysis;
+use super::constrained::{ConstrainedSolver, Unknowns};
+use crate::discretization::Quadrature;
+use crate::geometry::Point;
+use crate::mechanics::Tissue;
+use crate::mechanics::assembly::{self, BlockPositions, Inverted, State};
+use crate::mechanics::{Constraints, WeaklyImposed};
+use std::sync::Arc;
+
+/// What a body is made of once it is discretized.
+#[derive(Debug, Clone)]
+pub struct DiscreteBody<'a, const D: usize> {
+    /// Integration rule.
+    pub rule: Arc<Quadrature<D>>,
+    /// Materials by cell.
+    pub tissue: Tissue,
+    /// Positions of the nodes at rest, length units.
+    pub positions: &'a [Point<D>],
+    /// A typical node spacing: the length that step tolerances are relative to.
+    pub spacing: f64,
+}
+
+/// A body in equilibrium, and the means to take it to the next.
+#[derive(Debug, Clone)]
+pub struct Equilibrium<const D: usize> {
+    rule: Arc<Quadrature<D>>,
+    tissue: Tissue,
+    blocks: Arc<BlockPositions>,
+    solver: ConstrainedSolver<D>,
+    weak: Option<Arc<dyn WeaklyImposed>>,
+    settings: NewtonSettings,
+    /// Length that step tolerances are relative to.
+    spacing: f64,
+    /// Force that moves a node by a thousandth of the spacing: what residuals are relative to at rest.
+    smallest_force: f64,
+    at: Configuration<D>,
+    /// Whether the factor belongs to the current state.
+    factor_is_current: bool,
+    factor_exists: bool,
+    /// Coefficients where the tangent was last found positive definite.
+    stable_at: Vec<f64>,
+    residuals: Vec<f64>,
+    effort: Effort,
+}
+
+/// Everything that a failed increment must give back.
+#[derive(Debug, Clone)]
+struct Configuration<const D: usize> {
+    coefficients: Vec<f64>,
+    multipliers: Vec<f64>,
+    /// Values of the constrained rows, then those of the weakly imposed points.
+    prescribed: Vec<f64>,
+    /// Dead load, D numbers per node.
+    external: Vec<f64>,
+    /// Gradient of the potential energy.
+    force: Vec<f64>,
+    energy: f64,
+    state: State<D>,
+}
+
+impl<const D: usize> Equilibrium<D> {
+    /// A body at rest, of which `constraints` will be prescribed.
+    ///
+    /// # Errors
+    /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
+    pub fn at_rest(
+        body: DiscreteBody<'_, D>,
+        constraints: impl Into<Constraints>,
+        settings: NewtonSettings,
+    ) -> Result<Self, Failure> {
+        let constraints = constraints.into();
+        let weak_lists = constraints.weak.as_ref().map_or_else(Vec::new, |w| w.node_lists());
+        let lists = constraints.rows.node_lists().chain(weak_lists.iter().copied());
+        let analysis = Analysis::new(&body.rule, body.positions, lists);
+        Self::analysed(body, &analysis, constraints, settings)
+    }
+
+    /// The same for a rule and nodes that were analysed before, with at least these constraints.
+    ///
+    /// # Errors
+    /// [`Failure`] with [`FailureReason::SingularTangent`] when the tangent at rest is not positive definite.
+    ///
+    /// # Panics
+    /// When the analysis does not cover the constraints.
+    pub fn analysed(
+        body: DiscreteBody<'_, D>,
+        analysis: &Analysis,
+        constraints: Constraints,
+        settings: NewtonSettings,
+    ) -> Result<Self, Failure> {
+        let DiscreteBody { rule, tissue, positions, spacing } = body;
+        let Constraints { rows, weak } = constraints;
+        let nodes = positions.len();
+        let at = Configuration {
+            coefficients: vec![0.0; nodes * D],
+            multipliers: vec![0.0; rows.len() * D],
+            prescribed: vec![0.0; rows.len() * D + weak.as_ref().map_or(0, |w| w.prescribed())],
+            external: vec![0.0; nodes * D],
+            force: vec![0.0; nodes * D],
+            energy: 0.0,
+            state: State::default(),
+        };
+        let mut body = Self {
+            rule,
+            tissue,
+            blocks: Arc::clone(&analysis.blocks),
+            solver: ConstrainedSolver::new(analysis, rows),
+            weak,
+            settings,
+            spacing,
+            smallest_force: f64::MIN_POSITIVE,
+            at,
+            factor_is_current: false,
+            factor_exists: false,
+            stable_at: Vec::new(),
+            residuals: Vec::new(),
+            effort: Effort::default(),
+        };
+        body.evaluate().map_err(|at| body.failure(reason_of(&at), 0.0, "at rest".into()))?;
+        if !body.refactorise() {
+            return Err(body.failure(
+                FailureReason::SingularTangent,
+                0.0,
+                "the tangent at rest is not positive definite: hold more of the boundary, or use a rule without zero-energy modes".into(),
+            ));
+        }
+        body.smallest_force = 1e-3 * spacing * body.solver.rest_stiffness();
+        Ok(body)
+    }
+
+    /// Changes the settings for the solves to come.
+    pub fn set_settings(&mut self, settings: NewtonSettings) {
+        self.settings = settings;
+    }
+
+    /// Nodal coefficients d, D numbers per node.
+    pub fn coefficients(&self) -> &[f64] {
+        &self.at.coefficients
+    }
+
+    /// Forces that hold the constrained nodes, D numbers per row: −μ.
+    pub fn reactions(&self) -> impl Iterator<Item = f64> + '_ {
+        self.at.multipliers.iter().map(|m| -m)
+    }
+
+    /// Strain energy.
+    pub fn energy(&self) -> f64 {
+        self.at.energy
+    }
+
+    /// Displacement gradients at the integration points.
+    pub fn state(&self) -> &State<D> {
+        &self.at.state
+    }
+
+    /// The integration rule.
+    pub fn rule(&self) -> &Arc<Quadrature<D>> {
+        &self.rule
+    }
+
+    /// The tissue.
+    pub fn tissue(&self) -> &Tissue {
+        &self.tissue
+    }
+
+    /// Relative residuals of the last solve, iteration by iteration.
+    pub fn residual_history(&self) -> &[f64] {
+        &self.residuals
+    }
+
+    /// Work done since the body was made.
+    pub fn effort(&self) -> Effort {
+        self.effort
+    }
+
+    /// Entries of the Cholesky factor.
+    pub fn factor_entries(&self) -> usize {
+        self.solver.factor_entries()
+    }
+
+    /// Takes the prescribed values from where they are to `prescribed` (D numbers per row, then those of the weakly imposed
+    /// points), cutting the way into pieces where it must.
+    ///
+    /// # Errors
+    /// [`Failure`] with the reason; the body is then at the last state that converged on the way.
+    pub fn drive(&mut self, prescribed: &[f64]) -> Result<(), Failure> {
+        let external = self.at.external.clone();
+        self.drive_loaded(prescribed, &external)
+    }
+
+    /// Takes prescribed values and dead load (D numbers per node) together to what is given.
+    ///
+    /// # Errors
+    /// [`Failure`] with the reason; the body is then at the last state that converged on the way.
+    pub fn drive_loaded(&mut self, prescribed: &[f64], external: &[f64]) -> Result<(), Failure> {
+        let (start, start_load) = (self.at.prescribed.clone(), self.at.external.clone());
+        let between = |a: &[f64], b: &[f64], t: f64| -> Vec<f64> {
+            // The end itself, not the end up to rounding.
+            if t >= 1.0 { b.to_vec() } else { a.iter().zip(b).map(|(a, b)| a + (b - a) * t).collect() }
+        };
+        let (mut reached, mut step) = (0.0_f64, 1.0_f64);
+        let mut cuts = 0;
+        while reached < 1.0 {
+            let next = (reached + step).min(1.0);
+            let last = self.at.clone();
+            self.at.prescribed = between(&start, prescribed, next);
+            self.at.external = between(&start_load, external, next);
+            match self.attempt() {
+                Attempt::Converged => {
+                    reached = next;
+                    // Grow back after success, so that one hard spot does not slow down the rest.
+                    step *= 2.0;
+                }
+                Attempt::Failed(reason, detail) => {
+                    self.at = last;
+                    self.factor_is_current = false;
+                    if cuts >= self.settings.max_cutbacks {
+                        return Err(self.failure(reason, reached, detail));
+                    }
+                    cuts += 1;
+                    self.effort.cutbacks += 1;
+                    step = 0.5 * (next - reached);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Response of the coefficients to unit rates of the prescribed values at the current state: solves
+    /// `K x + Λᵀ μ = 0, Λ x = rates`. This is the exact linearisation of the equilibrium.
+    ///
+    /// # Errors
+    /// [`Failure`] when the tangent at the current state is not positive definite.
+    pub fn sensitivity(&mut self, rates: &[f64]) -> Result<Vec<f64>, Failure> {
+        if !self.factor_is_current && !self.refactorise() {
+            return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
+        }
+        let n = self.at.coefficients.len();
+        let (strong, weak) = rates.split_at(self.at.multipliers.len());
+        let (mut x, mut mu, mut rhs) = (vec![0.0; n], vec![0.0; strong.len()], vec![0.0; n]);
+        if let Some(imposed) = &self.weak {
+            imposed.add_response(&self.tissue, &self.at.coefficients, weak, &mut rhs);
+        }
+        self.solver.solve(&rhs, strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
+        Ok(x)
+    }
+
+    fn failure(&self, reason: FailureReason, reached: f64, detail: String) -> Failure {
+        Failure { reason, reached, detail }
+    }
+
+    /// Potential energy and its gradient at the current coefficients.
+    fn evaluate(&mut self) -> Result<(), Inverted> {
+        let at = &mut self.at;
+        at.energy = assembly::internal_force(&self.rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
+        if let Some(weak) = &self.weak {
+            let values = &at.prescribed[at.multipliers.len()..];
+            at.energy += weak.add_force(&self.tissue, &at.coefficients, values, &mut at.force);
+        }
+        for ((f, load), d) in at.force.iter_mut().zip(&at.external).zip(&at.coefficients) {
+            *f -= load;
+            at.energy -= load * d;
+        }
+        Ok(())
+    }
+
+    /// Assembles the tangent at the current state.
+    fn assemble(&mut self) {
+        let (rule, tissue, at, blocks, weak) = (&self.rule, &self.tissue, &self.at, &self.blocks, &self.weak);
+        self.solver.assemble(|pattern, values| {
+            assembly::tangent(rule, tissue, &at.state, blocks, values);
+            if let Some(weak) = weak {
+                weak.add_tangent(tissue, (&at.coefficients, &at.prescribed[at.multipliers.len()..]), pattern, values);
+            }
+        });
+    }
+
+    /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
+    fn refactorise(&mut self) -> bool {
+        self.assemble();
+        self.factorise()
+    }
+
+    fn factorise(&mut self) -> bool {
+        self.effort.factorisations += 1;
+        self.factor_is_current = self.solver.factorise().is_ok();
+        // A failed factorisation has overwritten the last factor.
+        self.factor_exists = self.factor_is_current;
+        if self.factor_is_current {
+            self.stable_at.clone_from(&self.at.coefficients);
+        }
+        self.factor_is_current
+    }
+}
+
+fn reason_of(at: &Inverted) -> FailureReason {
+    if at.law_overflowed() { FailureReason::LawOverflow } else { FailureReason::ElementInverted }
+}

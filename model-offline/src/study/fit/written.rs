@@ -1,0 +1,95 @@
+//! A fit as a scene file, and on one screen.
+
+use super::Fit;
+use super::plant::EndToEnd;
+use crate::scene::schema::FitSection;
+
+impl Fit {
+    /// The text of the scene with the choice written into it; everything else, comments included, stays.
+    ///
+    /// # Errors
+    /// What the text does not parse as; a scene that was read before always does.
+    pub fn written_into(&self, text: &str) -> Result<String, toml_edit::TomlError> {
+        let mut document: toml_edit::DocumentMut = text.parse()?;
+        let section = &mut document["discretization"];
+        if let Some(table) = section.as_table_like_mut() {
+            for key in ["spacing", "tolerance", "level", "support", "basis"] {
+                table.remove(key);
+            }
+        }
+        match self.chosen.level {
+            Some(level) => section["level"] = toml_edit::value(i64::from(level)),
+            None => section["spacing"] = toml_edit::value(self.chosen.spacing),
+        }
+        section["integration"] = toml_edit::value(self.chosen.integration.name());
+        if let Some(support) = self.chosen.support {
+            section["support"] = toml_edit::value(support);
+            section["basis"] = toml_edit::value(self.chosen.basis.name());
+        }
+        let FitSection { plant, table_knots, table_scalar } = self.section();
+        let mut fit = toml_edit::Table::new();
+        fit["plant"] = toml_edit::value(plant.to_string());
+        fit["table_knots"] = toml_edit::value(i64::from(table_knots));
+        fit["table_scalar"] = toml_edit::value(table_scalar.to_string());
+        document["fit"] = toml_edit::Item::Table(fit);
+        Ok(document.to_string())
+    }
+
+    /// The part of the choice that the scene's `[fit]` carries.
+    pub fn section(&self) -> FitSection {
+        FitSection {
+            plant: self.chosen.plant,
+            table_knots: self.chosen.table_knots,
+            table_scalar: self.chosen.table_scalar,
+        }
+    }
+
+    /// The answer on one screen.
+    pub fn summary(&self) -> String {
+        use std::fmt::Write as _;
+        let c = &self.chosen;
+        let nodes = match c.level {
+            Some(level) => format!("graded nodes, level {level}"),
+            None => format!("nodes {:.4} apart", c.spacing),
+        };
+        let support = c.support.map_or(String::new(), |s| format!(", {} basis, support {s}", c.basis));
+        let mut out = format!(
+            "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {} plant to depth {:.4}; {} table knots, {}\n\
+             estimated error {:.3} %, distance from the next finer model {:.3} %\n\
+             all Jacobians in {:.2} ms, one step of the plant in {:.2} µs (fitted in {:.1} s)\n",
+            self.scene,
+            self.tissue,
+            self.tolerance,
+            c.integration,
+            c.nodes,
+            c.law,
+            c.plant,
+            c.plant_depth,
+            c.table_knots,
+            c.table_scalar,
+            100.0 * self.error_estimate,
+            100.0 * self.verified_error,
+            1e3 * self.wall_s,
+            self.step_us,
+            self.fit_wall_s,
+        );
+        let _ = match self.end_to_end {
+            EndToEnd { error: Some(error), depth, nodes } => {
+                let beyond = if error > self.tolerance { ": ABOVE the tolerance" } else { "" };
+                writeln!(
+                    out,
+                    "end to end, against the full model on {nodes} nodes, to depth {depth:.4}: {:.3} %{beyond}\n",
+                    100.0 * error
+                )
+            }
+            EndToEnd { error: None, nodes, .. } => {
+                writeln!(out, "end to end: nothing to compare with ({nodes} nodes go nowhere)\n")
+            }
+        };
+        out.push_str("rejected:\n");
+        for r in &self.rejected {
+            let _ = writeln!(out, "  {:<56} {:>10}  {}", r.candidate.to_string(), r.reason.number_text(), r.reason);
+        }
+        out
+    }
+}
