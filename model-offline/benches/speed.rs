@@ -26,7 +26,7 @@ fn newton(c: &mut Criterion) {
         b.iter_custom(|count| {
             let (mut spent, mut iterations) = (Duration::ZERO, 0_u64);
             while iterations < count {
-                let mut body = model.body(Some(2), NewtonSettings::default()).expect("held");
+                let mut body = model.body(Some(2), NewtonSettings::default()).expect("enough is constrained");
                 let before = body.equilibrium().effort().iterations;
                 let start = Instant::now();
                 for k in 1..=10 {

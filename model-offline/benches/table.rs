@@ -54,7 +54,7 @@ fn milliseconds(mut work: impl FnMut(), repeats: u32) -> f64 {
 }
 
 fn worst_error(model: &TissueModel) -> f64 {
-    let responses = rest_responses(model).expect("held");
+    let responses = rest_responses(model).expect("enough is constrained");
     responses.iter().zip(LIMITS).map(|(r, l)| (r.controllability_measure / l - 1.0).abs()).fold(0.0, f64::max)
 }
 
@@ -67,7 +67,7 @@ fn newton(integration: Integration, spacing: f64) -> (usize, f64) {
     let model = TissueModel::new(&scene).expect("the paper's scene");
     let best = (0..3)
         .map(|_| {
-            let mut body = model.body(Some(2), NewtonSettings::default()).expect("held");
+            let mut body = model.body(Some(2), NewtonSettings::default()).expect("enough is constrained");
             let before = body.equilibrium().effort().iterations;
             let start = Instant::now();
             for k in 1..=3 {
@@ -88,7 +88,7 @@ fn five_jacobians(integration: Integration, grading: Grading) -> (f64, f64, usiz
             .expect("graded nodes");
         TissueModel::on(&scene, planar, grading.finest).expect("features have nodes")
     };
-    let time = milliseconds(|| drop(rest_responses(&build()).expect("held")), 5);
+    let time = milliseconds(|| drop(rest_responses(&build()).expect("enough is constrained")), 5);
     let model = build();
     (time, 100.0 * worst_error(&model), model.nodes())
 }

@@ -1,4 +1,4 @@
-//! What a placement study says where a paddle cannot control the target, where none can, and where no fixture helps.
+//! What a placement study says where a paddle cannot control the target, where none can, and where no static paddle helps.
 
 use assert_cmd::Command;
 use std::path::Path;

@@ -110,7 +110,7 @@ fn stiffness_from_a_millionth_to_a_million_is_solved() {
 }
 
 #[test]
-fn a_target_on_the_free_boundary_is_fine_and_on_a_held_one_is_refused() {
+fn a_target_on_the_free_boundary_is_fine_and_on_an_immobile_one_is_refused() {
     assert!(attempt(&with("position = [0.5, 0.5]", "position = [0.0, 0.8]")).unwrap().is_ok());
     assert!(attempt(&with("position = [0.5, 0.5]", "position = [1.0, 0.5]")).unwrap_err().contains("immobile"));
     assert!(attempt(&with("position = [0.5, 0.5]", "position = [0.5, 1.0]")).unwrap_err().contains("needle"));

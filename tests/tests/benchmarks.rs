@@ -18,16 +18,16 @@ fn plane_stress(e: f64, nu: f64) -> Law {
     Law::linear(e * nu / (1.0 - nu * nu), e / (2.0 * (1.0 + nu))).unwrap()
 }
 
-/// A body with nodes held where `held` gives a displacement.
+/// A body with nodes prescribed where `displacement` gives a displacement.
 fn hold(
     planar: &Planar,
     material: &Law,
     spacing: f64,
-    held: impl Fn(Point2) -> Option<Point2>,
+    displacement: impl Fn(Point2) -> Option<Point2>,
 ) -> (Equilibrium<2>, Vec<f64>) {
     let (mut stencils, mut prescribed) = (Vec::new(), Vec::new());
     for x in planar.positions() {
-        if let Some(u) = held(*x) {
+        if let Some(u) = displacement(*x) {
             stencils.push(planar.value_stencil(x).unwrap());
             prescribed.extend([u.x, u.y]);
         }

@@ -29,12 +29,14 @@ fn a_tolerance_of_one_percent_is_kept_by_quadratic_triangles() {
         let estimate = estimate.unwrap();
         println!("{} {}: {} nodes, {found:?}, {estimate:?}", scene.name, scene.tissue(), model.nodes());
         assert!(
-            found.controllability <= 0.01 && found.displacement <= 0.02,
+            found.controllability <= 0.01 && found.displacement <= 0.01,
             "{} {}: {found:?}",
             scene.name,
             scene.tissue()
         );
-        assert!(estimate.controllability <= 0.01);
+        // Neither smaller than the error, but for the limits' own 0.1 %, nor three times as large.
+        assert!(estimate.controllability <= 0.01 && found.controllability <= estimate.controllability + 0.001);
+        assert!(estimate.controllability <= 3.0 * found.controllability + 0.003, "{found:?}, {estimate:?}");
     }
 }
 
@@ -46,7 +48,7 @@ fn a_tolerance_of_one_percent_is_kept_by_scni() {
         let found = errors(&rest_responses(&model).unwrap(), &limits);
         println!("{} {}: {} nodes, {found:?}", scene.name, scene.tissue(), model.nodes());
         assert!(
-            found.controllability <= 0.01 && found.displacement <= 0.02,
+            found.controllability <= 0.01 && found.displacement <= 0.01,
             "{} {}: {found:?}",
             scene.name,
             scene.tissue()

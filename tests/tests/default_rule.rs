@@ -10,23 +10,19 @@ use model_offline::mechanics::assembly::{BlockPositions, State, internal_force, 
 use model_offline::model::TissueModel;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::Scene;
+use tests::continuum::{errors, limits};
 use tests::{jittered_rectangle, rectangle};
 
-/// Worst relative error of the controllability measures on even nodes against `golden/continuum.json`.
+/// Worst relative error of the controllability measures on even nodes against the continuum limits.
 fn error_on_even_nodes(scene: &str, tissue: &str, spacing: f64, integration: Integration) -> f64 {
-    let golden: serde_json::Value = serde_json::from_str(include_str!("../golden/continuum.json")).unwrap();
-    let limits = golden[if scene == "paper" { "paper" } else { "hull" }][tissue].as_array().unwrap();
+    let limits = limits(if scene == "paper" { "paper" } else { "hull" }, tissue);
     let mut scene = Scene::bundled(scene).unwrap();
     if tissue == "homogeneous" {
         scene = scene.without_inclusions();
     }
     scene.discretization.method = Method::new(integration);
     scene.discretization.resolution = Resolution::Spacing(spacing);
-    let responses = rest_responses(&TissueModel::new(&scene).unwrap()).unwrap();
-    let off = responses.iter().zip(limits).map(|(found, limit)| {
-        (found.controllability_measure / limit["controllability_measure"].as_f64().unwrap() - 1.0).abs()
-    });
-    off.fold(0.0, f64::max)
+    errors(&rest_responses(&TissueModel::new(&scene).unwrap()).unwrap(), &limits).controllability
 }
 
 #[test]

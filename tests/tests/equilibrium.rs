@@ -68,7 +68,7 @@ fn exact_jacobian_agrees_with_the_papers_small_displacements() {
 }
 
 #[test]
-fn held_values_are_met_and_a_rigid_translation_costs_nothing() {
+fn prescribed_values_are_met_and_a_rigid_translation_costs_nothing() {
     let scene = Scene::bundled("paper").unwrap();
     let model = TissueModel::new(&scene).unwrap();
     let mut body = model.body(Some(0), NewtonSettings::default()).unwrap();

@@ -8,20 +8,20 @@ use model_offline::mechanics::nitsche::Nitsche;
 use model_offline::mechanics::{Tissue, WeaklyImposed};
 use tests::{jittered_rectangle, rectangle};
 
-struct Held {
+struct Imposed {
     planar: Planar,
     tissue: Tissue,
     nitsche: Nitsche,
 }
 
-fn held() -> Held {
+fn imposed() -> Imposed {
     let nodes = jittered_rectangle(1.0, 1.0, 5, 5, 0.2, 3);
     let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes, None, Method::new(Integration::Scni)).unwrap();
     let law = Law::fung(383.0, 318.5, 40.0, 1.5, 1.0).unwrap();
     let tissue = Tissue::uniform(law, planar.cells().len());
     let points = planar.boundary_points_on(&[Point2::new(0.0, 0.0), Point2::new(1.0, 0.0)]).unwrap();
     let nitsche = Nitsche::new(&planar, &tissue, points);
-    Held { planar, tissue, nitsche }
+    Imposed { planar, tissue, nitsche }
 }
 
 /// A field with strains of `size`, that misses what is prescribed by as much.
@@ -32,7 +32,7 @@ fn field(planar: &Planar, size: f64) -> Vec<f64> {
 
 #[test]
 fn the_tangent_is_the_derivative_of_the_force_at_large_gaps_too() {
-    let Held { planar, tissue, nitsche } = held();
+    let Imposed { planar, tissue, nitsche } = imposed();
     let (d, prescribed) = (field(&planar, 0.1), vec![0.02; nitsche.prescribed()]);
     let pattern = Pattern::new(2, planar.positions().len(), nitsche.node_lists().into_iter());
     let mut values = vec![0.0; pattern.entries()];
@@ -66,7 +66,7 @@ fn the_tangent_is_the_derivative_of_the_force_at_large_gaps_too() {
 
 #[test]
 fn the_penalty_grows_with_the_stiffness_of_the_deformed_tissue_and_only_then() {
-    let Held { planar, tissue, nitsche } = held();
+    let Imposed { planar, tissue, nitsche } = imposed();
     let rest = vec![0.0; 2 * planar.positions().len()];
     assert!(nitsche.adapted(&tissue, &rest).is_none());
     let strained = field(&planar, 0.4);

@@ -19,7 +19,7 @@ enum Boundary {
     Transformation,
     /// Weakly, on all of it.
     Nitsche,
-    /// Tractions on all of it, and two corners held.
+    /// Tractions on all of it, and two corners constrained.
     Tractions,
 }
 
@@ -40,7 +40,7 @@ fn patch_error(boundary: Boundary, integration: Integration, consistency: Consis
     let tissue = Tissue::uniform(material.clone(), planar.cells().len());
 
     let corner = |x: &&Point2| x.y == 0.0 && (x.x == 0.0 || x.x == 1.0);
-    let held: Vec<Point2> = match boundary {
+    let constrained: Vec<Point2> = match boundary {
         Boundary::Transformation => planar.positions().iter().filter(|x| on_boundary(x)).copied().collect(),
         Boundary::Tractions => planar.positions().iter().filter(corner).copied().collect(),
         Boundary::Nitsche => Vec::new(),
@@ -56,9 +56,9 @@ fn patch_error(boundary: Boundary, integration: Integration, consistency: Consis
         }
         Boundary::Transformation | Boundary::Nitsche => vec![0.0; 2 * planar.positions().len()],
     };
-    let prescribed_at = held.iter().copied().chain(weakly.iter().map(|p| p.position));
+    let prescribed_at = constrained.iter().copied().chain(weakly.iter().map(|p| p.position));
     let prescribed: Vec<f64> = prescribed_at.flat_map(|x| <[f64; 2]>::from(gradient() * x)).collect();
-    let stencils: Vec<_> = held.iter().map(|x| planar.value_stencil(x).unwrap()).collect();
+    let stencils: Vec<_> = constrained.iter().map(|x| planar.value_stencil(x).unwrap()).collect();
     let weak = (!weakly.is_empty()).then(|| Arc::new(Nitsche::new(&planar, &tissue, weakly)) as Arc<dyn WeaklyImposed>);
 
     let settings = NewtonSettings { residual_tolerance: 1e-12, ..Default::default() };
@@ -118,7 +118,7 @@ fn the_transformation_method_leaves_the_published_error_and_no_more() {
     ] {
         let error = patch_error(Boundary::Transformation, integration, Consistency::Uncorrected, jitter);
         println!("{integration:?}, jitter {jitter}: {error:.2e}");
-        assert!(error < 2.5 * expected, "{integration:?} {jitter}: {error:.2e}, published {expected:.0e}");
-        assert!(error > 1e-6, "an exact patch test would mean that something else is tested");
+        let found = error / expected;
+        assert!((0.4..2.5).contains(&found), "{integration:?} {jitter}: {error:.2e}, published {expected:.0e}");
     }
 }

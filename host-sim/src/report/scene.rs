@@ -17,7 +17,7 @@ const BODY_WIDTH: f64 = 300.0;
 
 /// Short strokes on the outer side of the immobile boundary.
 fn hatch(drawing: &mut Drawing, view: &View, geometry: &Geometry, part: &[[f64; 2]]) {
-    drawing.polyline("held", &view.path(part));
+    drawing.polyline("immobile", &view.path(part));
     for edge in part.windows(2) {
         let [dx, dy] = [edge[1][0] - edge[0][0], edge[1][1] - edge[0][1]];
         let length = dx.hypot(dy);

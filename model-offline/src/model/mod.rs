@@ -184,7 +184,7 @@ impl<T> Groups<T> {
         self.immobile.iter().chain(&self.needle).chain(paddle)
     }
 
-    /// Everything that may be held.
+    /// Everything that may be constrained.
     fn all(&self) -> impl Iterator<Item = &T> + Clone {
         self.immobile.iter().chain(&self.needle).chain(self.paddles.iter().flatten())
     }
@@ -371,18 +371,18 @@ impl TissueModel {
         &self.target
     }
 
-    /// Sparsity and elimination order that serve every body of this model, whatever is held.
+    /// Sparsity and elimination order that serve every body of this model, whatever is constrained.
     pub(crate) fn analysis(&self) -> &Analysis {
         self.analysis.get_or_init(|| {
             let (rule, positions) = (self.rule(), self.positions());
             match &self.essential {
                 EssentialBoundary::Nodes(groups) => {
-                    let held = groups.all().chain([&self.target]).map(|stencil| stencil.nodes.as_slice());
-                    Analysis::new(rule, positions, held)
+                    let constrained = groups.all().chain([&self.target]).map(|stencil| stencil.nodes.as_slice());
+                    Analysis::new(rule, positions, constrained)
                 }
                 EssentialBoundary::Points(groups) => {
-                    let held = Nitsche::new(&self.planar, &self.tissue, groups.all().cloned());
-                    Analysis::new(rule, positions, held.node_lists().into_iter())
+                    let constrained = Nitsche::new(&self.planar, &self.tissue, groups.all().cloned());
+                    Analysis::new(rule, positions, constrained.node_lists().into_iter())
                 }
             }
         })
@@ -468,7 +468,7 @@ impl Body<'_> {
         self.model.target.interpolate(self.equilibrium.coefficients())
     }
 
-    /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle held, by exact linearisation.
+    /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle still, by exact linearisation.
     /// Rows target x, y; columns paddle x, y.
     ///
     /// # Errors

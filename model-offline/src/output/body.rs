@@ -61,7 +61,7 @@ impl<'a> Picture<'a> {
     fn parts(&self, drawing: &mut Drawing) {
         let scene = self.model.scene();
         drawing.polygon("rest", &self.rest(scene.outline.vertices()));
-        scene.immobile.iter().for_each(|part| drawing.polyline("held", &self.rest(part)));
+        scene.immobile.iter().for_each(|part| drawing.polyline("immobile", &self.rest(part)));
         for inclusion in &scene.inclusions {
             drawing.polygon("rim", &self.moved(inclusion.outline.vertices()));
         }

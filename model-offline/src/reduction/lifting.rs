@@ -20,7 +20,7 @@ pub(super) fn control_values(depth: f64, paddle: Vector2<f64>) -> [f64; 3] {
 ///
 /// # Errors
 /// [`ModelError::Unsupported`] where Nitsche's method holds the body (its prescribed values are met only weakly);
-/// [`ModelError::Solve`] when the body is not held.
+/// [`ModelError::Solve`] when too little of the body is constrained.
 pub(super) fn lifting(
     model: &TissueModel,
     paddle: Option<usize>,

@@ -58,19 +58,19 @@ impl Layout {
             let candidates = (0..edges.len()).filter(|i| Some(*i) != not);
             candidates.min_by(|&a, &b| score(&edges[a], sign).total_cmp(&score(&edges[b], sign))).unwrap_or(0)
         };
-        let held = best(1.0, None);
-        let entry = best(-1.0, Some(held));
+        let supported = best(1.0, None);
+        let entry = best(-1.0, Some(supported));
         let along = edges[entry][1] - edges[entry][0];
         let middle = edges[entry][0] + along * 0.5;
         let normal = Point2::new(-along.y, along.x).normalize();
         let axis = if outline.contains(middle + normal * (1e-3 * size)) { normal } else { -normal };
-        let immobile = edges[held];
+        let immobile = edges[supported];
         let contact = [middle - along * 0.15, middle + along * 0.15];
         let mut others: Vec<[Point2; 2]> = (0..edges.len())
-            .filter(|i| *i != held && *i != entry)
+            .filter(|i| *i != supported && *i != entry)
             .flat_map(|i| {
                 let [a, b] = edges[i];
-                // Long edges carry two paddles; none reaches a corner, where it could touch what is held.
+                // Long edges carry two paddles; none reaches a corner, where it could touch the immobile part.
                 let spans: &[(f64, f64)] =
                     if length(&edges[i]) > 0.25 * size { &[(0.15, 0.45), (0.55, 0.85)] } else { &[(0.2, 0.8)] };
                 spans.iter().map(move |(from, to)| [a + (b - a) * *from, a + (b - a) * *to]).collect::<Vec<_>>()

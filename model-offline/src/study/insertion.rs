@@ -82,7 +82,7 @@ pub fn profile(model: &TissueModel) -> Result<Profile, Failure> {
 /// The insertion as the linear law has it.
 ///
 /// # Errors
-/// [`ModelError`] when the body is not held.
+/// [`ModelError`] when too little of the body is constrained.
 pub fn linear_profile(model: &TissueModel) -> Result<Profile, ModelError> {
     let responses = rest_responses(model)?;
     Ok(responses.iter().map(|r| depths(model.scene()).map(|depth| r.target_per_depth * depth).collect()).collect())

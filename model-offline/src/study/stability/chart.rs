@@ -228,7 +228,7 @@ pub fn figure(study: &Stability) -> Figure {
     Figure {
         title: format!("{conclusion}: {} at spacing {}", study.scene.name, study.spacing),
         caption: format!(
-            "Paddle {} held; the needle is driven to {}, twice the scene's depth. After a title: mean depth over the \
+            "Paddle {} static; the needle is driven to {}, twice the scene's depth. After a title: mean depth over the \
              methods at the left → at the right end.",
             study.paddle,
             plain(deepest(study))

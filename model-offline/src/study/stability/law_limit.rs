@@ -8,7 +8,7 @@ const STEP: f64 = 2e-3;
 /// Stretch below which no limit is looked for.
 const SMALLEST: f64 = 0.02;
 
-/// How the lateral faces of the compressed body are held.
+/// How the lateral faces of the compressed body are constrained.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lateral {
     /// They cannot move: lateral stretch 1.

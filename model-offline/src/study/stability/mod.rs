@@ -34,7 +34,7 @@ pub use files::{csv, zero_energy_csv};
 pub struct LawLimit {
     /// Factor c of the exponential term; absent for the scene's own law.
     pub c: Option<f64>,
-    /// Stretch at the peak of nominal stress, lateral faces held.
+    /// Stretch at the peak of nominal stress, lateral faces confined.
     pub confined: Option<f64>,
     /// The same with free lateral faces.
     pub free: Option<f64>,

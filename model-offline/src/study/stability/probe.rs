@@ -32,8 +32,8 @@ pub enum StopReason {
     /// The nodes cannot be triangulated.
     #[error("no-triangulation")]
     NoTriangulation,
-    /// A held feature has no node.
-    #[error("nothing-held")]
+    /// A constrained feature has no node.
+    #[error("nothing-constrained")]
     NothingConstrained,
     /// The law with these numbers is not stable at rest.
     #[error("unstable-law")]
@@ -172,7 +172,7 @@ pub(super) fn varied(scene: &Scene, setting: &Experiment) -> Result<Scene, Mater
     Ok(scene)
 }
 
-/// Lattice nodes, those inside the body moved at random; nodes on the boundary and on what is held stay.
+/// Lattice nodes, those inside the body moved at random; nodes on the boundary and on the needle stay.
 fn jittered(scene: &Scene, setting: &Experiment) -> Vec<Point2> {
     let mut nodes = lattice_nodes(&scene.features(), setting.spacing);
     if setting.jitter == 0.0 {

@@ -18,7 +18,7 @@ use strum::VariantArray as _;
 /// Eigenvalues below this share of the largest count as zero.
 const ZERO: f64 = 1e-10;
 
-/// What one method feels of deformations that alternate from node to node, on the scene's homogeneous body, nothing held.
+/// What one method feels of deformations that alternate from node to node, on the scene's homogeneous body, nothing constrained.
 ///
 /// On a regular lattice the checkerboard is symmetric about every node of the interior: its gradient vanishes at the node
 /// (DNI) and its mean vanishes over the nodal cell (SCNI), so that neither feels it there, and only the boundary keeps it
