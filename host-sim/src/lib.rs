@@ -42,7 +42,7 @@
 //! # }
 //! ```
 //!
-//! An [`Insertion`] has the full tissue and the controller in a process of its own; a [`Comparison`] is what
+//! A [`SimulatedInsertion`] has the full tissue and the controller in a process of its own; a [`Comparison`] is what
 //! `host-sim run` does.
 
 pub mod bench;
@@ -58,7 +58,7 @@ pub mod world;
 pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
 pub use bench::error::SimError;
 pub use bench::result::RunResult;
-pub use bench::strategy::{ControllerSetup, Extras, Insertion, Label};
+pub use bench::strategy::{ControllerSetup, Extras, Label, SimulatedInsertion};
 pub use bench::tissue_variant::TissueVariant;
 pub use exchange::Space;
 pub use record::recording::Recording;
@@ -67,4 +67,4 @@ pub use runtime::mode::RunMode;
 pub use world::World;
 pub use world::loop_settings::LoopSettings;
 pub use world::simulation::Simulation;
-pub use world::tissue::PlantChoice;
+pub use world::tissue::WantedPlant;

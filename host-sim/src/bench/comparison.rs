@@ -16,7 +16,7 @@ use sha2::{Digest, Sha256};
 
 use super::describe;
 use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
-use super::strategy::{ControllerSetup, Extras, Insertion, Label, Measured};
+use super::strategy::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
 use super::tissue_variant::TissueVariant;
 use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
@@ -192,7 +192,7 @@ struct Studied {
 }
 
 /// `none` and `static` of a case.
-type Uncontrolled = (Option<Measured>, Option<Measured>);
+type Uncontrolled = (Option<MeasuredInsertion>, Option<MeasuredInsertion>);
 
 /// Nothing depends on the table without a paddle: a case that did not run it is held against that of its tissue.
 fn against_none_of_the_same_tissue(cases: &mut [CaseResult]) {
@@ -410,8 +410,8 @@ impl<'p> Comparison<'p> {
         Ok(results)
     }
 
-    fn insertion<'a>(&'a self, case: &Case, label: &'a Label<'a>, progress: &'a dyn Fn()) -> Insertion<'a> {
-        Insertion {
+    fn insertion<'a>(&'a self, case: &Case, label: &'a Label<'a>, progress: &'a dyn Fn()) -> SimulatedInsertion<'a> {
+        SimulatedInsertion {
             model: &self.studied(case.tissue).model,
             simulation: &self.simulation,
             label,
@@ -429,7 +429,7 @@ impl<'p> Comparison<'p> {
         spectator: Option<&dyn Spectator>,
     ) -> Result<(Strategies, Vec<Artifact>), SimError> {
         let mut artifacts = Vec::new();
-        let mut keep = |measured: Measured| {
+        let mut keep = |measured: MeasuredInsertion| {
             artifacts.extend(measured.artifacts);
             measured.result
         };
@@ -457,7 +457,7 @@ impl<'p> Comparison<'p> {
         table: &EncodedTable,
         mode: RunMode,
         spectator: Option<&dyn Spectator>,
-    ) -> Result<Measured, SimError> {
+    ) -> Result<MeasuredInsertion, SimError> {
         let label = case.label(match mode {
             RunMode::Lockstep => "dynamic",
             RunMode::FreeRun => "dynamic-free-run",

@@ -270,7 +270,7 @@ pub struct StrategyResult {
     pub deformed_nodes: Vec<[f64; 2]>,
     /// The body along the way, for drawings; results of older versions have none.
     #[serde(default)]
-    pub frames: Vec<Frame>,
+    pub frames: Vec<BodyFrame>,
     /// Mean duration of a plant step, µs; not part of what is reproducible.
     pub plant_step_us: f64,
     /// Which model answered for the tissue, and how well; results of older versions do not say.
@@ -280,7 +280,7 @@ pub struct StrategyResult {
 
 /// The body at one moment of the insertion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Frame {
+pub struct BodyFrame {
     /// Needle depth, length.
     pub depth: f64,
     /// Nodes there.

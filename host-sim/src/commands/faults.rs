@@ -8,7 +8,7 @@ use firmware::Mode;
 use firmware::contract::Table;
 use host_sim::SimError;
 use host_sim::bench::faults::catalogue::ROWS;
-use host_sim::bench::faults::evidence::Verdict;
+use host_sim::bench::faults::evidence::RowVerdict;
 use host_sim::bench::faults::monitors::{MonitorOff, monitors_off};
 use host_sim::bench::faults::random::{Composed, composed};
 use host_sim::bench::faults::report::{FaultsResult, RowResult};
@@ -140,7 +140,7 @@ fn print_row(row: &RowResult, wall_s: f64) {
         row.unaccounted,
         row.result,
     );
-    if row.result != Verdict::Passed {
+    if row.result != RowVerdict::Passed {
         for note in &row.notes {
             println!("    {note}");
         }

@@ -7,7 +7,7 @@ use host_sim::SimError;
 use host_sim::world::error::OptionRange;
 use host_sim::world::loop_settings::LoopSettings;
 use host_sim::world::simulation::Simulation;
-use host_sim::world::tissue::PlantChoice;
+use host_sim::world::tissue::WantedPlant;
 use model_offline::scene::Scene;
 
 /// How long a silent peer is waited for.
@@ -47,7 +47,7 @@ pub(crate) struct WorldArgs {
     pub(crate) paddle_delay: u32,
     /// What answers for the tissue at every tick [default: full; in free-run reduced where full cannot keep the period]
     #[arg(long, value_enum)]
-    pub(crate) plant: Option<PlantChoice>,
+    pub(crate) plant: Option<WantedPlant>,
     /// Part of its command that the paddle reaches
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub(crate) paddle_gain: f64,

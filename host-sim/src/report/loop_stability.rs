@@ -8,7 +8,7 @@ use crate::bench::loop_stability::StabilityResult;
 use crate::bench::loop_stability::behaviour::Behaviour;
 use crate::bench::loop_stability::cells::{Boundary, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
-use crate::bench::loop_stability::rate_limit::{self, Cell, Law};
+use crate::bench::loop_stability::rate_limit::{self, Cell, Integrator};
 use crate::bench::tissue_variant::TissueVariant;
 use crate::record::export::csv::table;
 
@@ -89,7 +89,7 @@ fn rate_limit_row(c: &Cell) -> [String; 22] {
     row[3] = "1".to_owned();
     row[4] = "0".to_owned();
     row[5] = format!("{limit:.6}");
-    row[17] = c.law.name().to_owned();
+    row[17] = c.integrator.name().to_owned();
     row[18] = format!("{:.6}", c.gain_share);
     row[19] = format!("{:.6}", c.amplitude);
     row[20] = format!("{:.6e}", c.remaining);
@@ -152,16 +152,19 @@ pub fn summary(result: &StabilityResult) -> String {
     }
     out.push_str("\nrate limit with delay, gains below the linear limit, errors up to 100 times what a sample's motion can undo:\n");
     for delay in rate_limit::DELAYS {
-        for law in [Law::Plain, Law::AntiWindup] {
-            let below: Vec<_> =
-                result.cells.iter().filter(|c| c.law == law && c.delay == delay && c.gain_share < 0.99).collect();
+        for integrator in [Integrator::Plain, Integrator::AntiWindup] {
+            let below: Vec<_> = result
+                .cells
+                .iter()
+                .filter(|c| c.integrator == integrator && c.delay == delay && c.gain_share < 0.99)
+                .collect();
             let bad: Vec<_> = below.iter().filter(|c| c.behaviour != Behaviour::Settles).collect();
             let lowest = bad.iter().map(|c| c.gain_share).fold(f64::INFINITY, f64::min);
             let from = if bad.is_empty() { String::new() } else { format!(", from {lowest:.2} of the limit up") };
             let _ = writeln!(
                 out,
                 "  delay {delay}, {:<15} {} of {} cells do not settle{from}",
-                law.name(),
+                integrator.name(),
                 bad.len(),
                 below.len()
             );

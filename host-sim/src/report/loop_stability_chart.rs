@@ -9,7 +9,7 @@ use crate::bench::loop_stability::StabilityResult;
 use crate::bench::loop_stability::behaviour::Behaviour;
 use crate::bench::loop_stability::cells::{ANGLES, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
-use crate::bench::loop_stability::rate_limit::{self, Law};
+use crate::bench::loop_stability::rate_limit::{self, Integrator};
 use crate::bench::tissue_variant::TissueVariant;
 
 /// Delays and paddles, one after the other.
@@ -28,8 +28,8 @@ pub fn figure(result: &StabilityResult) -> Figure {
         panels.push(size_panel(result, TissueVariant::Inclusion, "Table with the inclusion, tissue without it"));
         panels.push(margin_panel(result));
     }
-    for law in [Law::Plain, Law::AntiWindup] {
-        panels.push(rate_panel(result, law, rate_limit::DELAYS[1]));
+    for integrator in [Integrator::Plain, Integrator::AntiWindup] {
+        panels.push(rate_panel(result, integrator, rate_limit::DELAYS[1]));
     }
     let cells = result.boundaries.len() * result.gains().len();
     let disagreeing: usize = result.boundaries.iter().map(|b| b.disagreeing).sum();
@@ -122,17 +122,17 @@ fn margin_panel(result: &StabilityResult) -> Panel {
     }
 }
 
-fn rate_panel(result: &StabilityResult, law: Law, delay: u32) -> Panel {
-    let cells = || result.cells.iter().filter(|c| c.law == law && c.delay == delay);
+fn rate_panel(result: &StabilityResult, integrator: Integrator, delay: u32) -> Panel {
+    let cells = || result.cells.iter().filter(|c| c.integrator == integrator && c.delay == delay);
     let of = |behaviour| {
         let alike = cells().filter(|c| c.behaviour == behaviour);
         alike.map(|c| (c.gain_share, c.amplitude)).collect::<Vec<_>>()
     };
     let below = || cells().filter(|c| c.gain_share < 0.99);
     let bad = below().filter(|c| c.behaviour != Behaviour::Settles).count();
-    let name = match law {
-        Law::Plain => "Plain integral",
-        Law::AntiWindup => "The controller's law",
+    let name = match integrator {
+        Integrator::Plain => "Plain integral",
+        Integrator::AntiWindup => "The controller's law",
     };
     Panel {
         series: vec![

@@ -8,7 +8,7 @@ use model_offline::output::chart::style::band;
 use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
 
 use super::embed::inline;
-use super::view::{View, along, inside, middle};
+use super::view::{PlaneView, along, inside, middle};
 use crate::bench::result::{CaseResult, Geometry, RunResult, StrategyResult};
 
 /// Width of the scene and of a body, px.
@@ -16,7 +16,7 @@ const SCENE_WIDTH: f64 = 420.0;
 const BODY_WIDTH: f64 = 300.0;
 
 /// Short strokes on the outer side of the immobile boundary.
-fn hatch(drawing: &mut Drawing, view: &View, geometry: &Geometry, part: &[[f64; 2]]) {
+fn hatch(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, part: &[[f64; 2]]) {
     drawing.polyline("held", &view.path(part));
     for edge in part.windows(2) {
         let [dx, dy] = [edge[1][0] - edge[0][0], edge[1][1] - edge[0][1]];
@@ -35,7 +35,7 @@ fn hatch(drawing: &mut Drawing, view: &View, geometry: &Geometry, part: &[[f64; 
 }
 
 /// The needle's axis with a point at its contact.
-fn needle(drawing: &mut Drawing, view: &View, geometry: &Geometry, depth: f64) {
+fn needle(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, depth: f64) {
     let [from, to] = view.needle(geometry, depth);
     let way = [to[0] - from[0], to[1] - from[1]];
     let length = way[0].hypot(way[1]);
@@ -71,7 +71,7 @@ fn beside(geometry: &Geometry, extent: f64, segment: &[[f64; 2]; 2]) -> [f64; 2]
 /// The scene at rest with everything named.
 pub(super) fn at_rest(run: &RunResult) -> Drawing {
     let geometry = &run.geometry;
-    let view = View::new(run, SCENE_WIDTH);
+    let view = PlaneView::new(run, SCENE_WIDTH);
     let mut drawing = Drawing::new(view.size(), format!("Scene {} at rest", run.scene));
     drawing.polygon("body", &view.path(&geometry.outline));
     for inclusion in &geometry.inclusions {
@@ -103,7 +103,7 @@ fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
 }
 
 /// Names of the parts, beside them.
-fn words(drawing: &mut Drawing, view: &View, geometry: &Geometry) {
+fn words(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry) {
     let [x, y] = view.at(geometry.target);
     drawing.text("tick halo", [x - 12.0, y - 12.0], Anchor::End, "target");
     let [needle, _] = view.needle(geometry, 0.0);
@@ -121,7 +121,7 @@ fn words(drawing: &mut Drawing, view: &View, geometry: &Geometry) {
 }
 
 /// The nodes of a frame in a drawing, px, with their displacement from rest, px.
-pub(super) fn displaced(view: &View, geometry: &Geometry, nodes: &[[f64; 2]]) -> Vec<(Px, f64)> {
+pub(super) fn displaced(view: &PlaneView, geometry: &Geometry, nodes: &[[f64; 2]]) -> Vec<(Px, f64)> {
     let rest = geometry.nodes.iter().map(|node| view.at(*node));
     nodes
         .iter()
@@ -136,7 +136,7 @@ pub(super) fn displaced(view: &View, geometry: &Geometry, nodes: &[[f64; 2]]) ->
 /// What all bodies of a page share.
 #[derive(Debug)]
 pub(super) struct Surface {
-    pub(super) view: View,
+    pub(super) view: PlaneView,
     pub(super) triangles: Vec<[usize; 3]>,
     pub(super) boundary: Vec<usize>,
     /// Displacement at which the colours end, px.
@@ -145,7 +145,7 @@ pub(super) struct Surface {
 
 impl Surface {
     pub(super) fn new(run: &RunResult) -> Self {
-        let view = View::new(run, BODY_WIDTH);
+        let view = PlaneView::new(run, BODY_WIDTH);
         let geometry = &run.geometry;
         let strategies = run.cases.iter().flat_map(super::insertion::strategies);
         let largest = strategies

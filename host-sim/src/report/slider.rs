@@ -22,14 +22,14 @@ struct Data<'a> {
     axis: [f64; 2],
     normal: [f64; 2],
     scale: f64,
-    bodies: Vec<Body>,
+    bodies: Vec<DrawnBody>,
     charts: Vec<(String, [f64; 4])>,
 }
 
 #[derive(Serialize)]
-struct Body {
+struct DrawnBody {
     id: String,
-    frames: Vec<Frame>,
+    frames: Vec<DrawnFrame>,
     /// Depth, orthogonal error, axial displacement, paddle x, paddle y.
     series: Vec<[f64; 5]>,
     /// Displacement of the paddle in the drawing.
@@ -37,7 +37,7 @@ struct Body {
 }
 
 #[derive(Serialize)]
-struct Frame {
+struct DrawnFrame {
     depth: f64,
     nodes: Vec<[f64; 2]>,
 }
@@ -51,8 +51,8 @@ fn short(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-fn body(run: &RunResult, surface: &Surface, id: String, strategy: &StrategyResult) -> Body {
-    let frame = |depth: f64, nodes: &[[f64; 2]]| Frame {
+fn body(run: &RunResult, surface: &Surface, id: String, strategy: &StrategyResult) -> DrawnBody {
+    let frame = |depth: f64, nodes: &[[f64; 2]]| DrawnFrame {
         depth,
         nodes: surface.view.path(nodes).into_iter().map(rounded).collect(),
     };
@@ -62,7 +62,7 @@ fn body(run: &RunResult, surface: &Surface, id: String, strategy: &StrategyResul
     let last = strategy.series.len().saturating_sub(1);
     let points = strategy.series.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
     let [px, py] = strategy.series.last().map_or([0.0; 2], |point| point.paddle);
-    Body {
+    DrawnBody {
         id,
         frames: std::iter::once(rest).chain(frames).collect(),
         series: points

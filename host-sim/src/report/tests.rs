@@ -48,7 +48,7 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         csv: Some(EVIL.to_owned()),
         series: series.to_vec(),
         deformed_nodes: nodes.clone(),
-        frames: vec![Frame { depth: 0.05, nodes: rest() }, Frame { depth: 0.1, nodes }],
+        frames: vec![BodyFrame { depth: 0.05, nodes: rest() }, BodyFrame { depth: 0.1, nodes }],
         plant_step_us: 1.0,
         plant: crate::world::tissue::PlantAccount::default(),
     }

@@ -12,13 +12,13 @@ const MARGIN: f64 = 0.07;
 
 /// Equal scales on both axes, y upwards.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct View {
+pub(super) struct PlaneView {
     plane: Plane,
     /// Larger side of the scene, length.
     pub(super) extent: f64,
 }
 
-impl View {
+impl PlaneView {
     /// Everything that is ever drawn, this wide.
     pub(super) fn new(run: &RunResult, width: f64) -> Self {
         let geometry = &run.geometry;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::durations::LoopTiming;
 use super::ledger::{LedgerResult, StreamResult, TickResult};
 use super::tick::{ControllerTick, TICK_BYTES};
-use crate::exchange::bytes::{Reader, Writer};
+use crate::exchange::bytes::{ByteReader, ByteWriter};
 
 /// Accounts of one stream at the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,7 +81,7 @@ pub struct ControllerAccounts {
 impl ControllerAccounts {
     /// The line and the ticks. The type has only plain fields: an empty line, which nobody accepts, does not occur.
     pub fn encode(&self, kept: &[ControllerTick]) -> Vec<u8> {
-        let mut writer = Writer(serde_json::to_vec(self).unwrap_or_default());
+        let mut writer = ByteWriter(serde_json::to_vec(self).unwrap_or_default());
         writer.bytes(b"\n");
         for tick in kept {
             tick.encode(&mut writer);
@@ -93,7 +93,7 @@ impl ControllerAccounts {
     pub fn decode(bytes: &[u8]) -> Option<(Self, Vec<ControllerTick>)> {
         let end = bytes.iter().position(|byte| *byte == b'\n')?;
         let accounts: Self = serde_json::from_slice(&bytes[..end]).ok()?;
-        let mut reader = Reader(&bytes[end + 1..]);
+        let mut reader = ByteReader(&bytes[end + 1..]);
         if reader.0.len() as u64 != accounts.kept * TICK_BYTES as u64 {
             return None;
         }

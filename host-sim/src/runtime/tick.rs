@@ -3,7 +3,7 @@
 use firmware::Inputs;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 
-use crate::exchange::bytes::{Reader, Writer};
+use crate::exchange::bytes::{ByteReader, ByteWriter};
 
 /// What the controller saw and answered in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -19,7 +19,7 @@ pub const TICK_BYTES: usize = 4 + 16 + 32 + 32 + 32 + 64;
 
 impl ControllerTick {
     /// Writes the fixed-size form.
-    pub fn encode(&self, writer: &mut Writer) {
+    pub fn encode(&self, writer: &mut ByteWriter) {
         let (inputs, command) = (&self.inputs, &self.command);
         let present = u32::from(inputs.needle.is_some())
             | u32::from(inputs.target.is_some()) << 1
@@ -56,7 +56,7 @@ impl ControllerTick {
     }
 
     /// Reads the fixed-size form; `None` for bytes that nobody writes.
-    pub fn decode(reader: &mut Reader<'_>) -> Option<Self> {
+    pub fn decode(reader: &mut ByteReader<'_>) -> Option<Self> {
         let present = reader.u32()?;
         if present > 7 {
             return None;

@@ -10,7 +10,7 @@ use super::server::View;
 use super::shared::Knobs;
 use crate::bench::error::SimError;
 use crate::bench::result::StrategyResult;
-use crate::bench::strategy::{ControllerSetup, Insertion, Label};
+use crate::bench::strategy::{ControllerSetup, Label, SimulatedInsertion};
 use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
 use crate::runtime::mode::RunMode;
@@ -58,7 +58,7 @@ pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<
             spectator: Some(view),
         };
         let label = Label { tissue: scene.tissue(), table_tissue: basis.table.tissue.as_str(), strategy: "live" };
-        match Insertion::new(&model, &simulation, &label).controlled(&controller) {
+        match SimulatedInsertion::new(&model, &simulation, &label).controlled(&controller) {
             Ok(measured) => say(&line(number, &knobs, &measured.result)),
             Err(SimError::Runtime(RuntimeError::Interrupted { .. })) => return Ok(()),
             // A tissue that has no equilibrium any more is something to see, not the end of the view.

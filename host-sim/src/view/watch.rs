@@ -135,7 +135,7 @@ impl Observer for Watch {
 mod tests {
     use super::*;
     use crate::view::Knobs;
-    use crate::world::tissue::PlantChoice;
+    use crate::world::tissue::WantedPlant;
     use crate::world::truth::Truth;
     use model_offline::model::TissueModel;
     use model_offline::scene::Scene;
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn the_loop_never_waits_for_a_reader() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let tissue = TissuePlant::new(&model, None, PlantChoice::Full).unwrap();
+        let tissue = TissuePlant::new(&model, None, WantedPlant::Full).unwrap();
         let knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
         let shared = Arc::new(Shared::new(knobs));
         let insertion = ObservedInsertion {

@@ -118,7 +118,7 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::faults::evidence::Verdict;
+    use crate::bench::faults::evidence::RowVerdict;
     use crate::bench::paper_table::paper_table;
 
     #[test]
@@ -134,7 +134,7 @@ mod tests {
             for seed in 1..=seeds {
                 let evidence = row.run(&table, seed, 1.0).unwrap();
                 let failures = &evidence.failures;
-                assert_eq!(evidence.verdict(), Verdict::Passed, "row {} seed {seed}: {failures:?}", row.id);
+                assert_eq!(evidence.verdict(), RowVerdict::Passed, "row {} seed {seed}: {failures:?}", row.id);
                 assert!(evidence.injected > 0, "row {}", row.id);
             }
         }

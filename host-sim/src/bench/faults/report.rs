@@ -4,7 +4,7 @@ use firmware::Mode;
 use serde::{Deserialize, Serialize};
 
 use super::catalogue::Row;
-use super::evidence::{Evidence, Verdict};
+use super::evidence::{Evidence, RowVerdict};
 use super::random::Composed;
 use crate::record::export::csv::table;
 use crate::runtime::names;
@@ -34,7 +34,7 @@ pub struct RowResult {
     /// In one account and not in the other: 0.
     pub unaccounted: u64,
     /// Whether the row holds.
-    pub result: Verdict,
+    pub result: RowVerdict,
     /// Why it failed or was not run, and what is worth knowing.
     pub notes: Vec<String>,
 }
@@ -76,7 +76,7 @@ pub struct FaultsResult {
 impl FaultsResult {
     /// Rows that failed.
     pub fn failed(&self) -> usize {
-        self.rows.iter().filter(|row| row.result == Verdict::Failed).count()
+        self.rows.iter().filter(|row| row.result == RowVerdict::Failed).count()
     }
 
     /// `faults.csv`.
@@ -103,7 +103,8 @@ mod tests {
 
     #[test]
     fn the_csv_has_the_columns_and_quotes_commas() {
-        let row = RowResult { id: 8, name: "gaps of 1, 10".to_owned(), result: Verdict::Passed, ..Default::default() };
+        let row =
+            RowResult { id: 8, name: "gaps of 1, 10".to_owned(), result: RowVerdict::Passed, ..Default::default() };
         let csv = FaultsResult { rows: vec![row], ..Default::default() }.csv();
         let csv = String::from_utf8(csv).unwrap();
         let expected = "id,name,injected,detected,ticks_to_detect,max_error,final_state,unaccounted,result\n\

@@ -21,12 +21,12 @@ const VOID_STEAL: f64 = 0.01;
 
 /// What a controller says about itself in a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Answer {
+pub(super) struct ModeAnswer {
     mode: Mode,
     faults: Faults,
 }
 
-impl Answer {
+impl ModeAnswer {
     pub(super) fn of(command: &PaddleCommand) -> Self {
         let mode = Mode::from_wire(command.state).unwrap_or_default();
         Self { mode, faults: Faults::from_bits(command.faults) }
@@ -46,7 +46,7 @@ impl Answer {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stamps {
     /// The controller's mode and reasons; none without a controller.
-    pub(super) answer: Option<Answer>,
+    pub(super) answer: Option<ModeAnswer>,
     /// When its input was measured and when its command was there, ns.
     pub(super) exchanged_ns: Option<(u64, u64)>,
 }
@@ -72,8 +72,8 @@ pub struct LeftRun {
 
 impl LeftRun {
     /// The answer of a controller that should be in RUN, if it is not.
-    pub(super) fn found(measurement: &str, round: u64, tick: u64, answer: Answer) -> Option<Self> {
-        let Answer { mode, faults } = answer;
+    pub(super) fn found(measurement: &str, round: u64, tick: u64, answer: ModeAnswer) -> Option<Self> {
+        let ModeAnswer { mode, faults } = answer;
         let measurement = measurement.to_owned();
         (mode != Mode::Run).then_some(Self { measurement, round, tick, mode: Some(mode), faults })
     }
@@ -117,7 +117,7 @@ pub struct BlockResult {
 }
 
 /// What all blocks of one kind of loop come to.
-pub(super) struct Finished {
+pub(super) struct FinishedBlocks {
     /// In RUN; of a loop without a controller: all of it.
     pub(super) timing: LoopTiming,
     pub(super) more: BlockResult,
@@ -201,7 +201,7 @@ impl Blocks {
     }
 
     /// Everything that was measured.
-    pub(super) fn finish(self) -> Finished {
+    pub(super) fn finish(self) -> FinishedBlocks {
         let given = |durations: &Durations| Some(durations.distribution()).filter(|found| found.count > 0);
         let in_mode = |(mode, durations): (&Option<Mode>, &LoopDurations)| {
             durations.in_mode(*mode, self.rate_hz, &self.scheduling)
@@ -227,7 +227,7 @@ impl Blocks {
             blocks: self.medians_ns.len() as u64,
         };
         let timing = if none.ticks > 0 { none } else { run };
-        Finished { timing, more, left_run: self.left_run, ticks }
+        FinishedBlocks { timing, more, left_run: self.left_run, ticks }
     }
 }
 

@@ -21,7 +21,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::blocks::{BlockResult, LeftRun};
-use self::blocks::{Blocks, Finished, Stamps, ratios};
+use self::blocks::{Blocks, FinishedBlocks, Stamps, ratios};
 use self::machine::{Disturbance, pin, unpin};
 use self::own::Own;
 use self::partner::{Partner, Running};
@@ -145,7 +145,7 @@ pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
     let before = Disturbance::now();
     let pinned = options.cpu.is_some_and(pin);
     let scheduling = request_real_time_at(options.priority);
-    let measurement = Measurement { options, table: &table, controller: &controller, partner, scheduling };
+    let measurement = TimingMeasurement { options, table: &table, controller: &controller, partner, scheduling };
     let outcome = measurement.measure();
     release_real_time();
     unpin();
@@ -156,7 +156,7 @@ pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
 }
 
 /// Everything that the measurements share.
-struct Measurement<'t> {
+struct TimingMeasurement<'t> {
     options: &'t TimingOptions,
     table: &'t Table<f64, 2>,
     controller: &'t Controller<'t, f64>,
@@ -164,7 +164,7 @@ struct Measurement<'t> {
     scheduling: Scheduling,
 }
 
-impl Measurement<'_> {
+impl TimingMeasurement<'_> {
     fn measure(&self) -> Result<TimingResult, SimError> {
         let mut result = TimingResult::default();
         self.periodic(&mut result)?;
@@ -183,7 +183,7 @@ impl Measurement<'_> {
         let mut own = Own::in_run(&controller, self.table, &loop_settings)?;
         let mut blocks = Blocks::new("sweep", rate_hz, (SWEEP_S * rate_hz) as u64, &self.scheduling);
         blocks.block(|release| Ok(Stamps { answer: Some(own.step(release.tick)), exchanged_ns: None }))?;
-        let Finished { timing, more, ticks, .. } = blocks.finish();
+        let FinishedBlocks { timing, more, ticks, .. } = blocks.finish();
         let outside = more.outside_run.iter().map(|timing| timing.deadline_misses).sum::<u64>();
         Ok(SweepResult { rate_hz, ticks, deadline_misses: timing.deadline_misses + outside })
     }

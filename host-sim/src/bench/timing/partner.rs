@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use firmware::contract::{PaddleCommand, Table};
 use iceoryx2::service::ipc;
 
-use super::blocks::{Answer, Stamps};
+use super::blocks::{ModeAnswer, Stamps};
 use super::own::TICKS_TO_RUN;
 use super::peer::{Bare, DATAGRAM, Transport};
 use super::stimulus::{Samples, Stimulus};
@@ -96,13 +96,13 @@ impl Running {
         for tick in 0..TICKS_TO_RUN {
             signals::check()?;
             let stamps = running.at(tick)?;
-            if stamps.answer.is_some_and(Answer::is_run) {
+            if stamps.answer.is_some_and(ModeAnswer::is_run) {
                 running.armed_after = tick + 1;
                 running.stimulus.start_needle(running.armed_after * running.period_ns);
                 return Ok(running);
             }
         }
-        let answer = Answer::of(&running.last.unwrap_or_default());
+        let answer = ModeAnswer::of(&running.last.unwrap_or_default());
         Err(answer.never_armed(TICKS_TO_RUN, running.period_ns))
     }
 
@@ -168,7 +168,7 @@ impl Running {
             Ends::Socket(socket) => over_socket(socket, &samples, &mut self.last),
             Ends::Closed => Err(silent()),
         }?;
-        Ok(Stamps { answer: self.last.as_ref().map(Answer::of), exchanged_ns: Some(exchanged_ns) })
+        Ok(Stamps { answer: self.last.as_ref().map(ModeAnswer::of), exchanged_ns: Some(exchanged_ns) })
     }
 }
 

@@ -161,7 +161,7 @@ mod tests {
     use firmware::Settings;
 
     use super::*;
-    use crate::record::recording::Header;
+    use crate::record::recording::RecordingHeader;
     use crate::runtime::mode::RunMode;
     use crate::runtime::tick::ControllerTick;
 
@@ -178,7 +178,7 @@ mod tests {
 
     fn recorded(records: Vec<Record>) -> Vec<Vec<String>> {
         let settings = Settings::new(1_000_000, 20_000_000, 0);
-        let header = Header { mode: RunMode::Lockstep, seed: 1, scene_hash: [0; 32], settings, table: vec![] };
+        let header = RecordingHeader { mode: RunMode::Lockstep, seed: 1, scene_hash: [0; 32], settings, table: vec![] };
         lines(&recording(&Recording { header, records }, &Vector2::x(), "mm"))
     }
 

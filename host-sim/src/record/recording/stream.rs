@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::{Chain, Header, Record};
+use super::{Chain, Record, RecordingHeader};
 use crate::record::error::FileError;
 use crate::runtime::accounts::RecordAccount;
 use crate::runtime::controller::TickRecorder;
@@ -39,12 +39,12 @@ impl StreamRecorder {
     ///
     /// # Errors
     /// [`FileError::Write`] when there can be no such file.
-    pub fn create(path: &Path, header: &Header) -> Result<Self, FileError> {
+    pub fn create(path: &Path, header: &RecordingHeader) -> Result<Self, FileError> {
         let file = File::create(path).map_err(FileError::write(path))?;
         let (producer, consumer) = RingBuffer::new(RING);
         let stop = Arc::new(AtomicBool::new(false));
         let (chain, start) = Chain::start(header);
-        let writer = Writer { file, chain, consumer, stop: Arc::clone(&stop), account: RecordAccount::default() };
+        let writer = FileWriter { file, chain, consumer, stop: Arc::clone(&stop), account: RecordAccount::default() };
         let writer = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || writer.run(&start))
@@ -68,7 +68,7 @@ impl TickRecorder for StreamRecorder {
     }
 }
 
-struct Writer {
+struct FileWriter {
     file: File,
     chain: Chain,
     consumer: Consumer<ControllerTick>,
@@ -76,7 +76,7 @@ struct Writer {
     account: RecordAccount,
 }
 
-impl Writer {
+impl FileWriter {
     fn run(mut self, start: &[u8]) -> RecordAccount {
         self.write(start);
         loop {
@@ -131,9 +131,9 @@ mod tests {
     use crate::record::recording::Recording;
     use crate::runtime::mode::RunMode;
 
-    fn header() -> Header {
+    fn header() -> RecordingHeader {
         let settings = Settings::new(1_000_000, 20_000_000, 0);
-        Header { mode: RunMode::FreeRun, seed: 1, scene_hash: [0; 32], settings, table: vec![1, 2, 3] }
+        RecordingHeader { mode: RunMode::FreeRun, seed: 1, scene_hash: [0; 32], settings, table: vec![1, 2, 3] }
     }
 
     #[test]
