@@ -3,10 +3,12 @@
 //! Lengths are in the scene's unit, times in the unit that the name ends with.
 
 use firmware::{Faults, Mode};
+use model_offline::discretization::Integration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::tissue_variant::TissueVariant;
+use super::study_failure::StudyFailure;
+use super::tissue_variant::{TableTissue, TissueVariant};
 use crate::runtime::durations::LoopTiming;
 use crate::runtime::ledger::LedgerResult;
 use crate::runtime::mode::RunMode;
@@ -118,7 +120,8 @@ pub struct PlacementResult {
     /// Nodes of the model.
     pub nodes: usize,
     /// Its integration rule.
-    pub integration: String,
+    #[schemars(with = "String")]
+    pub integration: Integration,
     /// Duration of the study, s.
     pub wall_s: f64,
     /// Best static paddle.
@@ -152,7 +155,8 @@ pub struct PaddlePlacement {
     /// Depth reached, length.
     pub reached_depth: f64,
     /// Why the study ended before the full depth.
-    pub failure: Option<String>,
+    #[schemars(with = "Option<String>")]
+    pub failure: Option<StudyFailure>,
 }
 
 /// The insertion without a paddle in a placement study.
@@ -167,7 +171,8 @@ pub struct NoPaddlePlacement {
     /// Depth reached, length.
     pub reached_depth: f64,
     /// Why it ended before the full depth.
-    pub failure: Option<String>,
+    #[schemars(with = "Option<String>")]
+    pub failure: Option<StudyFailure>,
 }
 
 /// Strategies on one tissue with one table.
@@ -176,7 +181,8 @@ pub struct CaseResult {
     /// Tissue of the simulation.
     pub tissue: TissueVariant,
     /// Tissue that the planner and the table believed in.
-    pub table_tissue: String,
+    #[schemars(with = "String")]
+    pub table_tissue: TableTissue,
     /// The table.
     pub table: TableResult,
     /// The strategies.

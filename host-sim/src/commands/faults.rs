@@ -13,6 +13,7 @@ use host_sim::bench::faults::monitors::{MonitorOff, monitors_off};
 use host_sim::bench::faults::random::{Composed, composed};
 use host_sim::bench::faults::report::{FaultsResult, RowResult};
 use host_sim::bench::paper_table::paper_table;
+use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
 use host_sim::runtime::signals;
@@ -60,7 +61,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     signals::install();
     EFFORT.check(args.effort)?;
     if let Some(unknown) = args.only.iter().find(|id| !ROWS.iter().any(|row| row.id == **id)) {
-        return Err(SimError::Usage(format!("--only {unknown}: the catalogue has rows 1 to {}", ROWS.len())));
+        return Err(UsageError::NoRow { row: *unknown, last: ROWS.len() }.into());
     }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
@@ -72,12 +73,8 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     if args.monitors_off {
         return without_monitors(args, &table);
     }
-    let mut result = FaultsResult {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        seed: args.seed,
-        mode: "rows 1 to 32 and random schedules: lockstep; rows 33 to 45: real processes".to_owned(),
-        ..FaultsResult::default()
-    };
+    let mut result =
+        FaultsResult { version: env!("CARGO_PKG_VERSION").to_owned(), seed: args.seed, ..FaultsResult::default() };
     for row in ROWS.iter().filter(|row| args.only.is_empty() || args.only.contains(&row.id)) {
         signals::check()?;
         let started = Instant::now();

@@ -19,7 +19,6 @@ use host_sim::view::{self, Basis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
 
 use super::outputs::check_json_beside_report;
-use super::progress::Bar;
 use super::world_args::{WorldArgs, threads_within_reason};
 
 /// Options of `run`.
@@ -104,12 +103,12 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     check_directory(&args.out)?;
     let inputs: Vec<&Path> = args.table.iter().chain(&args.world.scene).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json.as_deref(), &args.out)?;
-    let bar = Bar::new(args.quiet);
+    let bar = super::progress_bar(args.quiet);
     let options = args.options()?;
     let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &bar))?;
     let view = args.view.then(|| live_view(args, &simulation.loop_settings)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
-    bar.finish();
+    bar.finish_and_clear();
     write_run(&args.out, &compared.result, compared.artifacts)?;
     if let Some(path) = &args.json {
         write_json(path, &compared.result)?;

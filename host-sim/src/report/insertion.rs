@@ -29,7 +29,7 @@ fn is_dynamic(class: &str) -> bool {
 
 /// A case in words.
 pub(super) fn case_name(case: &CaseResult) -> String {
-    if case.tissue.name() == case.table_tissue {
+    if case.table_tissue.is(case.tissue) {
         format!("{}, table of the same tissue", case.tissue)
     } else {
         format!("{}, table of tissue {}", case.tissue, case.table_tissue)
@@ -83,7 +83,7 @@ fn errors(strategy: &StrategyResult) -> Vec<(f64, f64)> {
 
 /// Tissue, and table where that is of another one.
 fn short_name(case: &CaseResult) -> String {
-    if case.tissue.name() == case.table_tissue {
+    if case.table_tissue.is(case.tissue) {
         case.tissue.to_string()
     } else {
         format!("{} (table: {})", case.tissue, case.table_tissue)

@@ -1,5 +1,6 @@
 //! Every sample and every tick accounted for.
 
+use firmware::Discard;
 use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, count};
 
@@ -12,7 +13,7 @@ fn ledgers(run: &RunResult) -> Vec<(String, &LedgerResult)> {
         .iter()
         .flat_map(|case| strategies(case).into_iter().map(move |shown| (case, shown)))
         .filter_map(|(case, (.., strategy))| {
-            let table = if case.tissue.name() == case.table_tissue {
+            let table = if case.table_tissue.is(case.tissue) {
                 String::new()
             } else {
                 format!(" (table of {})", case.table_tissue)
@@ -22,8 +23,9 @@ fn ledgers(run: &RunResult) -> Vec<(String, &LedgerResult)> {
         .collect()
 }
 
-fn reasons(reasons: &[(String, u64)]) -> String {
-    let all: Vec<String> = reasons.iter().map(|(reason, number)| format!("{reason}: {}", count(*number))).collect();
+fn reasons(reasons: &[(Discard, u64)]) -> String {
+    let all: Vec<String> =
+        reasons.iter().map(|(reason, number)| format!("{}: {}", reason.name(), count(*number))).collect();
     if all.is_empty() { NO_NUMBER.to_owned() } else { all.join(", ") }
 }
 

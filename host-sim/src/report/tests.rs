@@ -2,12 +2,15 @@
 
 use super::*;
 use crate::bench::result::*;
-use crate::bench::tissue_variant::TissueVariant;
+use crate::bench::study_failure::StudyFailure;
+use crate::bench::tissue_variant::{TableTissue, TissueVariant};
 use crate::runtime::clock::Scheduling;
 use crate::runtime::durations::{Distribution, LoopTiming};
 use crate::runtime::ledger::{LedgerResult, StreamResult};
 use crate::runtime::mode::RunMode;
-use firmware::Faults;
+use firmware::{Discard, Faults};
+use model_offline::discretization::Integration;
+use model_offline::solver::equilibrium::FailureReason;
 
 const EVIL: &str = "<script>alert(\"x\")</script>&'";
 
@@ -34,7 +37,7 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         ledger: controlled.then(|| LedgerResult {
             needle: StreamResult {
                 published: 1_234_567,
-                discarded_for: vec![(EVIL.to_owned(), 3)],
+                discarded_for: vec![(Discard::Late, 3)],
                 ..StreamResult::default()
             },
             ..LedgerResult::default()
@@ -66,7 +69,7 @@ fn timing() -> LoopTiming {
     LoopTiming {
         rate_hz: 1000.0,
         ticks: 3,
-        scheduling: Scheduling { policy: EVIL.to_owned(), memory_locked: false },
+        scheduling: Scheduling::default(),
         release_lateness: distribution.clone(),
         execution_time: distribution.clone(),
         response_time: distribution,
@@ -88,7 +91,7 @@ fn paddle_placement(index: u32) -> PaddlePlacement {
         orthogonal: vec![-0.001 * f64::from(index)],
         max_orthogonal: 0.001 * f64::from(index),
         reached_depth: 0.1,
-        failure: Some(EVIL.to_owned()),
+        failure: Some(StudyFailure { reason: FailureReason::NotConverged, detail: EVIL.to_owned() }),
     }
 }
 
@@ -96,16 +99,16 @@ fn run(scene: &str) -> RunResult {
     let placement = |tissue: TissueVariant| PlacementResult {
         tissue,
         nodes: 9,
-        integration: EVIL.to_owned(),
+        integration: Integration::default(),
         wall_s: 0.1,
         best_static: 1,
         best_dynamic: 1,
         paddles: vec![paddle_placement(1), paddle_placement(2)],
         no_paddle: None,
     };
-    let case = |tissue: TissueVariant, table_tissue: &str| CaseResult {
+    let case = |tissue: TissueVariant, table_tissue: TableTissue| CaseResult {
         tissue,
-        table_tissue: table_tissue.to_owned(),
+        table_tissue,
         table: TableResult {
             hash: EVIL.to_owned(),
             scene_hash: EVIL.to_owned(),
@@ -162,7 +165,10 @@ fn run(scene: &str) -> RunResult {
             nodes: rest(),
         },
         placements: vec![placement(TissueVariant::Homogeneous), placement(TissueVariant::Inclusion)],
-        cases: vec![case(TissueVariant::Homogeneous, "homogeneous"), case(TissueVariant::Inclusion, EVIL)],
+        cases: vec![
+            case(TissueVariant::Homogeneous, TableTissue::OfThisScene(TissueVariant::Homogeneous)),
+            case(TissueVariant::Inclusion, TableTissue::OfAnotherScene(EVIL.to_owned())),
+        ],
         wall_s: 1.0,
         command: vec!["host-sim".to_owned(), EVIL.to_owned()],
         platform: EVIL.to_owned(),

@@ -13,7 +13,7 @@ fn loops(run: &RunResult) -> Vec<(String, &LoopTiming)> {
     let free_runs = run.cases.iter().filter_map(|case| case.strategies.dynamic_free_run.as_ref().map(|s| (case, s)));
     free_runs
         .flat_map(|(case, strategy)| {
-            let tissue = if case.tissue.name() == case.table_tissue {
+            let tissue = if case.table_tissue.is(case.tissue) {
                 case.tissue.to_string()
             } else {
                 format!("{} with the table of {}", case.tissue, case.table_tissue)

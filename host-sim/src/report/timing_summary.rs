@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::bench::timing::{LeftRun, SweepResult, TimingResult};
+use crate::runtime::clock::SchedulingPolicy;
 use crate::runtime::durations::{Distribution, LoopTiming};
 use crate::runtime::ledger::TickResult;
 use crate::runtime::names;
@@ -14,7 +15,7 @@ fn us(ns: u64) -> f64 {
 /// The line that users of cyclictest know, in µs, and the percentiles that it does not have.
 fn cyclictest(number: usize, priority: u8, timing: &LoopTiming, last_ns: u64) -> String {
     let lateness = &timing.release_lateness;
-    let priority = if timing.scheduling.policy.starts_with("SCHED_FIFO") { priority } else { 0 };
+    let priority = if matches!(timing.scheduling.policy, SchedulingPolicy::Fifo { .. }) { priority } else { 0 };
     format!(
         "T:{number:2} ({:5}) P:{priority:2} I:{:.0} C:{:7} Min:{:7.0} Act:{:5.0} Avg:{:5.0} Max:{:8.0}",
         std::process::id(),

@@ -131,12 +131,7 @@ fn stream(account: &StreamAccount, published: u64) -> StreamResult {
         consumed: account.consumed,
         overwritten: account.overwritten,
         discarded,
-        discarded_for: Discard::ALL
-            .iter()
-            .zip(account.discarded)
-            .filter(|(_, count)| *count > 0)
-            .map(|(reason, count)| (reason.name().to_owned(), count))
-            .collect(),
+        discarded_for: Discard::ALL.into_iter().zip(account.discarded).filter(|(_, count)| *count > 0).collect(),
         in_flight: account.in_flight,
         unaccounted: published.abs_diff(entries) + account.unaccounted,
     }

@@ -1,7 +1,10 @@
 //! Accounts of samples, commands and ticks over both sides of the loop.
 
+use firmware::Discard;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+use super::names;
 
 /// All accounts of one run of the controller.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -35,7 +38,9 @@ pub struct StreamResult {
     /// Looked at and refused.
     pub discarded: u64,
     /// Refusals by reason, those that occurred.
-    pub discarded_for: Vec<(String, u64)>,
+    #[serde(with = "names::discards")]
+    #[schemars(with = "Vec<(String, u64)>")]
+    pub discarded_for: Vec<(Discard, u64)>,
     /// Published, and not looked at any more when the receiver stopped.
     pub in_flight: u64,
     /// Publications without an entry: 0.

@@ -41,10 +41,10 @@ impl View {
     /// Serves on 127.0.0.1 at this port; 0: any free one.
     ///
     /// # Errors
-    /// [`SimError::View`] when the port is taken or there is no randomness for the token.
+    /// [`SimError::ViewPort`] when the port is taken, [`SimError::ViewToken`] without randomness for the token.
     pub fn start(port: u16, knobs: Knobs) -> Result<Self, SimError> {
-        let token = token().map_err(|error| SimError::View(format!("no random token: {error}")))?;
-        let failed = |error| SimError::View(format!("cannot listen on port {port} of 127.0.0.1: {error}"));
+        let token = token().map_err(|source| SimError::ViewToken { source })?;
+        let failed = |source| SimError::ViewPort { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();

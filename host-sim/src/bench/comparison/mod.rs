@@ -1,26 +1,33 @@
 //! Strategies compared: placement, tables, one insertion after the other, one result.
 
-use std::path::{Path, PathBuf};
+mod cases;
+mod encoded_table;
+mod progress;
+
+use std::path::PathBuf;
 use std::time::Instant;
 
 use firmware::Controller;
-use firmware::contract::{Table, decode};
-use model_offline::model::{ModelError, TissueModel};
+use firmware::contract::Table;
+use model_offline::model::ModelError;
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
 use model_offline::placement::study::steps;
-use model_offline::placement::{Placement, PlacementOptions, discretise, place};
+use model_offline::placement::{PlacementOptions, PlacementStudy};
 use model_offline::scene::Scene;
 use model_offline::table::{TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
 
+use self::cases::{Case, cases};
+pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
+pub use self::progress::{Progress, Silent};
 use super::describe;
 use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
 use super::strategy::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
-use super::tissue_variant::TissueVariant;
+use super::tissue_variant::{TableTissue, TissueVariant};
 use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
-use crate::record::files::{Artifact, read_bytes};
+use crate::record::files::Artifact;
 use crate::runtime::executor::{Hardware, ScalarChoice};
 use crate::runtime::mode::RunMode;
 use crate::runtime::plant::observer::Spectator;
@@ -70,125 +77,11 @@ impl ComparisonOptions {
     }
 }
 
-/// Somebody who wants to know how far a comparison has come.
-pub trait Progress: Sync {
-    /// So many steps there will be.
-    fn begin(&self, steps: u64) {
-        let _ = steps;
-    }
-
-    /// One of them is done.
-    fn step(&self) {}
-
-    /// What is being done from now on.
-    fn say(&self, what: &str) {
-        let _ = what;
-    }
-}
-
-/// Nobody wants to know.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Silent;
-
-impl Progress for Silent {}
-
-/// Reads and validates a table file.
-///
-/// # Errors
-/// [`SimError::File`], [`SimError::Table`].
-pub fn read_table(path: &Path) -> Result<EncodedTable, SimError> {
-    let bytes = read_bytes(path)?;
-    let table = decode(&bytes).map_err(|source| SimError::Table { path: path.to_owned(), source })?;
-    Ok(EncodedTable { table, bytes })
-}
-
-/// A table, and the bytes that the controller decodes.
-#[derive(Clone, Debug)]
-pub struct EncodedTable {
-    /// The table in double precision.
-    pub table: Table<f64, 2>,
-    /// Its bytes in the controller's number type.
-    pub bytes: Vec<u8>,
-}
-
-/// Refuses a table in other units of length and stress than `expected`.
-///
-/// # Errors
-/// [`SimError::TableUnits`].
-pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -> Result<(), SimError> {
-    let found = [table.units.length.as_str().to_owned(), table.units.stress.as_str().to_owned()];
-    if found == *expected {
-        return Ok(());
-    }
-    Err(SimError::TableUnits { path: path.to_owned(), found, expected: expected.clone() })
-}
-
-/// Whether a table was computed from this scene, with or without its inclusions.
-pub fn is_of(table: &Table<f64, 2>, scene: &Scene) -> bool {
-    TissueVariant::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash)
-}
-
-/// A plant, and what its controller believes.
-#[derive(Clone, Copy, Debug)]
-struct Case {
-    tissue: TissueVariant,
-    table_tissue: TissueVariant,
-    /// A mismatch repeats nothing that its plant's own case shows already.
-    is_mismatch: bool,
-}
-
-impl Case {
-    fn label<'a>(&self, strategy: &'a str) -> Label<'a> {
-        Label { tissue: self.tissue.name(), table_tissue: self.table_tissue.name(), strategy }
-    }
-
-    /// Insertions of this case.
-    fn runs(&self, mode: Option<RunMode>) -> u64 {
-        match (mode, self.is_mismatch) {
-            (None, false) => 4,
-            (Some(_), false) => 3,
-            (_, true) => 2,
-        }
-    }
-}
-
-/// What is to be simulated.
-fn cases(options: &ComparisonOptions, scene: &Scene, table: Option<&Table<f64, 2>>) -> Result<Vec<Case>, SimError> {
-    let has_inclusion = !scene.inclusions.is_empty();
-    let asked = [options.tissue, options.table_tissue];
-    if !has_inclusion && asked.contains(&Some(TissueVariant::Inclusion)) {
-        return Err(SimError::NoInclusion { scene: scene.name.clone() });
-    }
-    let believed = match table {
-        Some(table) if table.tissue == TissueVariant::Homogeneous.name() => Some(TissueVariant::Homogeneous),
-        Some(table) if has_inclusion && table.tissue == TissueVariant::Inclusion.name() => {
-            Some(TissueVariant::Inclusion)
-        }
-        _ => options.table_tissue,
-    };
-    let case = |tissue| Case { tissue, table_tissue: believed.unwrap_or(tissue), is_mismatch: false };
-    let mut cases = match options.tissue {
-        Some(tissue) => vec![case(tissue)],
-        None if has_inclusion => TissueVariant::ALL.map(case).to_vec(),
-        None => vec![case(TissueVariant::Homogeneous)],
-    };
-    if has_inclusion && options.tissue.is_none() && believed.is_none() {
-        cases.push(Case {
-            tissue: TissueVariant::Inclusion,
-            table_tissue: TissueVariant::Homogeneous,
-            is_mismatch: true,
-        });
-    }
-    Ok(cases)
-}
-
 /// A tissue of the comparison, with its placement study.
 #[derive(Debug)]
 struct Studied {
     tissue: TissueVariant,
-    model: TissueModel,
-    placement: Placement,
-    wall_s: f64,
+    study: PlacementStudy,
 }
 
 /// `none` and `static` of a case.
@@ -281,7 +174,7 @@ impl<'p> Comparison<'p> {
                 return Err(SimError::OtherScene { path: path.clone(), scene: scene.name.clone() });
             }
         }
-        let cases = cases(&options, &scene, given.as_ref().map(|given| &given.table))?;
+        let cases = cases([options.tissue, options.table_tissue], &scene, given.as_ref().map(|given| &given.table))?;
         let mut comparison =
             Self { scene, simulation, options, progress, started, cases, studied: Vec::new(), tables: Vec::new() };
         comparison.study()?;
@@ -327,30 +220,25 @@ impl<'p> Comparison<'p> {
             let is_its = move |case: &Case| case.tissue == tissue || case.table_tissue == tissue;
             self.cases.iter().any(is_its)
         };
-        let models = TissueVariant::ALL
-            .into_iter()
-            .filter(|tissue| occurs(*tissue))
-            .map(|tissue| Ok((tissue, discretise(&tissue.of(&self.scene))?.0)))
-            .collect::<Result<Vec<_>, SimError>>()?;
-        let studies: u64 = models.iter().map(|(_, model)| steps(model.scene())).sum();
+        let tissues: Vec<TissueVariant> = TissueVariant::ALL.into_iter().filter(|tissue| occurs(*tissue)).collect();
+        let studies: u64 = tissues.iter().map(|tissue| steps(&tissue.of(&self.scene))).sum();
         let ticks = (self.simulation.duration_s * self.simulation.loop_settings.rate) as u64;
         let runs: u64 = self.cases.iter().map(|case| case.runs(self.options.mode)).sum();
         self.progress.begin(studies + runs * ticks);
-        for (tissue, model) in models {
+        for tissue in tissues {
             self.progress.say(&format!("{tissue}: placement"));
-            let started = Instant::now();
             let step = || self.progress.step();
-            let placement =
-                place(&model, &PlacementOptions { threads: self.options.threads, progress: &step, newton: None })?;
+            let options = PlacementOptions { threads: self.options.threads, progress: &step, newton: None };
+            let study = PlacementStudy::run(&tissue.of(&self.scene), &options)?;
             signals::check()?;
-            self.studied.push(Studied { tissue, model, placement, wall_s: started.elapsed().as_secs_f64() });
+            self.studied.push(Studied { tissue, study });
         }
         Ok(())
     }
 
-    fn studied(&self, tissue: TissueVariant) -> &Studied {
+    fn studied(&self, tissue: TissueVariant) -> &PlacementStudy {
         let found = self.studied.iter().find(|studied| studied.tissue == tissue);
-        found.expect("the tissues of all cases are studied")
+        &found.expect("the tissues of all cases are studied").study
     }
 
     /// A table for every case.
@@ -474,12 +362,6 @@ impl<'p> Comparison<'p> {
         self.insertion(case, &label, &|| self.progress.step()).controlled(&controller)
     }
 
-    /// What the table believes in, in words: its tissue, and that it is of another scene.
-    fn believed_tissue(&self, table: &Table<f64, 2>) -> String {
-        let tissue = table.tissue.as_str();
-        if is_of(table, &self.scene) { tissue.to_owned() } else { format!("{tissue} of another scene") }
-    }
-
     fn case_result(&self, case: &Case, encoded: &EncodedTable, strategies: Strategies) -> Result<CaseResult, SimError> {
         let EncodedTable { table, bytes } = encoded;
         let settings = self.simulation.loop_settings.settings(table.validity.depth_end);
@@ -494,7 +376,7 @@ impl<'p> Comparison<'p> {
         let (improvement, improvement_over_none) = (over(&strategies.static_paddle), over(&strategies.none));
         Ok(CaseResult {
             tissue: case.tissue,
-            table_tissue: self.believed_tissue(table),
+            table_tissue: TableTissue::believed(table, &self.scene),
             table: TableResult {
                 hash: hex(&Sha256::digest(bytes)),
                 scene_hash: hex(&table.scene_hash),
@@ -513,10 +395,7 @@ impl<'p> Comparison<'p> {
     }
 
     fn placements(&self) -> Vec<PlacementResult> {
-        self.studied
-            .iter()
-            .map(|studied| describe::placement(studied.tissue, &studied.model, &studied.placement, studied.wall_s))
-            .collect()
+        self.studied.iter().map(|studied| describe::placement(studied.tissue, &studied.study)).collect()
     }
 
     fn result(&self, cases: Vec<CaseResult>) -> RunResult {
@@ -528,7 +407,7 @@ impl<'p> Comparison<'p> {
             mode: self.options.mode.unwrap_or(RunMode::Lockstep),
             seed: self.simulation.seed,
             settings: describe::settings(&self.scene, &self.simulation),
-            geometry: describe::geometry(&self.scene, &self.studied[0].model),
+            geometry: describe::geometry(&self.scene, &self.studied[0].study.model),
             placements: self.placements(),
             cases,
             wall_s: self.started.elapsed().as_secs_f64(),

@@ -58,6 +58,15 @@ impl RowResult {
     }
 }
 
+/// What drives time in the catalogue.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CatalogueMode {
+    /// Faults inside of the loop in virtual time; deaths of processes and the like need real ones.
+    #[default]
+    #[serde(rename = "rows 1 to 32 and random schedules: lockstep; rows 33 to 45: real processes")]
+    LockstepThenProcesses,
+}
+
 /// Result of `faults`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultsResult {
@@ -66,7 +75,7 @@ pub struct FaultsResult {
     /// Seed of phases, noise and schedules.
     pub seed: u64,
     /// Rows 1 to 32 are in lockstep, the others in real time.
-    pub mode: String,
+    pub mode: CatalogueMode,
     /// The rows that were tried.
     pub rows: Vec<RowResult>,
     /// Random schedules of several faults at once.

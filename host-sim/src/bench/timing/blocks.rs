@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::machine::Disturbance;
+use crate::bench::rounds::MeasuredLoop;
 use crate::runtime::clock::{Scheduling, now_ns};
 use crate::runtime::durations::{Distribution, Durations, LoopDurations, LoopTiming};
 use crate::runtime::error::RuntimeError;
@@ -55,7 +56,7 @@ pub(super) struct Stamps {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftRun {
     /// What was being measured.
-    pub measurement: String,
+    pub measurement: MeasuredLoop,
     /// Round, from 1.
     pub round: u64,
     /// Release of the round, or exchange, at which RUN ended.
@@ -72,9 +73,8 @@ pub struct LeftRun {
 
 impl LeftRun {
     /// The answer of a controller that should be in RUN, if it is not.
-    pub(super) fn found(measurement: &str, round: u64, tick: u64, answer: ModeAnswer) -> Option<Self> {
+    pub(super) fn found(measurement: MeasuredLoop, round: u64, tick: u64, answer: ModeAnswer) -> Option<Self> {
         let ModeAnswer { mode, faults } = answer;
-        let measurement = measurement.to_owned();
         (mode != Mode::Run).then_some(Self { measurement, round, tick, mode: Some(mode), faults })
     }
 }
@@ -84,7 +84,7 @@ const MODES: [Option<Mode>; 4] = [None, Some(Mode::Run), Some(Mode::Hold), Some(
 
 /// Blocks of one kind of loop.
 pub(super) struct Blocks {
-    name: &'static str,
+    measured: MeasuredLoop,
     rate_hz: f64,
     ticks: u64,
     scheduling: Scheduling,
@@ -128,9 +128,9 @@ pub(super) struct FinishedBlocks {
 
 impl Blocks {
     /// Blocks in which `ticks` releases come due.
-    pub(super) fn new(name: &'static str, rate_hz: f64, ticks: u64, scheduling: &Scheduling) -> Self {
+    pub(super) fn new(measured: MeasuredLoop, rate_hz: f64, ticks: u64, scheduling: &Scheduling) -> Self {
         Self {
-            name,
+            measured,
             rate_hz,
             ticks,
             scheduling: scheduling.clone(),
@@ -169,7 +169,7 @@ impl Blocks {
             self.record(&served, &stamps);
             standing = Some(mode);
             let round = self.medians_ns.len() as u64 + 1;
-            let found = |answer| LeftRun::found(self.name, round, release.tick, answer);
+            let found = |answer| LeftRun::found(self.measured, round, release.tick, answer);
             left_run = left_run.or_else(|| stamps.answer.and_then(found));
         }
         if let Some(unserved) = periodic.unserved() {

@@ -13,6 +13,7 @@ use super::blocks::{ModeAnswer, Stamps};
 use super::own::TICKS_TO_RUN;
 use super::peer::{Bare, DATAGRAM, Transport};
 use super::stimulus::{Samples, Stimulus};
+use crate::bench::rounds::MeasuredLoop;
 use crate::exchange::{Departure, PlantPorts, Space};
 use crate::process::dies_with_parent;
 use crate::runtime::child::describe_exit;
@@ -138,12 +139,12 @@ impl Running {
         Ok(Self { ends, child, space, stimulus, last: None, transport, period_ns, armed_after: 0 })
     }
 
-    /// What is exchanged, for people.
-    pub(super) const fn name(&self) -> &'static str {
+    /// What is measured with it.
+    pub(super) const fn measured(&self) -> MeasuredLoop {
         match self.transport {
-            Transport::Link => "exchange over shared memory",
-            Transport::Bare => "bare iceoryx2",
-            Transport::Socket => "exchange over a Unix socket",
+            Transport::Link => MeasuredLoop::Link,
+            Transport::Bare => MeasuredLoop::Bare,
+            Transport::Socket => MeasuredLoop::Socket,
         }
     }
 
