@@ -10,9 +10,9 @@ use host_sim::bench::paper_table::paper_table;
 use host_sim::exchange::{ControllerPorts, Departure, PlantPorts, Space};
 use host_sim::record::recording::RecordingHeader;
 use host_sim::record::recording::stream::StreamRecorder;
+use host_sim::runtime::accounting::tick::ControllerTick;
 use host_sim::runtime::controller::TickRecorder as _;
-use host_sim::runtime::mode::RunMode;
-use host_sim::runtime::tick::ControllerTick;
+use host_sim::runtime::time::mode::RunMode;
 use iceoryx2::service::ipc;
 
 thread_local! {

@@ -7,9 +7,9 @@ use firmware::serial::{FrameWriter, Request};
 use firmware::{Faults, Settings};
 use host_sim::exchange::bytes::ByteWriter;
 use host_sim::record::recording::{Record, Recording, RecordingHeader};
-use host_sim::runtime::accounts::ControllerAccounts;
-use host_sim::runtime::mode::RunMode;
-use host_sim::runtime::tick::ControllerTick;
+use host_sim::runtime::accounting::accounts::ControllerAccounts;
+use host_sim::runtime::accounting::tick::ControllerTick;
+use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::truth::Truth;
 use proptest::prelude::*;
 

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use host_sim::bench::timing::TimingResult;
 use host_sim::report::directory::read_run;
-use host_sim::runtime::durations::LoopTiming;
+use host_sim::runtime::time::durations::LoopTiming;
 
 const STOP: Duration = Duration::from_secs(1);
 

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use super::study_failure::StudyFailure;
 use super::tissue_variant::{TableTissue, TissueVariant};
-use crate::runtime::durations::LoopTiming;
-use crate::runtime::ledger::LedgerResult;
-use crate::runtime::mode::RunMode;
+use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
+use crate::runtime::time::durations::LoopTiming;
+use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::PlantAccount;
 
 /// Version of this format.

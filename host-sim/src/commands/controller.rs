@@ -13,10 +13,10 @@ use host_sim::record::recording::stream::StreamRecorder;
 use host_sim::runtime::controller::ControlLoop;
 use host_sim::runtime::controller::process::{ControllerResult, ServedPlant, Service, serve};
 use host_sim::runtime::executor::{AnyTable, Hardware, on_emulated_board};
-use host_sim::runtime::introduction::Introduction;
-use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::names;
+use host_sim::runtime::peer::introduction::Introduction;
 use host_sim::runtime::signals;
+use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::loop_settings::LoopSettings;
 use model_offline::output::table_text::hex;
 

@@ -9,12 +9,12 @@ use host_sim::bench::strategy::Extras;
 use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_run};
-use host_sim::report::summary::summary;
+use host_sim::report::terminal::summary::summary;
 use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::executor::{Hardware, ScalarChoice};
-use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::signals;
+use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{self, Basis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
 

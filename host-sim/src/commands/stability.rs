@@ -9,8 +9,8 @@ use host_sim::bench::loop_stability::behaviour::Detail;
 use host_sim::bench::loop_stability::simulate;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
-use host_sim::report::loop_stability::{csv, summary};
-use host_sim::report::loop_stability_chart::figure;
+use host_sim::report::studies::loop_stability::{csv, summary};
+use host_sim::report::studies::loop_stability_chart::figure;
 use host_sim::runtime::signals;
 use model_offline::scene::Scene;
 

@@ -9,7 +9,7 @@ use host_sim::bench::tables::{KNOTS, compare};
 use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
-use host_sim::report::tables::{csv, figure, summary};
+use host_sim::report::studies::tables::{csv, figure, summary};
 use model_offline::placement::discretise;
 use model_offline::scene::Scene;
 

@@ -8,11 +8,11 @@ use host_sim::bench::timing::{TimingOptions, TimingResult, timing as measure};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
+use host_sim::report::terminal::timing_summary::timing_summary;
 use host_sim::report::timing_histograms;
-use host_sim::report::timing_summary::timing_summary;
-use host_sim::runtime::clock::FIFO_PRIORITY;
 use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::signals;
+use host_sim::runtime::time::clock::FIFO_PRIORITY;
 use host_sim::world::error::OptionRange;
 
 use super::outputs::check_outputs;

@@ -26,8 +26,8 @@ use sha2::{Digest, Sha256};
 use super::error::{RecordError, RecordingError};
 use super::files;
 use crate::exchange::bytes::{ByteReader, ByteWriter};
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::accounting::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 use crate::world::truth::Truth;
 
 mod layout;

@@ -13,8 +13,8 @@ use crate::bench::result::StrategyResult;
 use crate::bench::strategy::{ControllerSetup, Label, SimulatedInsertion};
 use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
-use crate::runtime::mode::RunMode;
 use crate::runtime::names;
+use crate::runtime::time::mode::RunMode;
 use crate::world::error::WorldError;
 use crate::world::simulation::Simulation;
 

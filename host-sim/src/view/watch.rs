@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::shared::{FRAME_NS, Shared, ViewState};
-use crate::runtime::clock::{now_ns, sleep_until};
-use crate::runtime::mode::RunMode;
 use crate::runtime::plant::observer::{Moment, ObservedInsertion, Observer};
 use crate::runtime::signals;
+use crate::runtime::time::clock::{now_ns, sleep_until};
+use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::TissuePlant;
 
 /// How long a paused loop sleeps between two looks.

@@ -5,8 +5,8 @@ use firmware::serial::{Frame, FrameReader, Reply, Request};
 use host_sim::exchange::bytes::{ByteReader, ByteWriter};
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::recording::Recording;
-use host_sim::runtime::accounts::ControllerAccounts;
-use host_sim::runtime::tick::{ControllerTick, TICK_BYTES};
+use host_sim::runtime::accounting::accounts::ControllerAccounts;
+use host_sim::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
 use model_offline::scene::Scene;
 use model_offline::scene::import::{Imported, gmsh, svg};
 

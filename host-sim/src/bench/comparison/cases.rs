@@ -6,7 +6,7 @@ use model_offline::scene::Scene;
 use crate::bench::error::SimError;
 use crate::bench::strategy::Label;
 use crate::bench::tissue_variant::TissueVariant;
-use crate::runtime::mode::RunMode;
+use crate::runtime::time::mode::RunMode;
 
 /// A plant, and what its controller believes.
 #[derive(Clone, Copy, Debug)]

@@ -29,9 +29,9 @@ use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
 use crate::record::files::Artifact;
 use crate::runtime::executor::{Hardware, ScalarChoice};
-use crate::runtime::mode::RunMode;
 use crate::runtime::plant::observer::Spectator;
 use crate::runtime::signals;
+use crate::runtime::time::mode::RunMode;
 use crate::world::simulation::Simulation;
 
 /// What is compared, and how.

@@ -18,7 +18,7 @@ use super::invariants::Invariants;
 use super::seam::{Channel, see};
 use super::shuttle::ShuttleDrive;
 use super::tissue::LinearTissue;
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::world::actuator::{ActuatorModel, PaddleActuator};
 use crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH;
 use crate::world::sensors::{Encoders, TargetSensor};

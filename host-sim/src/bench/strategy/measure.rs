@@ -6,8 +6,8 @@ use nalgebra::Vector2;
 
 use crate::bench::result::{BodyFrame, SeriesPoint, StrategyResult};
 use crate::record::export;
-use crate::runtime::mode::RunMode;
 use crate::runtime::plant::PlantLoop;
+use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::{TissuePlant, TissueResponse as _, WantedPlant};
 use crate::world::truth::Truth;
 use model_offline::output::table_text::hex;

@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use super::machine::Disturbance;
 use crate::bench::rounds::MeasuredLoop;
-use crate::runtime::clock::{Scheduling, now_ns};
-use crate::runtime::durations::{Distribution, Durations, LoopDurations, LoopTiming};
+use crate::runtime::accounting::ledger::TickResult;
 use crate::runtime::error::RuntimeError;
-use crate::runtime::ledger::TickResult;
 use crate::runtime::names;
-use crate::runtime::periodic::{PeriodicLoop, Served};
+use crate::runtime::time::clock::{Scheduling, now_ns};
+use crate::runtime::time::durations::{Distribution, Durations, LoopDurations, LoopTiming};
+use crate::runtime::time::periodic::{PeriodicLoop, Served};
 
 /// From the set-up to the first release of a block.
 const LEAD_NS: u64 = 5_000_000;

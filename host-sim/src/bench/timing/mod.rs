@@ -30,11 +30,11 @@ use super::error::SimError;
 use super::paper_table::paper_table;
 use super::rounds::{AllVoid, MeasuredLoop};
 use crate::record::error::FileError;
-use crate::runtime::clock::{Scheduling, now_ns, release_real_time, request_real_time_at};
-use crate::runtime::durations::{Distribution, Durations, LoopTiming};
+use crate::runtime::accounting::ledger::TickResult;
 use crate::runtime::error::RuntimeError;
-use crate::runtime::ledger::TickResult;
 use crate::runtime::signals;
+use crate::runtime::time::clock::{Scheduling, now_ns, release_real_time, request_real_time_at};
+use crate::runtime::time::durations::{Distribution, Durations, LoopTiming};
 use crate::world::loop_settings::LoopSettings;
 
 /// Rounds of blocks: enough for a range of ratios.

@@ -16,10 +16,10 @@ use super::stimulus::{Samples, Stimulus};
 use crate::bench::rounds::MeasuredLoop;
 use crate::exchange::{Departure, PlantPorts, Space};
 use crate::process::dies_with_parent;
-use crate::runtime::child::describe_exit;
-use crate::runtime::clock::now_ns;
 use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::peer::child::describe_exit;
 use crate::runtime::signals;
+use crate::runtime::time::clock::now_ns;
 use crate::world::loop_settings::LoopSettings;
 
 /// How long the other process may take to be there, and to answer.

@@ -162,8 +162,8 @@ mod tests {
 
     use super::*;
     use crate::record::recording::RecordingHeader;
-    use crate::runtime::mode::RunMode;
-    use crate::runtime::tick::ControllerTick;
+    use crate::runtime::accounting::tick::ControllerTick;
+    use crate::runtime::time::mode::RunMode;
 
     fn record(tick: u64, time_ns: u64, truth_ns: Option<u64>) -> Record {
         let inputs = firmware::Inputs { tick, time_ns, ..Default::default() };

@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 
 use super::{BODY_BYTES, FORMAT_VERSION, MAGIC, Record, RecordingError, RecordingHeader, TICK_MARK};
 use crate::exchange::bytes::{ByteReader, ByteWriter};
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::{ControllerTick, TICK_BYTES};
+use crate::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
+use crate::runtime::time::mode::RunMode;
 use crate::world::truth::Truth;
 
 pub(super) fn encode_header(header: &RecordingHeader, writer: &mut ByteWriter) {

@@ -15,9 +15,9 @@ use rtrb::{Consumer, Producer, RingBuffer};
 
 use super::{Chain, Record, RecordingHeader};
 use crate::record::error::FileError;
-use crate::runtime::accounts::RecordAccount;
+use crate::runtime::accounting::accounts::RecordAccount;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::controller::TickRecorder;
-use crate::runtime::tick::ControllerTick;
 
 /// Ticks that wait for the writer: two seconds at 1 kHz, more than any disk takes to answer.
 const RING: usize = 2048;
@@ -129,7 +129,7 @@ mod tests {
     use super::*;
     use crate::record::error::RecordingError;
     use crate::record::recording::Recording;
-    use crate::runtime::mode::RunMode;
+    use crate::runtime::time::mode::RunMode;
 
     fn header() -> RecordingHeader {
         let settings = Settings::new(1_000_000, 20_000_000, 0);

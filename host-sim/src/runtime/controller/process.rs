@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use super::ControlLoop;
 use crate::exchange::{ControllerPorts, Departure, Space};
-use crate::runtime::accounts::ControllerAccounts;
+use crate::runtime::accounting::accounts::ControllerAccounts;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::error::{Role, RuntimeError};
-use crate::runtime::introduction::Introduction;
-use crate::runtime::mode::RunMode;
+use crate::runtime::peer::introduction::Introduction;
 use crate::runtime::peer::{Patience, Peer};
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 use crate::world::loop_settings::LoopSettings;
 
 /// What `controller --json` writes.

@@ -9,8 +9,8 @@ use crate::bench::faults::closed_loop::ClosedLoop;
 use crate::bench::faults::evidence::{Evidence, carries, is_in};
 use crate::bench::faults::fault::{Event, Fault, Stream, below};
 use crate::record::recording::{Record, Recording, RecordingHeader};
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::accounting::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 
 /// Row 1: a step over its budget is counted, whole periods are skipped, the phase stays, nothing runs twice.
 pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {

@@ -4,7 +4,7 @@ use firmware::Discard;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::names;
+use crate::runtime::names;
 
 /// All accounts of one run of the controller.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

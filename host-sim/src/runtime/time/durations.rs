@@ -5,9 +5,9 @@ use hdrhistogram::Histogram;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::clock::Scheduling;
-use super::names;
-use super::periodic::{PeriodicLoop, Served};
+use crate::runtime::names;
+use crate::runtime::time::clock::Scheduling;
+use crate::runtime::time::periodic::{PeriodicLoop, Served};
 
 /// Longest duration told apart, ns: one minute.
 const LONGEST_NS: u64 = 60_000_000_000;

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use model_offline::scene::PlantModel;
 
-use super::paper::paper_optima;
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
-use crate::runtime::durations::LoopTiming;
+use crate::report::paper::paper_optima;
 use crate::runtime::names;
+use crate::runtime::time::durations::LoopTiming;
 
 /// The summary of a run that is at `directory`.
 pub fn summary(run: &RunResult, directory: &Path) -> String {

@@ -4,8 +4,8 @@ use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, in_unit, minus, number, plain};
 use model_offline::output::chart::{Axis, Bars, Colour, Dash, Marker, Panel, Place, ReferenceLine, Series, Strip};
 
-use super::paper::{is_paper, paper_controllability, paper_optima};
 use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
+use crate::report::paper::{is_paper, paper_controllability, paper_optima};
 
 /// Paddles as places of an axis, one of them with words below its number.
 fn places(placement: &PlacementResult, best: u32, words: &str) -> Axis {

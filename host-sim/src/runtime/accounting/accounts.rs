@@ -4,10 +4,10 @@ use firmware::inputs::StreamLedger;
 use firmware::{Discard, Faults, Mode};
 use serde::{Deserialize, Serialize};
 
-use super::durations::LoopTiming;
-use super::ledger::{LedgerResult, StreamResult, TickResult};
-use super::tick::{ControllerTick, TICK_BYTES};
 use crate::exchange::bytes::{ByteReader, ByteWriter};
+use crate::runtime::accounting::ledger::{LedgerResult, StreamResult, TickResult};
+use crate::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
+use crate::runtime::time::durations::LoopTiming;
 
 /// Accounts of one stream at the controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -60,10 +60,10 @@ pub struct ControllerAccounts {
     /// Commands that left.
     pub commands: u64,
     /// State at the end.
-    #[serde(with = "super::names::mode")]
+    #[serde(with = "crate::runtime::names::mode")]
     pub final_state: Option<Mode>,
     /// Every fault that was ever present.
-    #[serde(with = "super::names::faults")]
+    #[serde(with = "crate::runtime::names::faults")]
     pub faults: Faults,
     /// Timing of the loop; free-run only.
     pub timing: Option<LoopTiming>,

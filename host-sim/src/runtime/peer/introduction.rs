@@ -8,9 +8,9 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::{Role, RuntimeError};
-use super::signals;
 use crate::exchange::Space;
+use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::signals;
 
 /// Name of the file.
 const FILE: &str = "controller.json";

@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use crate::bench::timing::{LeftRun, SweepResult, TimingResult};
-use crate::runtime::clock::SchedulingPolicy;
-use crate::runtime::durations::{Distribution, LoopTiming};
-use crate::runtime::ledger::TickResult;
+use crate::runtime::accounting::ledger::TickResult;
 use crate::runtime::names;
+use crate::runtime::time::clock::SchedulingPolicy;
+use crate::runtime::time::durations::{Distribution, LoopTiming};
 
 fn us(ns: u64) -> f64 {
     ns as f64 * 1e-3

@@ -7,12 +7,12 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use super::accounts::ControllerAccounts;
-use super::error::{Role, RuntimeError};
-use super::executor::Hardware;
-use super::mode::RunMode;
-use super::tick::ControllerTick;
 use crate::exchange::Space;
+use crate::runtime::accounting::accounts::ControllerAccounts;
+use crate::runtime::accounting::tick::ControllerTick;
+use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::executor::Hardware;
+use crate::runtime::time::mode::RunMode;
 use crate::world::loop_settings::LoopSettings;
 
 /// How long a controller may take to hand in its accounts after the stop.

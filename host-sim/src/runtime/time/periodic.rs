@@ -6,9 +6,12 @@
 
 use firmware::schedule::{Release, Schedule};
 
-use super::clock::now_ns;
-use super::error::RuntimeError;
-use super::signals;
+use crate::runtime::error::RuntimeError;
+use crate::runtime::signals;
+use crate::runtime::time::clock::{self, now_ns};
+
+/// Longest sleep without a look at signals, ns: one that comes between the look and the sleep waits no longer than this.
+const SLEEP_NS: u64 = 100_000_000;
 
 /// A step, and the releases that it served: its own, and those that came due before it and never started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +72,7 @@ impl PeriodicLoop {
     /// # Errors
     /// [`RuntimeError::Interrupted`].
     pub fn wait(&self) -> Result<(), RuntimeError> {
-        signals::sleep_until(self.next_release_ns())
+        sleep_until(self.next_release_ns())
     }
 
     /// The step starts now.
@@ -121,10 +124,26 @@ impl PeriodicLoop {
     }
 }
 
+/// Sleeps until an absolute time of the steady clock, ns, or until a signal asks for the end.
+///
+/// # Errors
+/// [`RuntimeError::Interrupted`].
+fn sleep_until(time_ns: u64) -> Result<(), RuntimeError> {
+    signals::check()?;
+    loop {
+        let now_ns = now_ns();
+        if now_ns >= time_ns {
+            return Ok(());
+        }
+        clock::sleep_until(time_ns.min(now_ns + SLEEP_NS));
+        signals::check()?;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::runtime::durations::LoopDurations;
+    use crate::runtime::time::durations::LoopDurations;
 
     const PERIOD: u64 = 1_000_000;
 
@@ -141,7 +160,7 @@ mod tests {
         step(&mut periodic, &mut durations, 100, 10);
         step(&mut periodic, &mut durations, 1000 * PERIOD + 100, 10);
         step(&mut periodic, &mut durations, 100, 10);
-        let timing = durations.timing(1000.0, &periodic, &crate::runtime::clock::Scheduling::default());
+        let timing = durations.timing(1000.0, &periodic, &crate::runtime::time::clock::Scheduling::default());
         assert_eq!((timing.ticks, timing.skipped, timing.deadline_misses), (3, 1000, 1000));
         assert_eq!(timing.release_lateness.count, 1003, "an entry for every release that came due");
         assert_eq!(timing.release_lateness.count, periodic.due());
@@ -156,7 +175,7 @@ mod tests {
         step(&mut periodic, &mut durations, 0, 3 * PERIOD + PERIOD / 2);
         assert_eq!(periodic.unserved().map(|served| served.missed()), Some(3));
         step(&mut periodic, &mut durations, 0, 10);
-        let timing = durations.timing(1000.0, &periodic, &crate::runtime::clock::Scheduling::default());
+        let timing = durations.timing(1000.0, &periodic, &crate::runtime::time::clock::Scheduling::default());
         // The long one, and those due at 1, 2 and 3 periods, which the step at 4 periods answers.
         assert_eq!((timing.ticks, timing.skipped, timing.deadline_misses), (2, 3, 4));
         assert!(timing.release_lateness.max_ns.abs_diff(3 * PERIOD) < PERIOD / 100);
@@ -166,7 +185,7 @@ mod tests {
     fn releases_that_the_last_step_missed_are_in_the_figures() {
         let (mut periodic, mut durations) = (PeriodicLoop::new(0, PERIOD), LoopDurations::default());
         step(&mut periodic, &mut durations, 0, 5 * PERIOD);
-        let timing = durations.timing(1000.0, &periodic, &crate::runtime::clock::Scheduling::default());
+        let timing = durations.timing(1000.0, &periodic, &crate::runtime::time::clock::Scheduling::default());
         assert_eq!((timing.release_lateness.count, timing.deadline_misses, timing.skipped), (5, 5, 4));
         assert_eq!(periodic.due(), 5);
     }

@@ -6,7 +6,7 @@ use model_offline::output::chart::{Axis, Bars, Colour, Dash, Panel, Place, Refer
 
 use super::embed::panels;
 use crate::bench::result::RunResult;
-use crate::runtime::durations::{Distribution, LoopTiming};
+use crate::runtime::time::durations::{Distribution, LoopTiming};
 
 /// A loop on the machine's clock: whose it is, and its figures.
 fn loops(run: &RunResult) -> Vec<(String, &LoopTiming)> {

@@ -1,14 +1,17 @@
 //! The other process: is it alive, and how long is it waited for.
 
+pub mod child;
+pub mod introduction;
+
 use std::time::{Duration, Instant};
 
 use iceoryx2::service::Service;
 use rustix::process::{Pid, getppid};
 
-use super::child::{ControllerProcess, describe_exit};
-use super::error::{Role, RuntimeError};
-use super::signals;
+use self::child::{ControllerProcess, describe_exit};
 use crate::exchange::Space;
+use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::signals;
 
 /// Polls without giving the processor away: an answer usually comes within a few µs.
 const SPINS: u32 = 200;

@@ -6,7 +6,7 @@ use model_offline::output::chart::number::{NO_NUMBER, count};
 
 use super::insertion::strategies;
 use crate::bench::result::RunResult;
-use crate::runtime::ledger::LedgerResult;
+use crate::runtime::accounting::ledger::LedgerResult;
 
 fn ledgers(run: &RunResult) -> Vec<(String, &LedgerResult)> {
     run.cases
