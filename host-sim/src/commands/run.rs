@@ -15,7 +15,7 @@ use host_sim::runtime::executor::{Hardware, ScalarChoice};
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
-use host_sim::view::{self, Basis, Knobs, View};
+use host_sim::view::{self, InsertionBasis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
 
 use super::outputs::check_json_beside_report;
@@ -133,7 +133,7 @@ fn live_view(args: &RunArgs, loop_settings: &LoopSettings) -> Result<View, SimEr
 fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(), SimError> {
     let Some((scene, EncodedTable { table, bytes })) = comparison.last_case() else { return Ok(()) };
     let options = comparison.options();
-    let basis = Basis {
+    let basis = InsertionBasis {
         program: &options.program,
         scene,
         table,

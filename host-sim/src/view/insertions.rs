@@ -20,7 +20,7 @@ use crate::world::simulation::Simulation;
 
 /// What the page's insertions start from.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis<'a> {
+pub struct InsertionBasis<'a> {
     /// This program, which is also the controller.
     pub program: &'a Path,
     /// The scene of the simulation, as the knobs find it.
@@ -41,7 +41,7 @@ pub struct Basis<'a> {
 ///
 /// # Errors
 /// [`SimError`] of the first insertion that cannot be simulated, except for the signal.
-pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<(), SimError> {
+pub fn insertions(view: &View, basis: &InsertionBasis<'_>, say: &dyn Fn(&str)) -> Result<(), SimError> {
     let shared = view.shared();
     shared.allow_restarts();
     for number in 1_u64.. {
@@ -76,7 +76,7 @@ pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<
 }
 
 /// Scene and simulation as the knobs want them.
-fn under(knobs: &Knobs, basis: &Basis<'_>) -> (Scene, Simulation) {
+fn under(knobs: &Knobs, basis: &InsertionBasis<'_>) -> (Scene, Simulation) {
     let mut scene = basis.scene.clone();
     for inclusion in &mut scene.inclusions {
         inclusion.stiffness *= knobs.stiffness;

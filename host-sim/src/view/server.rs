@@ -16,7 +16,7 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use model_offline::output::table_text::hex;
 use tokio::net::TcpStream;
 
-use super::limits::{Deadline, Gate, Place};
+use super::limits::{Deadline, Gate, Slot};
 use super::requests::answer;
 use super::shared::{Knobs, Shared};
 use super::watch::Watch;
@@ -102,7 +102,7 @@ async fn accept(listener: TcpListener, gate: Arc<Gate>, shared: Arc<Shared>) {
 }
 
 /// One connection, until it is answered or its time is over.
-async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, place: Place) {
+async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, place: Slot) {
     let deadline = Arc::new(Deadline::new());
     let for_answer = Arc::clone(&deadline);
     let service =
