@@ -84,6 +84,13 @@ fn signals_are_obeyed_at_once_everywhere() {
     // Placement and table, then the insertions without a controller.
     obeys(&["run", "--out", out, "--quiet"], millis(60));
     obeys(&["run", "--out", out, "--quiet", "--insertion-time", "1000", "--threads", "1"], millis(2500));
+    // Random schedules, and rows that wait for processes.
+    obeys(&["faults", "--only", "1", "--seeds", "1000000"], millis(2500));
+    obeys(&["faults", "--only", "38"], millis(1200));
+    for row in ["33", "34", "35", "36"] {
+        obeys(&["faults", "--only", row], millis(2500));
+    }
+    obeys(&["run", "--out", out, "--quiet", "--mode", "free-run", "--insertion-time", "60"], millis(4000));
     let link = format!("test-signals-{}", std::process::id());
     obeys(&["plant", "--link", &link], millis(1500));
     assert!(!Path::new(out).exists());

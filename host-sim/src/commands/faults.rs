@@ -69,7 +69,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
-    let table = paper_table()?;
+    let table = signals::ends_at_once(paper_table)?;
     if args.monitors_off {
         return without_monitors(args, &table);
     }
@@ -101,7 +101,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
 
 /// The table monitor × row.
 fn without_monitors(args: &FaultsArgs, table: &Table<f64, 2>) -> Result<(), SimError> {
-    let monitors = monitors_off(table, args.seed)?;
+    let monitors = signals::ends_at_once(|| monitors_off(table, args.seed))?;
     for MonitorOff { monitor, rows } in &monitors {
         let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
         println!("{monitor:<20}  {}", if rows.is_empty() { "nobody notices".to_owned() } else { rows.join(" ") });

@@ -6,6 +6,7 @@ use super::evidence::Evidence;
 use super::processes::{self, Stage};
 use super::rows::{Trial, actuation, bytes, needle, streams, time, values};
 use crate::bench::error::SimError;
+use crate::runtime::signals;
 
 /// How a row is tried.
 #[derive(Clone, Copy, Debug)]
@@ -92,8 +93,16 @@ impl Row {
     pub fn run(&self, table: &Table<f64, 2>, seed: u64, effort: f64) -> Result<Evidence, SimError> {
         let mut evidence = Evidence::default();
         match self.method {
-            RowMethod::Lockstep(run) => run(&Trial { table, seed, without: Faults::NONE }, &mut evidence)?,
-            RowMethod::Processes(run) => run(&Stage::new(table, seed, effort)?, &mut evidence)?,
+            RowMethod::Lockstep(run) => {
+                let trial = Trial { table, seed, without: Faults::NONE };
+                signals::ends_at_once(|| run(&trial, &mut evidence))?;
+            }
+            RowMethod::Processes(run) => {
+                let outcome = run(&Stage::new(table, seed, effort)?, &mut evidence);
+                // What was not waited for any longer is no evidence.
+                signals::check()?;
+                outcome?;
+            }
         }
         Ok(evidence)
     }
