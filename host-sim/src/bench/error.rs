@@ -102,7 +102,7 @@ pub enum SimError {
     #[diagnostic(transparent)]
     Runtime(#[from] RuntimeError),
     /// The live view has no port.
-    #[error("no live view: cannot listen on port {port} of 127.0.0.1: {source}")]
+    #[error("no live view: cannot listen on port {port} of 127.0.0.1")]
     #[diagnostic(help("choose another --view-port, or leave it away for any free one"))]
     ViewPort {
         /// The port; 0: any.
@@ -111,7 +111,7 @@ pub enum SimError {
         source: std::io::Error,
     },
     /// The live view has no secret to be opened with.
-    #[error("no live view: no random token: {source}")]
+    #[error("no live view: no random token")]
     #[diagnostic(help("the page needs /dev/urandom; run without --view where there is none"))]
     ViewToken {
         /// What the operating system says.

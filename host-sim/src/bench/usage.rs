@@ -29,7 +29,7 @@ pub enum UsageError {
         path: PathBuf,
     },
     /// A budget cannot be understood.
-    #[error("the budget {}: {source}; `host-sim board RECORDING --write-budget FILE` writes one", path.display())]
+    #[error("the budget {} cannot be understood; `host-sim board RECORDING --write-budget FILE` writes one", path.display())]
     Budget {
         /// The file.
         path: PathBuf,
