@@ -5,6 +5,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use host_sim::bench::rounds::MeasuredLoop;
 use host_sim::bench::timing::TimingResult;
 use host_sim::report::directory::read_run;
 use host_sim::runtime::time::durations::LoopTiming;
@@ -109,7 +110,10 @@ fn timing_measures_in_run_and_says_where_not() {
     assert!(text.contains("RUN: wake latency"), "{text}");
     // Fewer than 10,000 values say nothing about one in 10,000.
     assert_eq!(result.controller.release_lateness.p9999_ns, None);
-    assert!(result.step.p9999_ns.is_some() || result.left_run.iter().any(|left| left.measurement.starts_with("step")));
+    assert!(
+        result.step.p9999_ns.is_some()
+            || result.left_run.iter().any(|left| left.measurement == MeasuredLoop::BackToBack)
+    );
 }
 
 #[test]

@@ -8,7 +8,6 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use firmware::Controller;
-use firmware::contract::Table;
 use model_offline::model::ModelError;
 use model_offline::output::table_text::hex;
 use model_offline::parallel;

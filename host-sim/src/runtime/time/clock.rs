@@ -152,7 +152,6 @@ fn policy() -> SchedulingPolicy {
             NormalThreadSchedulePolicy::Other => SchedulingPolicy::Other,
             NormalThreadSchedulePolicy::Batch => SchedulingPolicy::Batch,
             NormalThreadSchedulePolicy::Idle => SchedulingPolicy::Idle,
-            _ => SchedulingPolicy::Unknown,
         },
         Err(_) => SchedulingPolicy::Unknown,
     }
