@@ -341,11 +341,13 @@ mod tests {
         let faults = Faults::OVERRUN | Faults::WATCHDOG;
         let void = AllVoid { measured: MeasuredLoop::Exchange, rounds: ROUNDS, left_run: 2, faults };
         assert_eq!(result.check_rounds(), Err(void));
-        for take in [
-            |result: &mut TimingResult| &mut result.lateness_ratios,
-            |result: &mut TimingResult| &mut result.link_over_bare,
-            |result: &mut TimingResult| &mut result.socket_over_link,
-        ] {
+        type Ratios = fn(&mut TimingResult) -> &mut Vec<f64>;
+        let others: [Ratios; 3] = [
+            |result| &mut result.lateness_ratios,
+            |result| &mut result.link_over_bare,
+            |result| &mut result.socket_over_link,
+        ];
+        for take in others {
             let mut result = TimingResult { exchange_lateness_ratios: vec![1.2], ..result.clone() };
             take(&mut result).clear();
             assert!(result.check_rounds().is_err());
