@@ -10,7 +10,7 @@ use crate::scalar::{Scalar, bounded};
 
 /// A depth located in the table: the two knots around it and the position between them.
 #[derive(Clone, Copy, Debug)]
-pub struct Location<'t, T: Scalar, const D: usize> {
+pub struct TableLocation<'t, T: Scalar, const D: usize> {
     left: &'t Knot<T, D>,
     right: &'t Knot<T, D>,
     /// Distance of the knots, length.
@@ -23,18 +23,24 @@ pub struct Location<'t, T: Scalar, const D: usize> {
 
 impl<T: Scalar, const D: usize> Table<T, D> {
     /// Locates `depth` by bisection; `None` only for a table with fewer than two knots, which validation refuses.
-    pub fn locate(&self, depth: T) -> Option<Location<'_, T, D>> {
+    pub fn locate(&self, depth: T) -> Option<TableLocation<'_, T, D>> {
         let (first, last) = (self.knots.first()?, self.knots.last()?);
         let inside = bounded(depth, first.depth, last.depth);
         let right_index =
             self.knots.partition_point(|knot| knot.depth <= inside).min(self.knots.len().saturating_sub(1)).max(1);
         let (left, right) = (self.knots.get(right_index - 1)?, self.knots.get(right_index)?);
         let interval = right.depth - left.depth;
-        Some(Location { left, right, interval, fraction: (inside - left.depth) / interval, clamped: inside != depth })
+        Some(TableLocation {
+            left,
+            right,
+            interval,
+            fraction: (inside - left.depth) / interval,
+            clamped: inside != depth,
+        })
     }
 }
 
-impl<T: Scalar, const D: usize> Location<'_, T, D> {
+impl<T: Scalar, const D: usize> TableLocation<'_, T, D> {
     /// Feed-forward paddle displacement, length.
     pub fn paddle_path(&self) -> SVector<T, D> {
         self.hermite(

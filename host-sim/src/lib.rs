@@ -24,7 +24,7 @@
 //!
 //! Two modes of time, never mixed: in lockstep it comes from the messages, and the same seed gives the same bytes; in
 //! free-run both processes follow the machine's steady clock with absolute deadlines. Either way every tick is recorded and
-//! every sample accounted for ([`runtime::accounts`]).
+//! every sample accounted for ([`runtime::accounting::accounts`]).
 //!
 //! The controller with a tissue that is linear about its own table, in one thread and virtual time:
 //!
@@ -42,7 +42,7 @@
 //! # }
 //! ```
 //!
-//! An [`Insertion`] has the full tissue and the controller in a process of its own; a [`Comparison`] is what
+//! A [`SimulatedInsertion`] has the full tissue and the controller in a process of its own; a [`Comparison`] is what
 //! `host-sim run` does.
 
 pub mod bench;
@@ -58,13 +58,13 @@ pub mod world;
 pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
 pub use bench::error::SimError;
 pub use bench::result::RunResult;
-pub use bench::strategy::{ControllerSetup, Extras, Insertion, Label};
+pub use bench::strategy::{ControllerSetup, Extras, Label, SimulatedInsertion};
 pub use bench::tissue_variant::TissueVariant;
 pub use exchange::Space;
 pub use record::recording::Recording;
 pub use record::replay::replay_file;
-pub use runtime::mode::RunMode;
+pub use runtime::time::mode::RunMode;
 pub use world::World;
 pub use world::loop_settings::LoopSettings;
 pub use world::simulation::Simulation;
-pub use world::tissue::PlantChoice;
+pub use world::tissue::WantedPlant;

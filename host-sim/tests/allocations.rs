@@ -8,11 +8,11 @@ use firmware::io::run_tick;
 use firmware::{Controller, Inputs, Mode, Settings, State};
 use host_sim::bench::paper_table::paper_table;
 use host_sim::exchange::{ControllerPorts, Departure, PlantPorts, Space};
-use host_sim::record::recording::Header;
+use host_sim::record::recording::RecordingHeader;
 use host_sim::record::recording::stream::StreamRecorder;
+use host_sim::runtime::accounting::tick::ControllerTick;
 use host_sim::runtime::controller::TickRecorder as _;
-use host_sim::runtime::mode::RunMode;
-use host_sim::runtime::tick::ControllerTick;
+use host_sim::runtime::time::mode::RunMode;
 use iceoryx2::service::ipc;
 
 thread_local! {
@@ -105,7 +105,7 @@ fn the_loop_allocates_no_more_than_its_transport() {
     plant.connect().unwrap();
     ports.connect().unwrap();
     let folder = tempfile::tempdir().unwrap();
-    let header = Header { mode: RunMode::Lockstep, seed: 0, scene_hash: [0; 32], settings, table: Vec::new() };
+    let header = RecordingHeader { mode: RunMode::Lockstep, seed: 0, scene_hash: [0; 32], settings, table: Vec::new() };
     let mut recorder = StreamRecorder::create(&folder.path().join("log.rec"), &header).unwrap();
     let mut displacement = [0.0; 2];
     let (mut reading, mut ticking, mut recording) = (0, 0, 0);

@@ -82,14 +82,14 @@ fn settings() -> Settings {
 }
 
 /// The simulated world on linear tissue, without noise, at the end of the line.
-struct Plant<'t> {
+struct BoardPlant<'t> {
     world: World<LinearTissue<'t>, ShuttleDrive>,
     tick: u64,
     /// Orthogonal error that nothing would hold back, length.
     uncontrolled: f64,
 }
 
-impl<'t> Plant<'t> {
+impl<'t> BoardPlant<'t> {
     fn new(table: &'t Table<f64, 2>) -> Self {
         let Validity { depth_end, needle_speed, .. } = table.validity;
         let drive = ShuttleDrive::new(table, depth_end, 0.5 * needle_speed, 1e-3);
@@ -124,7 +124,7 @@ struct BoardRun {
 }
 
 /// Runs the loop for so many ticks; both limits must hold on every command that arrives.
-fn drive(device: &mut Device, plant: &mut Plant<'_>, ticks: u64) -> BoardRun {
+fn drive(device: &mut Device, plant: &mut BoardPlant<'_>, ticks: u64) -> BoardRun {
     let paddle = plant.world.tissue.table().paddle.clone();
     let step = paddle.max_rate * 1e-3;
     let mut run = BoardRun { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
@@ -156,7 +156,7 @@ fn a_damaged_line_costs_ticks_and_nothing_else() {
     for (i, damage) in Damage::ALL.into_iter().enumerate() {
         let mut device = thread_device(Tamper::none());
         device.begin(&bytes, &settings()).unwrap();
-        let mut plant = Plant::new(&table);
+        let mut plant = BoardPlant::new(&table);
         assert_eq!(drive(&mut device, &mut plant, 100).last.state, Mode::Run as u32);
         device.set_tamper(Tamper::new(damage, 40, i as u64));
         let damaged = drive(&mut device, &mut plant, 300);
@@ -194,7 +194,7 @@ fn lost_commands_leave_the_paddle_where_it_is() {
         // Rare enough, with this seed, that every answer to `begin` comes through.
         let mut device = thread_device(Tamper::new(damage, 60, 5));
         device.begin(&bytes, &settings()).unwrap();
-        let mut plant = Plant::new(&table);
+        let mut plant = BoardPlant::new(&table);
         let run = drive(&mut device, &mut plant, 600);
         assert_eq!(run.last.state, Mode::Run as u32, "{damage:?}");
         assert!(run.worst_error < 0.2 * plant.uncontrolled, "{damage:?}: {}", run.worst_error);
@@ -208,7 +208,7 @@ fn a_silent_host_leads_to_hold_and_then_to_safe() {
     let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     let mut device = thread_device(Tamper::none());
     device.begin(&bytes, &settings()).unwrap();
-    let mut plant = Plant::new(&table);
+    let mut plant = BoardPlant::new(&table);
     let before = drive(&mut device, &mut plant, 100).last;
     let silent = |device: &mut Device, tick: u64| {
         let inputs = Inputs { tick, time_ns: tick * MS, ..Inputs::default() };
@@ -272,7 +272,7 @@ fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
     let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     let mut device = Device::emulate(&image).unwrap();
     device.begin(&bytes, &settings()).unwrap();
-    let mut plant = Plant::new(&table);
+    let mut plant = BoardPlant::new(&table);
     assert_eq!(drive(&mut device, &mut plant, 200).last.state, Mode::Run as u32);
 
     // In RUN a patient depends on it; in SAFE it may be tested.
@@ -309,7 +309,7 @@ fn a_stopped_board_skips_ticks_and_comes_back() {
     let bytes = encode_as(&table, ScalarKind::F64).unwrap();
     let mut device = Device::emulate(&image).unwrap();
     device.begin(&bytes, &settings()).unwrap();
-    let mut plant = Plant::new(&table);
+    let mut plant = BoardPlant::new(&table);
     drive(&mut device, &mut plant, 200);
     let process = rustix::process::Pid::from_raw(device.process().unwrap() as i32).unwrap();
     rustix::process::kill_process(process, rustix::process::Signal::STOP).unwrap();

@@ -69,16 +69,16 @@ fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works()
 }
 
 /// Ends the simulation, whatever the test does.
-struct Simulation(Child);
+struct RunningProgram(Child);
 
-impl Drop for Simulation {
+impl Drop for RunningProgram {
     fn drop(&mut self) {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-fn live(folder: &std::path::Path) -> (Simulation, String, BufReader<std::process::ChildStdout>) {
+fn live(folder: &std::path::Path) -> (RunningProgram, String, BufReader<std::process::ChildStdout>) {
     let mut child = Command::new(PROGRAM)
         .args(["run", "--view", "--tissue", "inclusion", "--mode", "lockstep", "--insertion-time", "2", "--out"])
         .arg(folder.join("report"))
@@ -86,7 +86,7 @@ fn live(folder: &std::path::Path) -> (Simulation, String, BufReader<std::process
         .spawn()
         .unwrap();
     let mut said = BufReader::new(child.stdout.take().unwrap());
-    let simulation = Simulation(child);
+    let simulation = RunningProgram(child);
     let mut line = String::new();
     said.read_line(&mut line).unwrap();
     let address = line.trim().strip_prefix("Live view: ").unwrap_or_else(|| panic!("{line}")).to_owned();

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// Every command ends within a second of a signal; the rest is for a machine that is busy with other tests.
-const ENDS_WITHIN: Duration = Duration::from_secs(3);
+/// Every command ends within a second of a signal.
+const ENDS_WITHIN: Duration = Duration::from_secs(1);
 
 fn host_sim() -> Command {
     Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
@@ -57,12 +57,14 @@ fn traces(part: &str) -> Vec<PathBuf> {
 
 /// SIGTERM after `after`: exit code 1 with a word, soon.
 fn obeys(arguments: &[&str], after: Duration) {
-    let child = start(arguments);
+    let mut child = start(arguments);
     std::thread::sleep(after);
-    let asked = Instant::now();
     signal(child.id(), "TERM");
-    let output = child.wait_with_output().unwrap();
+    let asked = Instant::now();
+    // Its own end counts: whoever holds its pipes open is another matter.
+    wait_for("it goes on", || child.try_wait().unwrap());
     let took = asked.elapsed();
+    let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{arguments:?}: {}", message(&output));
     assert!(message(&output).contains("SIGTERM"), "{arguments:?}: {}", message(&output));
     assert!(took < ENDS_WITHIN, "{arguments:?}: {took:?}");
@@ -82,6 +84,13 @@ fn signals_are_obeyed_at_once_everywhere() {
     // Placement and table, then the insertions without a controller.
     obeys(&["run", "--out", out, "--quiet"], millis(60));
     obeys(&["run", "--out", out, "--quiet", "--insertion-time", "1000", "--threads", "1"], millis(2500));
+    // Random schedules, and rows that wait for processes.
+    obeys(&["faults", "--only", "1", "--seeds", "1000000"], millis(2500));
+    obeys(&["faults", "--only", "38"], millis(1200));
+    for row in ["33", "34", "35", "36"] {
+        obeys(&["faults", "--only", row], millis(2500));
+    }
+    obeys(&["run", "--out", out, "--quiet", "--mode", "free-run", "--insertion-time", "60"], millis(4000));
     let link = format!("test-signals-{}", std::process::id());
     obeys(&["plant", "--link", &link], millis(1500));
     assert!(!Path::new(out).exists());

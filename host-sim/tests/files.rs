@@ -1,7 +1,7 @@
 //! Files for other tools, read back with readers that are not ours: `mcap`, `meshio` and `jsonschema` from PyPI. Where
 //! they are not installed, that part says "skipped".
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use assert_cmd::Command as Checked;
@@ -23,33 +23,19 @@ fn python(module: &str, folder: &Path, program: &str) -> Option<String> {
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-#[test]
-fn a_run_can_be_opened_elsewhere() {
-    let folder = tempfile::tempdir().unwrap();
-    let report = folder.path().join("report");
-    host_sim()
-        .args([
-            "run",
-            "--quiet",
-            "--tissue",
-            "inclusion",
-            "--mode",
-            "lockstep",
-            "--insertion-time",
-            "0.4",
-            "--mcap",
-            "--vtu",
-        ])
-        .arg("--json")
-        .arg(folder.path().join("result.json"))
-        .arg("--out")
-        .arg(&report)
-        .assert()
-        .success();
+/// A run with everything that it can write for other tools, beside its result as JSON.
+fn run_with_everything(folder: &Path) -> PathBuf {
+    let report = folder.join("report");
+    let words = "run --quiet --tissue inclusion --mode lockstep --insertion-time 0.4 --mcap --vtu --json";
+    let mut run = host_sim();
+    run.args(words.split(' ')).arg(folder.join("result.json")).arg("--out").arg(&report).assert().success();
+    report
+}
 
-    // The same recording, exported afterwards, gives the same bytes.
-    let again = folder.path().join("again.mcap");
-    let csv = folder.path().join("again.csv");
+/// The same recording, exported afterwards, gives the same bytes. Rows of its time series.
+fn check_exports(folder: &Path, report: &Path) -> usize {
+    let again = folder.join("again.mcap");
+    let csv = folder.join("again.csv");
     let recording = report.join("inclusion-dynamic.rec");
     host_sim().arg("export").arg(&recording).arg("--mcap").arg(&again).arg("--csv").arg(&csv).assert().success();
     assert!(std::fs::read(&again).unwrap() == std::fs::read(report.join("inclusion-dynamic.mcap")).unwrap());
@@ -58,8 +44,11 @@ fn a_run_can_be_opened_elsewhere() {
     assert!(times.len() > 800 && times.windows(2).all(|pair| pair[0] < pair[1]), "{} rows", times.len());
     let columns = text.lines().next().unwrap().split(',').count();
     assert!(text.lines().all(|line| line.split(',').count() == columns));
+    times.len()
+}
 
-    // Every file of the series is there, and its time rises.
+/// Every file of the series is there, and its time rises.
+fn check_series(report: &Path) {
     let pvd = std::fs::read_to_string(report.join("inclusion-dynamic.pvd")).unwrap();
     let pvd = roxmltree::Document::parse(&pvd).unwrap();
     let sets: Vec<_> = pvd.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
@@ -67,11 +56,11 @@ fn a_run_can_be_opened_elsewhere() {
     assert!(sets.iter().all(|set| report.join(set.attribute("file").unwrap()).is_file()));
     let at = |set: &roxmltree::Node<'_, '_>| set.attribute("timestep").unwrap().parse::<f64>().unwrap();
     assert!(sets.windows(2).all(|pair| at(&pair[0]) < at(&pair[1])));
+}
 
-    if let Some(said) = python(
-        "mcap",
-        &report,
-        "import json\nfrom mcap.reader import make_reader\n\
+/// `mcap` reads every message, and its largest error is the result's; `rows` are those of the time series.
+fn check_mcap(folder: &Path, report: &Path, rows: usize) {
+    let program = "import json\nfrom mcap.reader import make_reader\n\
          r = make_reader(open('inclusion-dynamic.mcap', 'rb'), validate_crcs=True)\n\
          n, last, worst = 0, 0, 0.0\n\
          for schema, channel, message in r.iter_messages():\n\
@@ -80,37 +69,48 @@ fn a_run_can_be_opened_elsewhere() {
          \x20   assert set(json.loads(schema.data)['properties']) == set(body), body\n\
          \x20   n += 1\n\
          \x20   if channel.topic == '/truth': worst = max(worst, abs(body['orthogonal_error']))\n\
-         print(n, worst)\n",
-    ) {
-        let (count, worst) = said.trim().split_once(' ').unwrap();
-        assert!(count.parse::<usize>().unwrap() > 3 * times.len(), "{said}");
-        let result: serde_json::Value =
-            serde_json::from_slice(&std::fs::read(folder.path().join("result.json")).unwrap()).unwrap();
-        let ours = result["cases"][0]["strategies"]["dynamic"]["max_orthogonal_error"].as_f64().unwrap();
-        assert!((worst.parse::<f64>().unwrap() - ours).abs() <= 1e-12, "{said} {ours}");
-    }
-    if let Some(said) = python(
-        "meshio",
-        &report,
-        "import meshio, numpy as np\n\
+         print(n, worst)\n";
+    let Some(said) = python("mcap", report, program) else { return };
+    let (count, worst) = said.trim().split_once(' ').unwrap();
+    assert!(count.parse::<usize>().unwrap() > 3 * rows, "{said}");
+    let result: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.join("result.json")).unwrap()).unwrap();
+    let ours = result["cases"][0]["strategies"]["dynamic"]["max_orthogonal_error"].as_f64().unwrap();
+    assert!((worst.parse::<f64>().unwrap() - ours).abs() <= 1e-12, "{said} {ours}");
+}
+
+/// `meshio` reads the last body, in which the tissue at the needle is as deep as the needle.
+fn check_vtu(report: &Path) {
+    let program = "import meshio, numpy as np\n\
          m = meshio.read('inclusion-dynamic-020.vtu')\n\
          u = m.point_data['displacement']\n\
          assert np.isfinite(u).all() and np.concatenate(m.cell_data['det_f']).min() > 0\n\
          under = (np.abs(m.points[:, 1] - 1) < 1e-9) & (np.abs(m.points[:, 0] - 0.5) < 0.06)\n\
-         print(len(m.points), float(u[under, 1].mean()))\n",
-    ) {
-        let (points, deepest) = said.trim().split_once(' ').unwrap();
-        assert!(points.parse::<usize>().unwrap() > 100);
-        // Held values are met at nodes; corners of cells lie between them, where a meshfree field overshoots a little.
-        assert!((deepest.parse::<f64>().unwrap() + 0.1).abs() < 6e-3, "the needle is 0.1 deep: {said}");
-    }
+         print(len(m.points), float(u[under, 1].mean()))\n";
+    let Some(said) = python("meshio", report, program) else { return };
+    let (points, deepest) = said.trim().split_once(' ').unwrap();
+    assert!(points.parse::<usize>().unwrap() > 100);
+    // Held values are met at nodes; corners of cells lie between them, where a meshfree field overshoots a little.
+    assert!((deepest.parse::<f64>().unwrap() + 0.1).abs() < 6e-3, "the needle is 0.1 deep: {said}");
+}
+
+/// `jsonschema` finds the result to be what its schema says.
+fn check_schema(folder: &Path) {
     let schema = host_sim().args(["schema", "result"]).assert().success();
-    std::fs::write(folder.path().join("schema.json"), &schema.get_output().stdout).unwrap();
-    python(
-        "jsonschema",
-        folder.path(),
-        "import json, jsonschema\njsonschema.validate(json.load(open('result.json')), json.load(open('schema.json')))\n",
-    );
+    std::fs::write(folder.join("schema.json"), &schema.get_output().stdout).unwrap();
+    let program = "import json, jsonschema\njsonschema.validate(json.load(open('result.json')), json.load(open('schema.json')))\n";
+    python("jsonschema", folder, program);
+}
+
+#[test]
+fn a_run_can_be_opened_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let report = run_with_everything(folder.path());
+    let rows = check_exports(folder.path(), &report);
+    check_series(&report);
+    check_mcap(folder.path(), &report, rows);
+    check_vtu(&report);
+    check_schema(folder.path());
 }
 
 #[test]

@@ -5,11 +5,11 @@ mod entries;
 
 use firmware::serial::{FrameWriter, Request};
 use firmware::{Faults, Settings};
-use host_sim::exchange::bytes::Writer;
-use host_sim::record::recording::{Header, Record, Recording};
-use host_sim::runtime::accounts::ControllerAccounts;
-use host_sim::runtime::mode::RunMode;
-use host_sim::runtime::tick::ControllerTick;
+use host_sim::exchange::bytes::ByteWriter;
+use host_sim::record::recording::{Record, Recording, RecordingHeader};
+use host_sim::runtime::accounting::accounts::ControllerAccounts;
+use host_sim::runtime::accounting::tick::ControllerTick;
+use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::truth::Truth;
 use proptest::prelude::*;
 
@@ -32,7 +32,8 @@ fn tick(tick: u64) -> ControllerTick {
 
 fn a_recording() -> Vec<u8> {
     let settings = Settings::new(1_000_000, 20_000_000, 0);
-    let header = Header { mode: RunMode::Lockstep, seed: 1, scene_hash: [7; 32], settings, table: vec![1, 2, 3] };
+    let header =
+        RecordingHeader { mode: RunMode::Lockstep, seed: 1, scene_hash: [7; 32], settings, table: vec![1, 2, 3] };
     let truth = |tick| Truth { tick, time_ns: tick * 1_000_000, depth: 0.1, target: [0.1, 0.2], paddle: [0.0, 0.3] };
     let records = (0..20).map(|n| Record { tick: tick(n), truth: (n % 2 == 0).then(|| truth(n)) }).collect();
     Recording { header, records }.encode()
@@ -44,7 +45,7 @@ fn some_accounts() -> Vec<u8> {
 }
 
 fn some_ticks() -> Vec<u8> {
-    let mut writer = Writer::default();
+    let mut writer = ByteWriter::default();
     (0..3).for_each(|n| tick(n).encode(&mut writer));
     writer.0
 }

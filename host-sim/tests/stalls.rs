@@ -5,9 +5,10 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
+use host_sim::bench::rounds::MeasuredLoop;
 use host_sim::bench::timing::TimingResult;
 use host_sim::report::directory::read_run;
-use host_sim::runtime::durations::LoopTiming;
+use host_sim::runtime::time::durations::LoopTiming;
 
 const STOP: Duration = Duration::from_secs(1);
 
@@ -109,7 +110,10 @@ fn timing_measures_in_run_and_says_where_not() {
     assert!(text.contains("RUN: wake latency"), "{text}");
     // Fewer than 10,000 values say nothing about one in 10,000.
     assert_eq!(result.controller.release_lateness.p9999_ns, None);
-    assert!(result.step.p9999_ns.is_some() || result.left_run.iter().any(|left| left.measurement.starts_with("step")));
+    assert!(
+        result.step.p9999_ns.is_some()
+            || result.left_run.iter().any(|left| left.measurement == MeasuredLoop::BackToBack)
+    );
 }
 
 #[test]
@@ -157,4 +161,27 @@ fn a_plant_that_cannot_keep_the_period_is_refused_before_anything_is_written() {
     assert_eq!(output.status.code(), Some(2), "{message}");
     assert!(message.contains("µs a step") && message.contains("--plant reduced"), "{message}");
     assert!(!out.exists());
+}
+
+#[test]
+fn timing_of_nothing_but_void_rounds_fails_and_says_so() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("timing.json");
+    // Ordinary threads wake tens of µs late: at 10 µs the controller sees its releases pass, and leaves RUN.
+    let output = host_sim()
+        .args(["timing", "--seconds", "0.6", "--rate", "100000", "--priority", "0", "--json"])
+        .arg(&json)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).replace(['\n', '│'], " ");
+    let result = read_timing(&json);
+    if !result.lateness_ratios.is_empty() && !result.exchange_lateness_ratios.is_empty() {
+        assert!(output.status.success(), "{said}");
+        return println!("skipped: this machine keeps a period of 10 µs");
+    }
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    for words in ["rounds of the measurement", "void", "RUN", "run it again"] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
 }

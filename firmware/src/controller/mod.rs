@@ -23,6 +23,38 @@ use state::to_frame;
 const D: usize = 2;
 
 /// Controller of one paddle: a table and settings, nothing that changes. See the crate documentation for the law.
+///
+/// # Example
+/// ```
+/// use firmware::contract::frames::TARGET_VISIBLE;
+/// use firmware::{Controller, Faults, Inputs, Mode, NeedleSample, PaddleSample, Settings, State, TargetSample, decode};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let table = decode::<f64, 2>(&std::fs::read("tests/planar.table")?)?;
+/// let controller = Controller::new(&table, &Settings::new(1_000_000, 20_000_000, 20_000_000))?;
+/// let mut state = State::new();
+///
+/// // Everything at rest, the paddle a little to the side: it is taken up where it is, and stays there.
+/// for tick in 0..100 {
+///     let (sequence, time_ns) = (tick as u32, tick * 1_000_000);
+///     let needle = NeedleSample { sequence, time_ns, ..Default::default() };
+///     let target = TargetSample { sequence, time_ns, flags: TARGET_VISIBLE, displacement: [0.0; 2] };
+///     let paddle = PaddleSample { sequence, time_ns, paddle_index: 3, displacement: [0.01, 0.0] };
+///     let inputs = Inputs { tick, time_ns, needle: Some(needle), target: Some(target), paddle: Some(paddle) };
+///     let command = controller.step(&mut state, &inputs);
+///     assert!(!command.is_valid() || (command.displacement[0] - 0.01).abs() < 1e-3);
+/// }
+/// assert_eq!(state.mode(), Mode::Run);
+///
+/// // One step without samples is forgiven; after some it holds, and says what it misses.
+/// for tick in 100..110 {
+///     controller.step(&mut state, &Inputs { tick, time_ns: tick * 1_000_000, ..Inputs::default() });
+/// }
+/// assert_eq!(state.mode(), Mode::Hold);
+/// assert!(state.faults().contains(Faults::NEEDLE_STALE | Faults::PADDLE_STALE));
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Controller<'t, T: Scalar> {
     table: &'t Table<T, D>,

@@ -9,7 +9,7 @@ use crate::inputs::checks::Checks;
 use crate::inputs::ledger::Discard;
 use crate::inputs::monitors::{FollowingMonitor, Motion};
 use crate::inputs::sample::{Measurement, are_within};
-use crate::inputs::stream::Stream;
+use crate::inputs::stream::StreamGate;
 use crate::scalar::Scalar;
 use crate::settings::AgeLimits;
 use crate::units::seconds;
@@ -146,7 +146,7 @@ impl<T: Scalar> Controller<'_, T> {
         let Some(now_ns) = state.clock.now_ns().filter(|_| !state.armed) else {
             return;
         };
-        let expire = |stream: &mut Stream, limits: AgeLimits| {
+        let expire = |stream: &mut StreamGate, limits: AgeLimits| {
             let expired = stream.accepted.is_some_and(|last| now_ns.saturating_sub(last.time_ns) > limits.safe_ns);
             if expired {
                 stream.accepted = None;
@@ -166,7 +166,7 @@ impl<T: Scalar> Controller<'_, T> {
             return;
         };
         let runtime = &self.runtime;
-        let mut check = |stream: &Stream, limits: AgeLimits, stale: Faults, dead: Faults| {
+        let mut check = |stream: &StreamGate, limits: AgeLimits, stale: Faults, dead: Faults| {
             let Some(last) = &stream.accepted else {
                 *faults |= Faults::WAITING;
                 return;

@@ -7,9 +7,9 @@ use super::clock::Clock;
 use crate::contract::{Faults, Mode};
 use crate::inputs::Ledger;
 use crate::inputs::monitors::{
-    DivergenceMonitor, FollowingMonitor, FrozenMonitor, InnovationGate, NeedleMonitor, Resolution, RestMonitor,
+    DivergenceMonitor, FollowingMonitor, FrozenMonitor, InnovationGate, NeedleMonitor, RestMonitor, SensorStep,
 };
-use crate::inputs::stream::Stream;
+use crate::inputs::stream::StreamGate;
 use crate::inputs::supervisor::Supervisor;
 use crate::scalar::Scalar;
 
@@ -30,13 +30,13 @@ pub struct State<T: Scalar> {
     pub(super) integral: Option<SVector<T, D>>,
     /// The last motion at full rate.
     pub(super) underway: Option<Underway<T>>,
-    pub(super) needle: Stream,
-    pub(super) target: Stream,
-    pub(super) paddle: Stream,
+    pub(super) needle: StreamGate,
+    pub(super) target: StreamGate,
+    pub(super) paddle: StreamGate,
     pub(super) target_lost: bool,
     pub(super) needle_monitor: NeedleMonitor,
     pub(super) target_frozen: FrozenMonitor,
-    pub(super) target_resolution: Resolution,
+    pub(super) target_resolution: SensorStep,
     pub(super) paddle_frozen: FrozenMonitor,
     pub(super) rest: RestMonitor,
     pub(super) gate: InnovationGate,

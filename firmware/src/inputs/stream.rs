@@ -14,7 +14,7 @@ use crate::detection::{RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
 
 /// One stream: sequence numbers and the last accepted sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Stream {
+pub(crate) struct StreamGate {
     /// What has arrived, for the accounts.
     arrivals: SequenceTracker,
     /// Sequence number of the last accepted sample; unlike `accepted` it does not expire.
@@ -24,7 +24,7 @@ pub(crate) struct Stream {
     contradiction: Option<(u32, u32)>,
 }
 
-impl Stream {
+impl StreamGate {
     /// Enters a delivery whose content has been checked. Returns whether it is accepted.
     #[inline(never)]
     pub(crate) fn offer(

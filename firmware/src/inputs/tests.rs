@@ -6,7 +6,7 @@ use super::checks::Checks;
 use super::ledger::{Discard, StreamLedger};
 use super::monitors::{InnovationGate, NeedleMonitor};
 use super::sample::Measurement;
-use super::stream::Stream;
+use super::stream::StreamGate;
 use crate::contract::Faults;
 use crate::contract::example::table;
 use crate::detection::{RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
@@ -17,12 +17,12 @@ const BAD: Result<(), Discard> = Err(Discard::NotFinite);
 
 /// A stream and its accounts, which must balance after every delivery.
 #[derive(Default)]
-struct Account {
-    stream: Stream,
+struct AccountedStream {
+    stream: StreamGate,
     ledger: StreamLedger,
 }
 
-impl Account {
+impl AccountedStream {
     fn offer(&mut self, sequence: u32, content: Result<(), Discard>) -> (bool, Faults) {
         let mut faults = Faults::NONE;
         let sample = Measurement { sequence, ..Measurement::default() };
@@ -47,7 +47,7 @@ impl Account {
 
 #[test]
 fn gaps_are_lost_and_flagged_and_filled_by_late_samples() {
-    let mut account = Account::default();
+    let mut account = AccountedStream::default();
     account.accept([7, 8]);
     assert_eq!(account.offer(12, Ok(())), (true, Faults::SAMPLE_GAP));
     assert_eq!(account.counts(), [6, 3, 3, 0, 0, 0, 0]);
@@ -62,7 +62,7 @@ fn gaps_are_lost_and_flagged_and_filled_by_late_samples() {
 
 #[test]
 fn refused_samples_count_as_delivered_and_do_not_hide_others() {
-    let mut account = Account::default();
+    let mut account = AccountedStream::default();
     account.accept([0, 1]);
     assert_eq!(account.offer(2, BAD), (false, Faults::NOT_FINITE));
     assert_eq!(account.offer(2, BAD), (false, Faults::DUPLICATE), "once only");
@@ -79,7 +79,7 @@ fn refused_samples_count_as_delivered_and_do_not_hide_others() {
 #[test]
 fn what_a_number_from_nowhere_made_seem_lost_is_taken_back() {
     for far in [64, 65, 1000, SEQUENCE_JUMP.cast_unsigned()] {
-        let mut account = Account::default();
+        let mut account = AccountedStream::default();
         account.accept(0..10);
         account.offer(9 + far, BAD);
         account.accept(10..30);
@@ -88,7 +88,7 @@ fn what_a_number_from_nowhere_made_seem_lost_is_taken_back() {
         // Within the window it may have been right: then the rest of the gap is still lost.
         assert_eq!(lost, if far < 65 { u64::from(far) - 21 } else { 0 }, "{far}");
     }
-    let mut account = Account::default();
+    let mut account = AccountedStream::default();
     account.accept(0..10);
     assert_eq!(account.offer(10 + SEQUENCE_JUMP.cast_unsigned(), BAD), (false, Faults::OUT_OF_ORDER));
     assert_eq!(account.counts(), [10, 10, 0, 0, 1, 0, 0], "a jump past the limit is no loss");
@@ -96,11 +96,11 @@ fn what_a_number_from_nowhere_made_seem_lost_is_taken_back() {
 
 #[test]
 fn a_refused_first_sample_is_no_beginning() {
-    let mut account = Account::default();
+    let mut account = AccountedStream::default();
     account.offer(1000, BAD);
     account.accept(0..100);
     assert_eq!(account.counts(), [101, 100, 0, 0, 0, 0, 1]);
-    let mut account = Account::default();
+    let mut account = AccountedStream::default();
     account.offer(20, BAD);
     account.accept(0..20);
     assert_eq!(account.counts(), [21, 20, 0, 0, 0, 0, 1]);
@@ -108,11 +108,11 @@ fn a_refused_first_sample_is_no_beginning() {
 
 #[test]
 fn a_sender_that_counts_anew_needs_consistent_numbers_and_good_content() {
-    let steps = |account: &mut Account, numbers: &[u32]| -> Vec<bool> {
+    let steps = |account: &mut AccountedStream, numbers: &[u32]| -> Vec<bool> {
         numbers.iter().map(|number| account.offer(*number, Ok(())).0).collect()
     };
     let begin = || {
-        let mut account = Account::default();
+        let mut account = AccountedStream::default();
         account.accept(1_000_000..1_000_010);
         account
     };

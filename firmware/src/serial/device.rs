@@ -24,7 +24,7 @@ pub const COUNTER_BITS: u32 = 24;
 const COUNTER_MASK: u32 = (1 << COUNTER_BITS) - 1;
 
 /// A reply as it is sent.
-type Answer<'a> = Reply<&'a Account>;
+type BorrowedReply<'a> = Reply<&'a Account>;
 
 /// What a microcontroller has to provide.
 pub trait Board {
@@ -77,7 +77,7 @@ impl<T: Scalar> Memory<T> {
         let command =
             PaddleCommand { state: Mode::Safe as u32, faults: Faults::WATCHDOG.bits(), ..PaddleCommand::default() };
         self.line.writer.restart();
-        self.line.writer.encode(&Answer::Command { command, counts: 0 }).unwrap_or_default()
+        self.line.writer.encode(&BorrowedReply::Command { command, counts: 0 }).unwrap_or_default()
     }
 }
 
@@ -262,7 +262,7 @@ impl<T: Scalar> Run<'_, T> {
     fn step<B: Board>(&mut self, board: &mut B, line: &mut Line, tick: u64, time_ns: u64) {
         let inputs = Inputs { tick, time_ns, ..core::mem::take(&mut self.inbox) };
         let (command, counts) = timed_step(board, self.controller, self.state, &inputs);
-        line.send(board, &Answer::Command { command, counts });
+        line.send(board, &BorrowedReply::Command { command, counts });
     }
 
     /// The host's clock shows `time_ns` now. The first time, the next release is one period ahead.
@@ -282,7 +282,7 @@ impl<T: Scalar> Run<'_, T> {
             faults: self.state.faults(),
             stack_bytes: board.stack_bytes(),
         };
-        line.send(board, &Answer::Account(&account));
+        line.send(board, &BorrowedReply::Account(&account));
     }
 }
 
@@ -376,7 +376,7 @@ impl Now {
 impl Line {
     /// Sends a reply. Every reply fits into a frame.
     #[inline(never)]
-    fn send<B: Board>(&mut self, board: &mut B, reply: &Answer<'_>) {
+    fn send<B: Board>(&mut self, board: &mut B, reply: &BorrowedReply<'_>) {
         for byte in self.writer.encode(reply).unwrap_or_default() {
             board.write(*byte);
         }
@@ -384,7 +384,7 @@ impl Line {
 
     #[inline(never)]
     fn send_hello<B: Board>(&mut self, board: &mut B, identity: Identity) {
-        self.send(board, &Answer::Hello(identity));
+        self.send(board, &BorrowedReply::Hello(identity));
     }
 
     /// Answers a host that starts.
@@ -395,17 +395,17 @@ impl Line {
 
     #[inline(never)]
     fn send_taken<B: Board>(&mut self, board: &mut B, bytes: u32) {
-        self.send(board, &Answer::Taken { bytes });
+        self.send(board, &BorrowedReply::Taken { bytes });
     }
 
     #[inline(never)]
     fn send_ready<B: Board>(&mut self, board: &mut B) {
-        self.send(board, &Answer::Ready);
+        self.send(board, &BorrowedReply::Ready);
     }
 
     #[inline(never)]
     fn send_refusal<B: Board>(&mut self, board: &mut B, refusal: Refusal) {
-        self.send(board, &Answer::Refused(refusal));
+        self.send(board, &BorrowedReply::Refused(refusal));
     }
 
     /// Takes the bytes that have arrived, up to the end of a frame.

@@ -2,12 +2,13 @@
 
 use model_offline::geometry::Point2;
 use model_offline::model::TissueModel;
-use model_offline::placement::{Placement, StaticStudy};
+use model_offline::placement::{PlacementStudy, StaticStudy};
 use model_offline::scene::Scene;
 
 use super::result::{
     Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings,
 };
+use super::study_failure::StudyFailure;
 use super::tissue_variant::TissueVariant;
 use crate::world::simulation::Simulation;
 
@@ -72,13 +73,13 @@ pub fn command_line() -> Vec<String> {
 }
 
 /// A placement study of which some paddle can control the target.
-pub fn placement(tissue: TissueVariant, model: &TissueModel, placement: &Placement, wall_s: f64) -> PlacementResult {
-    let integration = serde_json::to_value(model.scene().discretization.method.integration);
+pub fn placement(tissue: TissueVariant, study: &PlacementStudy) -> PlacementResult {
+    let PlacementStudy { model, placement, wall_s, .. } = study;
     PlacementResult {
         tissue,
         nodes: model.nodes(),
-        integration: integration.ok().and_then(|name| name.as_str().map(str::to_owned)).unwrap_or_default(),
-        wall_s,
+        integration: model.scene().discretization.method.integration,
+        wall_s: *wall_s,
         best_static: placement.optimum.static_paddle,
         best_dynamic: placement.optimum.dynamic_paddle.unwrap_or_default(),
         paddles: placement
@@ -93,7 +94,7 @@ pub fn placement(tissue: TissueVariant, model: &TissueModel, placement: &Placeme
                 orthogonal: paddle.static_study.orthogonal.clone(),
                 max_orthogonal: paddle.static_study.max_orthogonal,
                 reached_depth: paddle.static_study.reached_depth,
-                failure: failure(&paddle.static_study),
+                failure: paddle.static_study.failure.as_ref().map(StudyFailure::from),
             })
             .collect(),
         no_paddle: Some(no_paddle(&placement.no_paddle.static_study)),
@@ -106,10 +107,6 @@ fn no_paddle(study: &StaticStudy) -> NoPaddlePlacement {
         orthogonal: study.orthogonal.clone(),
         max_orthogonal: study.max_orthogonal,
         reached_depth: study.reached_depth,
-        failure: failure(study),
+        failure: study.failure.as_ref().map(StudyFailure::from),
     }
-}
-
-fn failure(study: &StaticStudy) -> Option<String> {
-    study.failure.as_ref().map(|failure| format!("{}: {}", failure.reason, failure.detail))
 }

@@ -10,6 +10,8 @@ use model_offline::scene::SceneError;
 use model_offline::table::TableBuildError;
 
 use super::board::measure::MeasureError;
+use super::rounds::AllVoid;
+use super::usage::UsageError;
 use crate::exchange::LinkError;
 use crate::exchange::board::BoardError;
 use crate::record::error::{FileError, RecordError};
@@ -30,9 +32,9 @@ pub enum SimError {
     /// An output is refused before the work begins.
     #[error(transparent)]
     Refused(#[from] OutputRefused),
-    /// A combination of options that makes no sense.
-    #[error("{0}")]
-    Usage(String),
+    /// Options that cannot be obeyed.
+    #[error(transparent)]
+    Usage(#[from] UsageError),
     /// A tissue was asked for that the scene does not have.
     #[error("the scene {scene} has no inclusion: leave --tissue and --table-tissue away")]
     NoInclusion {
@@ -99,10 +101,26 @@ pub enum SimError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Runtime(#[from] RuntimeError),
-    /// The live view cannot be served.
-    #[error("no live view: {0}")]
+    /// The live view has no port.
+    #[error("no live view: cannot listen on port {port} of 127.0.0.1")]
     #[diagnostic(help("choose another --view-port, or leave it away for any free one"))]
-    View(String),
+    ViewPort {
+        /// The port; 0: any.
+        port: u16,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The live view has no secret to be opened with.
+    #[error("no live view: no random token")]
+    #[diagnostic(help("the page needs /dev/urandom; run without --view where there is none"))]
+    ViewToken {
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// Nothing of a timing measurement is left to compare.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Void(#[from] AllVoid),
     /// The images on the board cannot be measured, or cost too much.
     #[error(transparent)]
     Measure(#[from] MeasureError),

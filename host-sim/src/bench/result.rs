@@ -3,14 +3,16 @@
 //! Lengths are in the scene's unit, times in the unit that the name ends with.
 
 use firmware::{Faults, Mode};
+use model_offline::discretization::Integration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::tissue_variant::TissueVariant;
-use crate::runtime::durations::LoopTiming;
-use crate::runtime::ledger::LedgerResult;
-use crate::runtime::mode::RunMode;
+use super::study_failure::StudyFailure;
+use super::tissue_variant::{TableTissue, TissueVariant};
+use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
+use crate::runtime::time::durations::LoopTiming;
+use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::PlantAccount;
 
 /// Version of this format.
@@ -118,7 +120,8 @@ pub struct PlacementResult {
     /// Nodes of the model.
     pub nodes: usize,
     /// Its integration rule.
-    pub integration: String,
+    #[schemars(with = "String")]
+    pub integration: Integration,
     /// Duration of the study, s.
     pub wall_s: f64,
     /// Best static paddle.
@@ -152,7 +155,8 @@ pub struct PaddlePlacement {
     /// Depth reached, length.
     pub reached_depth: f64,
     /// Why the study ended before the full depth.
-    pub failure: Option<String>,
+    #[schemars(with = "Option<String>")]
+    pub failure: Option<StudyFailure>,
 }
 
 /// The insertion without a paddle in a placement study.
@@ -167,7 +171,8 @@ pub struct NoPaddlePlacement {
     /// Depth reached, length.
     pub reached_depth: f64,
     /// Why it ended before the full depth.
-    pub failure: Option<String>,
+    #[schemars(with = "Option<String>")]
+    pub failure: Option<StudyFailure>,
 }
 
 /// Strategies on one tissue with one table.
@@ -176,7 +181,8 @@ pub struct CaseResult {
     /// Tissue of the simulation.
     pub tissue: TissueVariant,
     /// Tissue that the planner and the table believed in.
-    pub table_tissue: String,
+    #[schemars(with = "String")]
+    pub table_tissue: TableTissue,
     /// The table.
     pub table: TableResult,
     /// The strategies.
@@ -270,7 +276,7 @@ pub struct StrategyResult {
     pub deformed_nodes: Vec<[f64; 2]>,
     /// The body along the way, for drawings; results of older versions have none.
     #[serde(default)]
-    pub frames: Vec<Frame>,
+    pub frames: Vec<BodyFrame>,
     /// Mean duration of a plant step, µs; not part of what is reproducible.
     pub plant_step_us: f64,
     /// Which model answered for the tissue, and how well; results of older versions do not say.
@@ -280,7 +286,7 @@ pub struct StrategyResult {
 
 /// The body at one moment of the insertion.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Frame {
+pub struct BodyFrame {
     /// Needle depth, length.
     pub depth: f64,
     /// Nodes there.

@@ -33,7 +33,7 @@ const NOISE: f64 = 1e-9;
 const REPEATS: u32 = 3;
 
 /// One table, tried.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct TableTrial {
     /// Depth knots.
     pub knots: usize,
@@ -46,7 +46,7 @@ pub struct TableTrial {
     /// Largest orthogonal target displacement over the insertion, length.
     pub max_error: f64,
     /// Why the loop stopped.
-    pub failure: Option<String>,
+    pub failure: Option<SimError>,
 }
 
 impl TableTrial {
@@ -91,7 +91,7 @@ fn try_table<T: Scalar>(table: &Table<T, 2>, plant: TissuePlant<'_>, simulation:
             trial.max_error = max_error;
             trial.step_ns = (0..REPEATS).map(|_| step_ns(table, simulation, &inputs)).fold(f64::INFINITY, f64::min);
         }
-        Err(error) => trial.failure = Some(error.to_string()),
+        Err(error) => trial.failure = Some(error),
     }
     trial
 }

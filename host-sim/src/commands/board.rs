@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use host_sim::SimError;
 use host_sim::bench::board::measure::{self, Budget, Figures, MeasureError};
+use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
@@ -67,7 +68,8 @@ const HEAD: &str = "\
 
 fn read_budget(path: &Path) -> Result<Budget, SimError> {
     let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
-    toml::from_str(&text).map_err(|error| SimError::Usage(format!("the budget {}: {error}", path.display())))
+    toml::from_str(&text)
+        .map_err(|source| UsageError::Budget { path: path.to_owned(), source: Box::new(source) }.into())
 }
 
 fn table(name: &str, figures: &Figures) -> String {

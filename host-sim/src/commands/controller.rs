@@ -8,15 +8,15 @@ use host_sim::SimError;
 use host_sim::exchange::Space;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{read_bytes, write_json};
-use host_sim::record::recording::Header;
+use host_sim::record::recording::RecordingHeader;
 use host_sim::record::recording::stream::StreamRecorder;
 use host_sim::runtime::controller::ControlLoop;
-use host_sim::runtime::controller::process::{ControllerResult, Served, Service, serve};
+use host_sim::runtime::controller::process::{ControllerResult, ServedPlant, Service, serve};
 use host_sim::runtime::executor::{AnyTable, Hardware, on_emulated_board};
-use host_sim::runtime::introduction::Introduction;
-use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::names;
+use host_sim::runtime::peer::introduction::Introduction;
 use host_sim::runtime::signals;
+use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::loop_settings::LoopSettings;
 use model_offline::output::table_text::hex;
 
@@ -83,7 +83,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
         Hardware::Qemu if args.mode == RunMode::FreeRun => return Err(SimError::QemuIsLockstepOnly),
         Hardware::Qemu => on_emulated_board(&bytes, &settings, timeout)?,
     };
-    let header = Header { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
+    let header = RecordingHeader { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
     let mut control_loop = ControlLoop::new(executor, args.capacity as usize).rearmed_by(signals::install_rearming());
     if let Some(path) = &args.record {
         control_loop = control_loop.recorded_by(Box::new(StreamRecorder::create(path, &header)?));
@@ -99,8 +99,8 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
 }
 
 /// Writes the accounts where they are wanted.
-fn hand_in(args: &ControllerArgs, served: Served) -> Result<(), SimError> {
-    let Served { accounts, ticks, ended } = served;
+fn hand_in(args: &ControllerArgs, served: ServedPlant) -> Result<(), SimError> {
+    let ServedPlant { accounts, ticks, ended } = served;
     if let Some(path) = &args.json {
         let ended = ended.as_ref().err().map(ToString::to_string);
         write_json(path, &ControllerResult { accounts: accounts.clone(), ended })?;

@@ -8,11 +8,12 @@ use firmware::Mode;
 use firmware::contract::Table;
 use host_sim::SimError;
 use host_sim::bench::faults::catalogue::ROWS;
-use host_sim::bench::faults::evidence::Verdict;
+use host_sim::bench::faults::evidence::RowVerdict;
 use host_sim::bench::faults::monitors::{MonitorOff, monitors_off};
 use host_sim::bench::faults::random::{Composed, composed};
 use host_sim::bench::faults::report::{FaultsResult, RowResult};
 use host_sim::bench::paper_table::paper_table;
+use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
 use host_sim::runtime::signals;
@@ -60,7 +61,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     signals::install();
     EFFORT.check(args.effort)?;
     if let Some(unknown) = args.only.iter().find(|id| !ROWS.iter().any(|row| row.id == **id)) {
-        return Err(SimError::Usage(format!("--only {unknown}: the catalogue has rows 1 to {}", ROWS.len())));
+        return Err(UsageError::NoRow { row: *unknown, last: ROWS.len() }.into());
     }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
@@ -68,16 +69,12 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
-    let table = paper_table()?;
+    let table = signals::ends_at_once(paper_table)?;
     if args.monitors_off {
         return without_monitors(args, &table);
     }
-    let mut result = FaultsResult {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        seed: args.seed,
-        mode: "rows 1 to 32 and random schedules: lockstep; rows 33 to 45: real processes".to_owned(),
-        ..FaultsResult::default()
-    };
+    let mut result =
+        FaultsResult { version: env!("CARGO_PKG_VERSION").to_owned(), seed: args.seed, ..FaultsResult::default() };
     for row in ROWS.iter().filter(|row| args.only.is_empty() || args.only.contains(&row.id)) {
         signals::check()?;
         let started = Instant::now();
@@ -104,7 +101,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
 
 /// The table monitor × row.
 fn without_monitors(args: &FaultsArgs, table: &Table<f64, 2>) -> Result<(), SimError> {
-    let monitors = monitors_off(table, args.seed)?;
+    let monitors = signals::ends_at_once(|| monitors_off(table, args.seed))?;
     for MonitorOff { monitor, rows } in &monitors {
         let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
         println!("{monitor:<20}  {}", if rows.is_empty() { "nobody notices".to_owned() } else { rows.join(" ") });
@@ -140,7 +137,7 @@ fn print_row(row: &RowResult, wall_s: f64) {
         row.unaccounted,
         row.result,
     );
-    if row.result != Verdict::Passed {
+    if row.result != RowVerdict::Passed {
         for note in &row.notes {
             println!("    {note}");
         }

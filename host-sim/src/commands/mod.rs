@@ -6,7 +6,6 @@ mod export;
 mod faults;
 mod outputs;
 mod plant;
-mod progress;
 mod rearm;
 mod replay;
 mod report;
@@ -24,6 +23,8 @@ use clap::{CommandFactory as _, Parser, Subcommand};
 use host_sim::SimError;
 use host_sim::record::error::FileError;
 use host_sim::runtime::signals;
+use indicatif::ProgressBar;
+use model_offline::output::terminal;
 
 use self::board::{BoardArgs, board};
 use self::controller::{ControllerArgs, controller};
@@ -170,6 +171,11 @@ pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
     }
 }
 
+/// The progress of a command whose steps are not counted yet; hidden for a quiet one.
+fn progress_bar(quiet: bool) -> ProgressBar {
+    if quiet { ProgressBar::hidden() } else { terminal::progress(0) }
+}
+
 /// Removes what runs that were killed have left in shared memory, and says so.
 fn sweep() {
     let swept = host_sim::exchange::sweep();
@@ -200,7 +206,7 @@ pub(crate) fn parse() -> Cli {
             if ELSEWHERE.contains(&word.as_str()) {
                 eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
             } else {
-                model_offline::output::terminal::suggest(&error, &word, &Cli::command());
+                terminal::suggest(&error, &word, &Cli::command());
             }
         }
         std::process::exit(error.exit_code());

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use host_sim::SimError;
+use host_sim::bench::usage::UsageError;
 use model_offline::output::OutputRefused;
 
 /// Refuses outputs (the option that names each, its path) that cannot be written, that name one file twice, or that name
@@ -29,8 +30,5 @@ pub(super) fn check_json_beside_report(inputs: &[&Path], json: Option<&Path>, ou
     if is_json && path.file_name().is_some_and(|name| name != "result.json") {
         return Ok(());
     }
-    Err(SimError::Usage(format!(
-        "--json {}: the report has a file of that name itself; name another ending in .json",
-        path.display()
-    )))
+    Err(UsageError::NameOfTheReport { path: path.to_owned() }.into())
 }

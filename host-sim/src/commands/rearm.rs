@@ -4,6 +4,7 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
 use host_sim::SimError;
+use host_sim::bench::usage::UsageError;
 use host_sim::runtime::error::RuntimeError;
 use rustix::process::{Pid, Signal, getuid, kill_process};
 
@@ -24,16 +25,13 @@ pub(crate) fn rearm(args: &RearmArgs) -> Result<(), SimError> {
     let process = match (args.process.as_ref(), controllers.as_slice()) {
         // Another program would die of the signal.
         (Some(process), found) if !found.contains(process) => {
-            return Err(SimError::Usage(format!("process {process} is no controller of this user")));
+            return Err(UsageError::NotAController { process: *process }.into());
         }
         (Some(process), _) | (None, [process]) => *process,
-        (None, []) => return Err(SimError::Usage("no controller of this user is running".to_owned())),
-        (None, several) => {
-            let list: Vec<String> = several.iter().map(ToString::to_string).collect();
-            return Err(SimError::Usage(format!("several controllers are running: say which, {}", list.join(" or "))));
-        }
+        (None, []) => return Err(UsageError::NoController.into()),
+        (None, several) => return Err(UsageError::SeveralControllers { processes: several.to_vec() }.into()),
     };
-    let pid = Pid::from_raw(process).ok_or_else(|| SimError::Usage("a process id is positive".to_owned()))?;
+    let pid = Pid::from_raw(process).ok_or(UsageError::NotAController { process })?;
     kill_process(pid, Signal::USR1).map_err(|error| RuntimeError::Spawn(error.into()))?;
     println!("asked controller {process} to re-arm");
     Ok(())

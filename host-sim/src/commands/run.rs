@@ -9,17 +9,16 @@ use host_sim::bench::strategy::Extras;
 use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_run};
-use host_sim::report::summary::summary;
+use host_sim::report::terminal::summary::summary;
 use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::executor::{Hardware, ScalarChoice};
-use host_sim::runtime::mode::RunMode;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::signals;
-use host_sim::view::{self, Basis, Knobs, View};
+use host_sim::runtime::time::mode::RunMode;
+use host_sim::view::{self, InsertionBasis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
 
 use super::outputs::check_json_beside_report;
-use super::progress::Bar;
 use super::world_args::{WorldArgs, threads_within_reason};
 
 /// Options of `run`.
@@ -104,12 +103,12 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     check_directory(&args.out)?;
     let inputs: Vec<&Path> = args.table.iter().chain(&args.world.scene).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json.as_deref(), &args.out)?;
-    let bar = Bar::new(args.quiet);
+    let bar = super::progress_bar(args.quiet);
     let options = args.options()?;
     let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &bar))?;
     let view = args.view.then(|| live_view(args, &simulation.loop_settings)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
-    bar.finish();
+    bar.finish_and_clear();
     write_run(&args.out, &compared.result, compared.artifacts)?;
     if let Some(path) = &args.json {
         write_json(path, &compared.result)?;
@@ -134,7 +133,7 @@ fn live_view(args: &RunArgs, loop_settings: &LoopSettings) -> Result<View, SimEr
 fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(), SimError> {
     let Some((scene, EncodedTable { table, bytes })) = comparison.last_case() else { return Ok(()) };
     let options = comparison.options();
-    let basis = Basis {
+    let basis = InsertionBasis {
         program: &options.program,
         scene,
         table,

@@ -5,16 +5,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::Progress as _;
-use host_sim::bench::loop_stability::behaviour::Resolution;
+use host_sim::bench::loop_stability::behaviour::Detail;
 use host_sim::bench::loop_stability::simulate;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
-use host_sim::report::loop_stability::{csv, summary};
-use host_sim::report::loop_stability_chart::figure;
+use host_sim::report::studies::loop_stability::{csv, summary};
+use host_sim::report::studies::loop_stability_chart::figure;
 use host_sim::runtime::signals;
 use model_offline::scene::Scene;
 
-use super::progress::Bar;
 use super::world_args::threads_within_reason;
 
 /// Parts of the simulation.
@@ -48,13 +47,13 @@ pub(crate) fn stability(args: &StabilityArgs) -> Result<(), SimError> {
     signals::install();
     let scene = Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?;
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
-    let bar = Bar::new(args.quiet);
+    let bar = super::progress_bar(args.quiet);
     bar.begin(PARTS);
     let all = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads_within_reason(args.threads.unwrap_or_else(all));
-    let resolution = if args.quick { Resolution::Quick } else { Resolution::Fine };
-    let result = signals::ends_at_once(|| simulate(&scene, resolution, threads, &|| bar.step()))?;
-    bar.finish();
+    let detail = if args.quick { Detail::Quick } else { Detail::Fine };
+    let result = signals::ends_at_once(|| simulate(&scene, detail, threads, &|| bar.step()))?;
+    bar.finish_and_clear();
     write_bytes(&args.out.join("closed_loop.csv"), &csv(&result))?;
     write_bytes(&args.out.join("closed_loop.svg"), figure(&result).svg().as_bytes())?;
     if !args.quiet {

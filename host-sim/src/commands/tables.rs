@@ -9,11 +9,10 @@ use host_sim::bench::tables::{KNOTS, compare};
 use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
-use host_sim::report::tables::{csv, figure, summary};
+use host_sim::report::studies::tables::{csv, figure, summary};
 use model_offline::placement::discretise;
 use model_offline::scene::Scene;
 
-use super::progress::Bar;
 use super::world_args::threads_within_reason;
 
 /// Options of `tables`.
@@ -45,11 +44,11 @@ pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
     let all = || std::thread::available_parallelism().map_or(1, usize::from);
     let threads = threads_within_reason(args.threads.unwrap_or_else(all));
-    let bar = Bar::new(args.quiet);
+    let bar = super::progress_bar(args.quiet);
     bar.begin(KNOTS.len() as u64);
     let (model, _) = discretise(&scene)?;
     let trials = compare(&model, threads, &|| bar.step())?;
-    bar.finish();
+    bar.finish_and_clear();
     write_bytes(&args.out.join("tables.csv"), &csv(&trials))?;
     let svg = figure(&trials, &scene.name, &scene.length_unit).svg();
     write_bytes(&args.out.join("tables.svg"), svg.as_bytes())?;

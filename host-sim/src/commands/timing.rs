@@ -5,13 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::timing::{TimingOptions, TimingResult, timing as measure};
+use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
+use host_sim::report::terminal::timing_summary::timing_summary;
 use host_sim::report::timing_histograms;
-use host_sim::report::timing_summary::timing_summary;
-use host_sim::runtime::clock::FIFO_PRIORITY;
 use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::signals;
+use host_sim::runtime::time::clock::FIFO_PRIORITY;
 use host_sim::world::error::OptionRange;
 
 use super::outputs::check_outputs;
@@ -48,7 +49,7 @@ pub(crate) struct TimingArgs {
 /// Measures and prints.
 ///
 /// # Errors
-/// [`SimError`].
+/// [`SimError`]; [`SimError::Void`] when nothing is left to compare, with everything written all the same.
 pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     signals::install();
     super::sweep();
@@ -58,7 +59,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     if let Some(cpu) = args.cpu
         && cpu >= processors
     {
-        return Err(SimError::Usage(format!("--cpu {cpu}: this machine has processors 0 to {}", processors - 1)));
+        return Err(UsageError::NoProcessor { cpu, last: processors - 1 }.into());
     }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
@@ -75,7 +76,8 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
         program: std::env::current_exe().map_err(RuntimeError::Spawn)?,
     })?;
     print!("{}", timing_summary(&result, args.priority));
-    write(args, &result)
+    write(args, &result)?;
+    Ok(result.check_rounds()?)
 }
 
 fn write(args: &TimingArgs, result: &TimingResult) -> Result<(), SimError> {

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
+use host_sim::bench::usage::UsageError;
 use host_sim::world::error::OptionRange;
 use host_sim::world::loop_settings::LoopSettings;
 use host_sim::world::simulation::Simulation;
-use host_sim::world::tissue::PlantChoice;
+use host_sim::world::tissue::WantedPlant;
 use model_offline::scene::Scene;
 
 /// How long a silent peer is waited for.
@@ -47,7 +48,7 @@ pub(crate) struct WorldArgs {
     pub(crate) paddle_delay: u32,
     /// What answers for the tissue at every tick [default: full; in free-run reduced where full cannot keep the period]
     #[arg(long, value_enum)]
-    pub(crate) plant: Option<PlantChoice>,
+    pub(crate) plant: Option<WantedPlant>,
     /// Part of its command that the paddle reaches
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub(crate) paddle_gain: f64,
@@ -86,11 +87,8 @@ impl WorldArgs {
         DURATION.check(simulation.duration_s)?;
         let ticks = simulation.duration_s * self.loop_settings.rate;
         if ticks > MOST_TICKS {
-            return Err(SimError::Usage(format!(
-                "--duration {} s at --rate {} Hz are {ticks:.0} ticks, at most {MOST_TICKS:.0} are kept; simulate a \
-                 shorter time or a slower loop",
-                simulation.duration_s, self.loop_settings.rate
-            )));
+            let (duration_s, rate_hz) = (simulation.duration_s, self.loop_settings.rate);
+            return Err(UsageError::TooManyTicks { duration_s, rate_hz, ticks, most: MOST_TICKS }.into());
         }
         simulation.loop_settings = self.loop_settings;
         simulation.actuator.lag_s = self.paddle_lag * 1e-3;

@@ -21,4 +21,4 @@ pub use error::LinkError;
 pub use ports::{ControllerPorts, PlantPorts, ReceiveCounts};
 pub use space::{Departure, Space, sweep};
 pub use stream::{Receiver, Sender};
-pub use wire::{ClockFrame, ClockKind, Frame, Wire};
+pub use wire::{ClockFrame, ClockKind, Wire, WireFrame};

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::error::LinkError;
 use super::space::{Presence, Space};
 use super::stream::{Receiver, Sender};
-use super::wire::{ClockFrame, Frame};
+use super::wire::{ClockFrame, WireFrame};
 
 fn node<S: Service>(space: &Space) -> Result<Node<S>, LinkError> {
     NodeBuilder::new()
@@ -192,7 +192,7 @@ impl<S: Service> ControllerPorts<S> {
     }
 }
 
-fn counts<S: Service, F: Frame>(receiver: &Receiver<S, F>) -> ReceiveCounts {
+fn counts<S: Service, F: WireFrame>(receiver: &Receiver<S, F>) -> ReceiveCounts {
     ReceiveCounts { received: receiver.received(), superseded: receiver.superseded() }
 }
 

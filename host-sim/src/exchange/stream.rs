@@ -15,7 +15,7 @@ use iceoryx2::service::builder::publish_subscribe::{
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::error::LinkError;
-use super::wire::{Frame, Wire};
+use super::wire::{Wire, WireFrame};
 
 /// Frames that wait at most; older ones are overwritten. Enough for a stopped reader to see that time has passed,
 /// short enough that draining never takes long.
@@ -26,7 +26,7 @@ const IN_FLUX_TIMEOUT: Duration = Duration::from_millis(500);
 
 type Factory<S, F> = PortFactory<S, Wire<F>, ()>;
 
-fn open<S: Service, F: Frame>(node: &Node<S>) -> Result<Factory<S, F>, LinkError> {
+fn open<S: Service, F: WireFrame>(node: &Node<S>) -> Result<Factory<S, F>, LinkError> {
     let name: ServiceName = F::SERVICE.try_into().expect("the names of services are short and plain");
     let until = Instant::now() + IN_FLUX_TIMEOUT;
     loop {
@@ -73,13 +73,13 @@ fn in_flux(error: &PublishSubscribeOpenOrCreateError) -> bool {
 
 /// Publishes frames of one type; the only one to do so.
 #[derive(Debug)]
-pub struct Sender<S: Service, F: Frame> {
+pub struct Sender<S: Service, F: WireFrame> {
     publisher: Publisher<S, Wire<F>, ()>,
     factory: Factory<S, F>,
     published: u64,
 }
 
-impl<S: Service, F: Frame> Sender<S, F> {
+impl<S: Service, F: WireFrame> Sender<S, F> {
     pub(super) fn new(node: &Node<S>) -> Result<Self, LinkError> {
         let factory = open(node)?;
         let publisher =
@@ -123,14 +123,14 @@ impl<S: Service, F: Frame> Sender<S, F> {
 
 /// Reads frames of one type; the only one to do so.
 #[derive(Debug)]
-pub struct Receiver<S: Service, F: Frame> {
+pub struct Receiver<S: Service, F: WireFrame> {
     subscriber: Subscriber<S, Wire<F>, ()>,
     factory: Factory<S, F>,
     received: u64,
     superseded: u64,
 }
 
-impl<S: Service, F: Frame> Receiver<S, F> {
+impl<S: Service, F: WireFrame> Receiver<S, F> {
     pub(super) fn new(node: &Node<S>) -> Result<Self, LinkError> {
         let factory = open(node)?;
         let subscriber =

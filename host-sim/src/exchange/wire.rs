@@ -7,7 +7,7 @@ use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample
 use iceoryx2::prelude::ZeroCopySend;
 
 /// A frame with its service and its type name in shared memory. Sealed: the list below has been looked at.
-pub trait Frame: Copy + Debug + sealed::Plain + 'static {
+pub trait WireFrame: Copy + Debug + sealed::Plain + 'static {
     /// Name of the service that carries it.
     const SERVICE: &'static str;
     /// Name of the type with the version of its layout; peers with another one are refused.
@@ -26,7 +26,7 @@ macro_rules! frames {
     ($($frame:ty: $service:literal, $type_name:literal;)*) => {
         $(
             impl sealed::Plain for $frame {}
-            impl Frame for $frame {
+            impl WireFrame for $frame {
                 const SERVICE: &'static str = $service;
                 const TYPE_NAME: &'static str = $type_name;
             }
@@ -90,13 +90,13 @@ impl ClockFrame {
 /// A frame as it lies in shared memory.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
-pub struct Wire<F: Frame>(pub F);
+pub struct Wire<F: WireFrame>(pub F);
 
-// SAFETY: `Frame` is sealed; every type that implements it is `repr(C)` and made of integers and floats without
+// SAFETY: `WireFrame` is sealed; every type that implements it is `repr(C)` and made of integers and floats without
 // padding (asserted at compile time here and in `firmware`), so that any bytes are a valid value and no pointer can
 // leak. `Wire` is transparent. The type name is unique to the layout version.
 #[allow(unsafe_code)]
-unsafe impl<F: Frame> ZeroCopySend for Wire<F> {
+unsafe impl<F: WireFrame> ZeroCopySend for Wire<F> {
     unsafe fn type_name() -> &'static str {
         F::TYPE_NAME
     }

@@ -10,7 +10,7 @@
 //! | 8 | seed |
 //! | 32 | SHA-256 of the plant's scene |
 //! | 32 | SHA-256 of the table's bytes |
-//! | 96 | settings of the controller, see [`Header`] |
+//! | 96 | settings of the controller, see [`RecordingHeader`] |
 //! | 4 + L | length of the table, and the table itself |
 //! | 32 | chain value h₀ = SHA-256 of everything above |
 //! | n · 288 | records: 256 bytes b, and hᵢ = SHA-256(hᵢ₋₁ ‖ b) |
@@ -25,9 +25,9 @@ use sha2::{Digest, Sha256};
 
 use super::error::{RecordError, RecordingError};
 use super::files;
-use crate::exchange::bytes::{Reader, Writer};
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::ControllerTick;
+use crate::exchange::bytes::{ByteReader, ByteWriter};
+use crate::runtime::accounting::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 use crate::world::truth::Truth;
 
 mod layout;
@@ -45,7 +45,7 @@ const TICK_MARK: u32 = u32::from_le_bytes(*b"TICK");
 
 /// Everything that a replay needs besides the records.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Header {
+pub struct RecordingHeader {
     /// What drove time.
     pub mode: RunMode,
     /// Seed of the sensors' noise.
@@ -71,7 +71,7 @@ pub struct Record {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// What it is about.
-    pub header: Header,
+    pub header: RecordingHeader,
     /// Its ticks.
     pub records: Vec<Record>,
 }
@@ -112,7 +112,7 @@ impl Recording {
     /// # Errors
     /// [`RecordingError`] for everything but a missing end.
     pub fn whole_records(bytes: &[u8]) -> Result<(Self, bool), RecordingError> {
-        let mut reader = Reader(bytes);
+        let mut reader = ByteReader(bytes);
         let header = decode_header(&mut reader)?;
         let covered = bytes.len() - reader.0.len();
         let mut chain: [u8; 32] = Sha256::digest(&bytes[..covered]).into();
@@ -129,7 +129,7 @@ impl Recording {
                 return Err(RecordingError::Chain { record: records.len() });
             }
             let impossible = RecordingError::Value { record: records.len() };
-            let mut body = Reader(&body);
+            let mut body = ByteReader(&body);
             match body.u32() {
                 Some(TICK_MARK) => records.push(decode_record(&mut body).ok_or(impossible)?),
                 Some(END_MARK) => {
@@ -155,8 +155,8 @@ struct Chain([u8; HASH_BYTES]);
 
 impl Chain {
     /// The chain of a recording, and the bytes that it starts with.
-    fn start(header: &Header) -> (Self, Vec<u8>) {
-        let mut writer = Writer::default();
+    fn start(header: &RecordingHeader) -> (Self, Vec<u8>) {
+        let mut writer = ByteWriter::default();
         encode_header(header, &mut writer);
         let chain: [u8; HASH_BYTES] = Sha256::digest(&writer.0).into();
         writer.bytes(&chain);
@@ -164,13 +164,13 @@ impl Chain {
     }
 
     fn record(&mut self, record: &Record, bytes: &mut Vec<u8>) {
-        let mut body = Writer::default();
+        let mut body = ByteWriter::default();
         encode_record(record, &mut body);
         self.link(&body.0, bytes);
     }
 
     fn end(&mut self, records: u64, bytes: &mut Vec<u8>) {
-        let mut body = Writer::default();
+        let mut body = ByteWriter::default();
         body.u32(END_MARK);
         body.u32(0);
         body.u64(records);

@@ -8,7 +8,7 @@ use firmware::contract::PaddleCommand;
 use super::error::RecordError;
 use super::recording::Recording;
 use crate::runtime::executor::AnyTable;
-use crate::runtime::mode::RunMode;
+use crate::runtime::time::mode::RunMode;
 
 /// A replay without differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

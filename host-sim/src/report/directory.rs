@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{Attachments, pictures, render, render_with};
 use crate::bench::error::SimError;
 use crate::bench::result::{FORMAT, RunResult};
+use crate::bench::usage::UsageError;
 use crate::record::error::FileError;
 use crate::record::files::{Artifact, read_bytes, write_bytes};
 
@@ -27,11 +28,8 @@ fn parent(directory: &Path) -> &Path {
 /// [`SimError::Usage`].
 pub fn check_directory(directory: &Path) -> Result<(), SimError> {
     if !parent(directory).is_dir() {
-        return Err(SimError::Usage(format!(
-            "--out {}: the directory {} does not exist",
-            directory.display(),
-            parent(directory).display()
-        )));
+        let parent = parent(directory).to_owned();
+        return Err(UsageError::NoParent { directory: directory.to_owned(), parent }.into());
     }
     let Ok(metadata) = directory.symlink_metadata() else {
         return Ok(());
@@ -40,10 +38,7 @@ pub fn check_directory(directory: &Path) -> Result<(), SimError> {
     if metadata.is_dir() && (empty() || directory.join(RESULT_FILE).is_file()) {
         return Ok(());
     }
-    Err(SimError::Usage(format!(
-        "--out {}: it exists and is not the report of a former run; name another directory",
-        directory.display()
-    )))
+    Err(UsageError::NotAReport { directory: directory.to_owned() }.into())
 }
 
 /// Writes the whole report directory; one of a former run is replaced.

@@ -9,9 +9,9 @@ use firmware::scalar::{Scalar, ScalarKind};
 use firmware::serial::Request;
 use firmware::{Controller, Inputs, Settings, State};
 
-use super::error::RuntimeError;
 use crate::exchange::board::device::scalar_of;
 use crate::exchange::board::{BoardError, Device, Image, Processor};
+use crate::runtime::error::RuntimeError;
 
 /// What computes the controller's steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]

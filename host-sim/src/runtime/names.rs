@@ -1,4 +1,4 @@
-//! Modes and fault codes as JSON has them: by name.
+//! Modes, fault codes and reasons of refusals as JSON has them: by name.
 
 /// `RUN`, `HOLD`, `SAFE`; `none` without a controller.
 pub mod mode {
@@ -93,9 +93,38 @@ pub mod faults {
     }
 }
 
+/// Pairs of a reason's name and a count.
+pub mod discards {
+    use firmware::Discard;
+    use serde::de::Error as _;
+    use serde::{Deserialize as _, Deserializer, Serializer};
+
+    /// Writes the pairs.
+    ///
+    /// # Errors
+    /// Those of the serializer.
+    pub fn serialize<S: Serializer>(counts: &[(Discard, u64)], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(counts.iter().map(|(reason, count)| (reason.name(), count)))
+    }
+
+    /// Reads the pairs.
+    ///
+    /// # Errors
+    /// A name that no reason has.
+    pub fn deserialize<'d, D: Deserializer<'d>>(deserializer: D) -> Result<Vec<(Discard, u64)>, D::Error> {
+        let found = Vec::<(String, u64)>::deserialize(deserializer)?;
+        let known = |(name, count): (String, u64)| {
+            let reason = Discard::ALL.into_iter().find(|reason| reason.name() == name);
+            let unknown = || D::Error::custom(format!("`{name}` is no reason to refuse a sample"));
+            Ok((reason.ok_or_else(unknown)?, count))
+        };
+        found.into_iter().map(known).collect()
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use firmware::{Faults, Mode};
+    use firmware::{Discard, Faults, Mode};
     use serde::{Deserialize, Serialize};
 
     #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -116,5 +145,16 @@ mod tests {
         }
         assert!(serde_json::from_str::<Both>(r#"{"mode":"run","faults":"NONE"}"#).is_err());
         assert!(serde_json::from_str::<Both>(r#"{"mode":"RUN","faults":"NOTHING"}"#).is_err());
+    }
+
+    #[test]
+    fn reasons_are_read_back_and_others_refused() {
+        #[derive(Debug, PartialEq, Serialize, Deserialize)]
+        struct Counts(#[serde(with = "super::discards")] Vec<(Discard, u64)>);
+        let counts = Counts(Discard::ALL.into_iter().zip(1..).collect());
+        let text = serde_json::to_string(&counts).unwrap();
+        assert!(text.starts_with(r#"[["late",1],["not finite",2],"#), "{text}");
+        assert_eq!(serde_json::from_str::<Counts>(&text).unwrap(), counts);
+        assert!(serde_json::from_str::<Counts>(r#"[["tired",1]]"#).is_err());
     }
 }

@@ -8,11 +8,7 @@ use std::time::Duration;
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGUSR1};
 
-use super::clock;
-use super::error::RuntimeError;
-
-/// Longest sleep without a look at signals, ns: one that comes between the look and the sleep waits no longer than this.
-const SLEEP_NS: u64 = 100_000_000;
+use crate::runtime::error::RuntimeError;
 
 static RECEIVED: OnceLock<Arc<AtomicUsize>> = OnceLock::new();
 
@@ -51,22 +47,6 @@ pub fn check() -> Result<(), RuntimeError> {
         _ => return Ok(()),
     };
     Err(RuntimeError::Interrupted { signal })
-}
-
-/// Sleeps until an absolute time of the steady clock, ns, or until a signal asks for the end.
-///
-/// # Errors
-/// [`RuntimeError::Interrupted`].
-pub fn sleep_until(time_ns: u64) -> Result<(), RuntimeError> {
-    check()?;
-    loop {
-        let now_ns = clock::now_ns();
-        if now_ns >= time_ns {
-            return Ok(());
-        }
-        clock::sleep_until(time_ns.min(now_ns + SLEEP_NS));
-        check()?;
-    }
 }
 
 /// How often a computation that looks at no signals is looked after.

@@ -9,7 +9,7 @@ use hyper::body::Bytes;
 use serde_json::Value;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::limits::{Deadline, Place};
+use super::limits::{Deadline, Slot};
 use super::page;
 use super::shared::{FRAME_NS, Shared, ViewState};
 
@@ -26,11 +26,11 @@ pub(super) struct Events {
     insertion: u64,
     number: u64,
     idle: u32,
-    _place: Place,
+    _place: Slot,
 }
 
 impl Events {
-    pub(super) fn new(shared: Arc<Shared>, deadline: Arc<Deadline>, place: Place) -> Self {
+    pub(super) fn new(shared: Arc<Shared>, deadline: Arc<Deadline>, place: Slot) -> Self {
         let mut looks = interval(Duration::from_nanos(FRAME_NS / 2));
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         Self { shared, deadline, looks, waiting: VecDeque::new(), insertion: 0, number: 0, idle: 0, _place: place }

@@ -10,17 +10,17 @@ use super::server::View;
 use super::shared::Knobs;
 use crate::bench::error::SimError;
 use crate::bench::result::StrategyResult;
-use crate::bench::strategy::{ControllerSetup, Insertion, Label};
+use crate::bench::strategy::{ControllerSetup, Label, SimulatedInsertion};
 use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
-use crate::runtime::mode::RunMode;
 use crate::runtime::names;
+use crate::runtime::time::mode::RunMode;
 use crate::world::error::WorldError;
 use crate::world::simulation::Simulation;
 
 /// What the page's insertions start from.
 #[derive(Clone, Copy, Debug)]
-pub struct Basis<'a> {
+pub struct InsertionBasis<'a> {
     /// This program, which is also the controller.
     pub program: &'a Path,
     /// The scene of the simulation, as the knobs find it.
@@ -41,7 +41,7 @@ pub struct Basis<'a> {
 ///
 /// # Errors
 /// [`SimError`] of the first insertion that cannot be simulated, except for the signal.
-pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<(), SimError> {
+pub fn insertions(view: &View, basis: &InsertionBasis<'_>, say: &dyn Fn(&str)) -> Result<(), SimError> {
     let shared = view.shared();
     shared.allow_restarts();
     for number in 1_u64.. {
@@ -58,7 +58,7 @@ pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<
             spectator: Some(view),
         };
         let label = Label { tissue: scene.tissue(), table_tissue: basis.table.tissue.as_str(), strategy: "live" };
-        match Insertion::new(&model, &simulation, &label).controlled(&controller) {
+        match SimulatedInsertion::new(&model, &simulation, &label).controlled(&controller) {
             Ok(measured) => say(&line(number, &knobs, &measured.result)),
             Err(SimError::Runtime(RuntimeError::Interrupted { .. })) => return Ok(()),
             // A tissue that has no equilibrium any more is something to see, not the end of the view.
@@ -76,7 +76,7 @@ pub fn insertions(view: &View, basis: &Basis<'_>, say: &dyn Fn(&str)) -> Result<
 }
 
 /// Scene and simulation as the knobs want them.
-fn under(knobs: &Knobs, basis: &Basis<'_>) -> (Scene, Simulation) {
+fn under(knobs: &Knobs, basis: &InsertionBasis<'_>) -> (Scene, Simulation) {
     let mut scene = basis.scene.clone();
     for inclusion in &mut scene.inclusions {
         inclusion.stiffness *= knobs.stiffness;

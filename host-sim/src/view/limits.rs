@@ -24,12 +24,12 @@ pub(super) struct Gate {
 
 /// A place that is free again when this is dropped.
 #[derive(Debug)]
-pub(super) struct Place {
+pub(super) struct Slot {
     gate: Arc<Gate>,
     of: fn(&Gate) -> &AtomicUsize,
 }
 
-impl Drop for Place {
+impl Drop for Slot {
     fn drop(&mut self) {
         (self.of)(&self.gate).fetch_sub(1, Ordering::AcqRel);
     }
@@ -41,19 +41,19 @@ impl Gate {
         Self { token, port, lookers: AtomicUsize::new(0), connections: AtomicUsize::new(0) }
     }
 
-    fn take(self: &Arc<Self>, of: fn(&Self) -> &AtomicUsize, most: usize) -> Option<Place> {
+    fn take(self: &Arc<Self>, of: fn(&Self) -> &AtomicUsize, most: usize) -> Option<Slot> {
         let next = |taken: usize| (taken < most).then_some(taken + 1);
         of(self).fetch_update(Ordering::AcqRel, Ordering::Acquire, next).ok()?;
-        Some(Place { gate: Arc::clone(self), of })
+        Some(Slot { gate: Arc::clone(self), of })
     }
 
     /// A place for a page that looks on, if there is one.
-    pub(super) fn look_on(self: &Arc<Self>) -> Option<Place> {
+    pub(super) fn look_on(self: &Arc<Self>) -> Option<Slot> {
         self.take(|gate| &gate.lookers, MAX_LOOKERS)
     }
 
     /// A place for a connection, if there is one.
-    pub(super) fn connect(self: &Arc<Self>) -> Option<Place> {
+    pub(super) fn connect(self: &Arc<Self>) -> Option<Slot> {
         self.take(|gate| &gate.connections, MAX_CONNECTIONS)
     }
 }

@@ -20,6 +20,6 @@ mod server;
 mod shared;
 mod watch;
 
-pub use insertions::{Basis, insertions};
+pub use insertions::{InsertionBasis, insertions};
 pub use server::View;
 pub use shared::{KnobOutOfRange, Knobs};

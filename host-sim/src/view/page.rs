@@ -3,7 +3,7 @@
 use serde_json::{Value, json};
 
 use super::shared::{Shared, ViewState};
-use crate::report::mesh;
+use crate::report::page::mesh;
 
 /// One file: no network but the events of its own address.
 pub(super) const PAGE: &str = include_str!("page.html");

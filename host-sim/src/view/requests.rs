@@ -34,14 +34,14 @@ enum PageRequest {
 
 /// The body of an answer.
 #[derive(Debug)]
-pub(super) enum Reply {
+pub(super) enum HttpReply {
     /// All of it.
     Whole(Full<Bytes>),
     /// Events until the page goes away.
     Events(Box<Events>),
 }
 
-impl Body for Reply {
+impl Body for HttpReply {
     type Data = Bytes;
     type Error = Infallible;
 
@@ -60,8 +60,8 @@ impl Body for Reply {
     }
 }
 
-fn whole(status: StatusCode, kind: &'static str, text: impl Into<Bytes>) -> Response<Reply> {
-    let mut response = Response::new(Reply::Whole(Full::new(text.into())));
+fn whole(status: StatusCode, kind: &'static str, text: impl Into<Bytes>) -> Response<HttpReply> {
+    let mut response = Response::new(HttpReply::Whole(Full::new(text.into())));
     *response.status_mut() = status;
     let fixed = [
         (header::CONTENT_TYPE, kind),
@@ -77,7 +77,7 @@ fn whole(status: StatusCode, kind: &'static str, text: impl Into<Bytes>) -> Resp
     response
 }
 
-fn plain(status: StatusCode, text: impl Into<Bytes>) -> Response<Reply> {
+fn plain(status: StatusCode, text: impl Into<Bytes>) -> Response<HttpReply> {
     whole(status, "text/plain; charset=utf-8", text)
 }
 
@@ -110,7 +110,7 @@ pub(super) async fn answer(
     gate: Arc<Gate>,
     shared: Arc<Shared>,
     deadline: Arc<Deadline>,
-) -> Result<Response<Reply>, Infallible> {
+) -> Result<Response<HttpReply>, Infallible> {
     let Some(path) = path(&request, &gate) else {
         let text = "forbidden: open the address that host-sim printed, with its token\n";
         return Ok(plain(StatusCode::FORBIDDEN, text));
@@ -121,13 +121,13 @@ pub(super) async fn answer(
             None => plain(StatusCode::SERVICE_UNAVAILABLE, "too many pages look on already: close one\n"),
             Some(place) => {
                 let mut response = whole(StatusCode::OK, "text/event-stream", "");
-                *response.body_mut() = Reply::Events(Box::new(Events::new(shared, deadline, place)));
+                *response.body_mut() = HttpReply::Events(Box::new(Events::new(shared, deadline, place)));
                 response
             }
         },
         (&Method::POST, "request") => match button(request.into_body()).await.and_then(|asked| grant(asked, &shared)) {
             Ok(()) => plain(StatusCode::NO_CONTENT, ""),
-            Err(refusal @ Refusal::TooLong) => plain(StatusCode::PAYLOAD_TOO_LARGE, format!("{refusal}\n")),
+            Err(refusal @ HttpRefusal::TooLong) => plain(StatusCode::PAYLOAD_TOO_LARGE, format!("{refusal}\n")),
             Err(refusal) => plain(StatusCode::BAD_REQUEST, format!("{refusal}\n")),
         },
         _ => plain(StatusCode::NOT_FOUND, "not here\n"),
@@ -135,18 +135,19 @@ pub(super) async fn answer(
 }
 
 /// What a button sent. A length that is too large is refused before anything is read.
-async fn button(body: Incoming) -> Result<PageRequest, Refusal> {
+async fn button(body: Incoming) -> Result<PageRequest, HttpRefusal> {
     if body.size_hint().lower() > MAX_BODY as u64 {
-        return Err(Refusal::TooLong);
+        return Err(HttpRefusal::TooLong);
     }
     let read = Limited::new(body, MAX_BODY).collect().await;
-    let body = read.map_err(|error| if error.is::<LengthLimitError>() { Refusal::TooLong } else { Refusal::CutOff })?;
+    let body =
+        read.map_err(|error| if error.is::<LengthLimitError>() { HttpRefusal::TooLong } else { HttpRefusal::CutOff })?;
     Ok(serde_json::from_slice(&body.to_bytes())?)
 }
 
 /// Why a button's request is not granted.
 #[derive(Debug, thiserror::Error)]
-enum Refusal {
+enum HttpRefusal {
     #[error("no button sends more than {MAX_BODY} bytes")]
     TooLong,
     #[error("the request ended early")]
@@ -161,13 +162,13 @@ enum Refusal {
     Knob(#[from] KnobOutOfRange),
 }
 
-fn grant(request: PageRequest, shared: &Shared) -> Result<(), Refusal> {
+fn grant(request: PageRequest, shared: &Shared) -> Result<(), HttpRefusal> {
     match request {
         PageRequest::Pause(paused) => shared.set_paused(paused),
         PageRequest::Step(ticks) if (1..=1000).contains(&ticks) => shared.step(ticks),
-        PageRequest::Step(ticks) => return Err(Refusal::Steps(ticks)),
+        PageRequest::Step(ticks) => return Err(HttpRefusal::Steps(ticks)),
         PageRequest::Pace(thousandths) if thousandths <= 100_000 => shared.set_pace(thousandths),
-        PageRequest::Pace(thousandths) => return Err(Refusal::Pace(thousandths)),
+        PageRequest::Pace(thousandths) => return Err(HttpRefusal::Pace(thousandths)),
         PageRequest::Knobs(knobs) => {
             knobs.check()?;
             shared.turn(knobs);

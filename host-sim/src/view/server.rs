@@ -16,7 +16,7 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use model_offline::output::table_text::hex;
 use tokio::net::TcpStream;
 
-use super::limits::{Deadline, Gate, Place};
+use super::limits::{Deadline, Gate, Slot};
 use super::requests::answer;
 use super::shared::{Knobs, Shared};
 use super::watch::Watch;
@@ -41,10 +41,10 @@ impl View {
     /// Serves on 127.0.0.1 at this port; 0: any free one.
     ///
     /// # Errors
-    /// [`SimError::View`] when the port is taken or there is no randomness for the token.
+    /// [`SimError::ViewPort`] when the port is taken, [`SimError::ViewToken`] without randomness for the token.
     pub fn start(port: u16, knobs: Knobs) -> Result<Self, SimError> {
-        let token = token().map_err(|error| SimError::View(format!("no random token: {error}")))?;
-        let failed = |error| SimError::View(format!("cannot listen on port {port} of 127.0.0.1: {error}"));
+        let token = token().map_err(|source| SimError::ViewToken { source })?;
+        let failed = |source| SimError::ViewPort { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
@@ -102,7 +102,7 @@ async fn accept(listener: TcpListener, gate: Arc<Gate>, shared: Arc<Shared>) {
 }
 
 /// One connection, until it is answered or its time is over.
-async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, place: Place) {
+async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, place: Slot) {
     let deadline = Arc::new(Deadline::new());
     let for_answer = Arc::clone(&deadline);
     let service =

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use model_offline::model::TissueModel;
 use serde::{Deserialize, Serialize};
 
-use crate::runtime::mode::RunMode;
+use crate::runtime::time::mode::RunMode;
 
 /// Time between two pictures: 30 a second.
 pub(super) const FRAME_NS: u64 = 33_333_333;

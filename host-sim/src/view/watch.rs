@@ -4,10 +4,10 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::shared::{FRAME_NS, Shared, ViewState};
-use crate::runtime::clock::{now_ns, sleep_until};
-use crate::runtime::mode::RunMode;
 use crate::runtime::plant::observer::{Moment, ObservedInsertion, Observer};
 use crate::runtime::signals;
+use crate::runtime::time::clock::{now_ns, sleep_until};
+use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::TissuePlant;
 
 /// How long a paused loop sleeps between two looks.
@@ -135,7 +135,7 @@ impl Observer for Watch {
 mod tests {
     use super::*;
     use crate::view::Knobs;
-    use crate::world::tissue::PlantChoice;
+    use crate::world::tissue::WantedPlant;
     use crate::world::truth::Truth;
     use model_offline::model::TissueModel;
     use model_offline::scene::Scene;
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn the_loop_never_waits_for_a_reader() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let tissue = TissuePlant::new(&model, None, PlantChoice::Full).unwrap();
+        let tissue = TissuePlant::new(&model, None, WantedPlant::Full).unwrap();
         let knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
         let shared = Arc::new(Shared::new(knobs));
         let insertion = ObservedInsertion {

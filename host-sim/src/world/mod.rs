@@ -27,7 +27,7 @@ use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
 use self::rehearsal::rehearse;
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{PlantAccount, PlantChoice, TissuePlant, TissueResponse};
+use self::tissue::{PlantAccount, TissuePlant, TissueResponse, WantedPlant};
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
@@ -97,11 +97,11 @@ impl<'m> World<TissuePlant<'m>> {
         if simulation.plant.is_some() {
             return Err(full.too_slow());
         }
-        let reduced = Simulation { plant: Some(PlantChoice::Reduced), ..*simulation };
+        let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..*simulation };
         let Ok(mut world) = Self::new(model, paddle_index, &reduced) else { return Err(full.too_slow()) };
-        let pace = rehearse(&mut world.tissue, simulation)?;
-        if !pace.keeps_the_period() {
-            return Err(pace.too_slow());
+        let rehearsed = rehearse(&mut world.tissue, simulation)?;
+        if !rehearsed.keeps_the_period() {
+            return Err(rehearsed.too_slow());
         }
         world.tissue.stands_in_for_full(full.step_us);
         Ok(world)

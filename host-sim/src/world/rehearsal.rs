@@ -18,14 +18,14 @@ const PADDLE_PER_DEPTH: f64 = 0.1;
 
 /// What a step takes, against the period.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pace {
+pub struct Rehearsal {
     /// Median of a step, µs.
     pub step_us: f64,
     /// Period of the loop, µs.
     pub period_us: f64,
 }
 
-impl Pace {
+impl Rehearsal {
     /// Whether a loop at this period has time for the step.
     pub fn keeps_the_period(&self) -> bool {
         self.step_us <= PART_OF_PERIOD * self.period_us
@@ -42,7 +42,7 @@ impl Pace {
 ///
 /// # Errors
 /// [`WorldError::Tissue`].
-pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result<Pace, WorldError> {
+pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result<Rehearsal, WorldError> {
     let trajectory = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
     let period_us = simulation.loop_settings.period_ns() as f64 * 1e-3;
     let middle_s = 0.5 * simulation.insertion_s;
@@ -60,7 +60,7 @@ pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result
         Ok(())
     })?;
     times_us.sort_by(f64::total_cmp);
-    Ok(Pace { step_us: times_us[STEPS / 2], period_us })
+    Ok(Rehearsal { step_us: times_us[STEPS / 2], period_us })
 }
 
 #[cfg(test)]
@@ -71,12 +71,12 @@ mod tests {
     use super::*;
     use crate::world::World;
     use crate::world::loop_settings::LoopSettings;
-    use crate::world::tissue::PlantChoice;
+    use crate::world::tissue::WantedPlant;
 
     #[test]
     fn the_rule_of_the_period() {
-        assert!(Pace { step_us: 800.0, period_us: 1000.0 }.keeps_the_period());
-        let slow = Pace { step_us: 801.0, period_us: 1000.0 };
+        assert!(Rehearsal { step_us: 800.0, period_us: 1000.0 }.keeps_the_period());
+        let slow = Rehearsal { step_us: 801.0, period_us: 1000.0 };
         assert!(!slow.keeps_the_period());
         assert!(slow.too_slow().to_string().contains("at most 998 Hz"), "{}", slow.too_slow());
     }
@@ -91,7 +91,7 @@ mod tests {
             let loop_settings = LoopSettings { rate, target_rate: rate.min(50.0), ..LoopSettings::default() };
             Simulation { loop_settings, plant, ..Simulation::new(&scene) }
         };
-        for plant in [None, Some(PlantChoice::Full)] {
+        for plant in [None, Some(WantedPlant::Full)] {
             let refused = World::in_time(&model, Some(2), &at(5e5, plant));
             assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
         }

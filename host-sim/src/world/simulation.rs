@@ -4,7 +4,7 @@ use model_offline::scene::Scene;
 
 use super::actuator::ActuatorModel;
 use super::loop_settings::LoopSettings;
-use super::tissue::PlantChoice;
+use super::tissue::WantedPlant;
 
 /// The controller needs one target sample to arrive; everything longer is a fault of the set-up.
 pub const LONGEST_WAIT_FOR_RUN_NS: u64 = 2_000_000_000;
@@ -38,7 +38,7 @@ pub struct Simulation {
     pub seed: u64,
     /// What answers for the tissue; none: the full model, or the reduced one where the clock drives time and the full
     /// one cannot keep the period.
-    pub plant: Option<PlantChoice>,
+    pub plant: Option<WantedPlant>,
 }
 
 impl Simulation {

@@ -30,7 +30,7 @@ const STEP_SETTINGS: NewtonSettings = NewtonSettings {
 
 /// Which model is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PlantChoice {
+pub enum WantedPlant {
     /// The full nonlinear model at every tick
     #[default]
     Full,
@@ -123,14 +123,14 @@ impl<'m> TissuePlant<'m> {
     ///
     /// # Errors
     /// [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
-    /// the reduced model that was asked for cannot be made (with [`PlantChoice::Auto`] the full one answers, and the account says why).
-    pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: PlantChoice) -> Result<Self, WorldError> {
+    /// the reduced model that was asked for cannot be made (with [`WantedPlant::Auto`] the full one answers, and the account says why).
+    pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: WantedPlant) -> Result<Self, WorldError> {
         let mut account = PlantAccount::default();
         let wanted = match (choice, model.scene().fit) {
-            (PlantChoice::Full, _) => PlantModel::Full,
-            (PlantChoice::Condensed, _) => PlantModel::Condensed,
-            (PlantChoice::Reduced, _) | (PlantChoice::Auto, None) => PlantModel::Reduced,
-            (PlantChoice::Auto, Some(fit)) => fit.plant,
+            (WantedPlant::Full, _) => PlantModel::Full,
+            (WantedPlant::Condensed, _) => PlantModel::Condensed,
+            (WantedPlant::Reduced, _) | (WantedPlant::Auto, None) => PlantModel::Reduced,
+            (WantedPlant::Auto, Some(fit)) => fit.plant,
         };
         let kind = match wanted {
             PlantModel::Full => Kind::Full(full(model, paddle)?),
@@ -146,7 +146,7 @@ impl<'m> TissuePlant<'m> {
                     account.points = Some([report.points, report.full_points]);
                     return Ok(Self { account, ..Self::reduced(model, paddle, &reduced) });
                 }
-                Err(error) if choice == PlantChoice::Auto => {
+                Err(error) if choice == WantedPlant::Auto => {
                     account.first_fallback = Some(error.to_string());
                     Kind::Full(full(model, paddle)?)
                 }
@@ -282,8 +282,8 @@ mod tests {
     #[test]
     fn where_the_reduced_model_does_not_hold_the_full_one_answers_and_it_is_counted() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let mut reduced = TissuePlant::new(&model, Some(2), PlantChoice::Reduced).unwrap();
-        let mut exact = TissuePlant::new(&model, Some(2), PlantChoice::Full).unwrap();
+        let mut reduced = TissuePlant::new(&model, Some(2), WantedPlant::Reduced).unwrap();
+        let mut exact = TissuePlant::new(&model, Some(2), WantedPlant::Full).unwrap();
         let inside = (0.05, Vector2::new(0.001, -0.002));
         let far = (0.05, Vector2::new(0.04, 0.0));
         for (depth, paddle) in [inside, far, inside] {
@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn the_condensed_model_says_how_far_off_it_is() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let mut condensed = TissuePlant::new(&model, Some(2), PlantChoice::Condensed).unwrap();
+        let mut condensed = TissuePlant::new(&model, Some(2), WantedPlant::Condensed).unwrap();
         let shallow = condensed.step(1e-4, Vector2::zeros()).unwrap();
         assert!(condensed.account().error_at_end.unwrap() < 1e-3 * shallow.norm());
         let deep = condensed.step(0.1, Vector2::zeros()).unwrap();
@@ -311,7 +311,7 @@ mod tests {
     fn auto_does_what_the_scene_says() {
         let mut scene = Scene::bundled("paper").unwrap();
         let model = TissueModel::new(&scene).unwrap();
-        let name = |model: &TissueModel| TissuePlant::new(model, None, PlantChoice::Auto).unwrap().account().model;
+        let name = |model: &TissueModel| TissuePlant::new(model, None, WantedPlant::Auto).unwrap().account().model;
         assert_eq!(name(&model), PlantModel::Reduced);
         let section = "[fit]\nplant = \"condensed\"\ntable_knots = 9\ntable_scalar = \"f32\"\n";
         let text = format!("{}\n{section}", model_offline::scene::BUNDLED[0].1);

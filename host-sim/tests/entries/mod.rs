@@ -2,11 +2,11 @@
 //! nothing but a typed refusal or a plausible value may come.
 
 use firmware::serial::{Frame, FrameReader, Reply, Request};
-use host_sim::exchange::bytes::{Reader, Writer};
+use host_sim::exchange::bytes::{ByteReader, ByteWriter};
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::recording::Recording;
-use host_sim::runtime::accounts::ControllerAccounts;
-use host_sim::runtime::tick::{ControllerTick, TICK_BYTES};
+use host_sim::runtime::accounting::accounts::ControllerAccounts;
+use host_sim::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
 use model_offline::scene::Scene;
 use model_offline::scene::import::{Imported, gmsh, svg};
 
@@ -39,9 +39,9 @@ pub(crate) fn recording(bytes: &[u8]) {
 
 /// Ticks as a controller hands them over.
 pub(crate) fn ticks(bytes: &[u8]) {
-    let mut reader = Reader(bytes);
+    let mut reader = ByteReader(bytes);
     while let Some(tick) = ControllerTick::decode(&mut reader) {
-        let mut writer = Writer::default();
+        let mut writer = ByteWriter::default();
         tick.encode(&mut writer);
         assert_eq!(writer.0.len(), TICK_BYTES);
     }

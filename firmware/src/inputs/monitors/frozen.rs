@@ -37,12 +37,12 @@ impl FrozenMonitor {
 /// A value rounded to steps stays bit-identical until the target has moved by one. How far it must move for that is
 /// what the table says, so that the test asks for the table's own motion in units of the resolution.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Resolution {
+pub(crate) struct SensorStep {
     /// Squared; `None` before the first change.
     smallest_step_squared: Option<f64>,
 }
 
-impl Resolution {
+impl SensorStep {
     /// Motion without which an unchanged value says nothing, for a sensor of this range, length.
     pub(crate) fn unseen_motion(&self, range: f64) -> f64 {
         let coarsest = FROZEN_UNSEEN_RESOLUTION * range;

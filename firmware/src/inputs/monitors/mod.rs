@@ -16,7 +16,7 @@ mod tests;
 pub(crate) use bucket::LeakyBucket;
 pub(crate) use divergence::DivergenceMonitor;
 pub(crate) use following::FollowingMonitor;
-pub(crate) use frozen::{FrozenMonitor, Resolution};
+pub(crate) use frozen::{FrozenMonitor, SensorStep};
 pub(crate) use innovation::InnovationGate;
 pub(crate) use needle::NeedleMonitor;
 pub(crate) use rest::{Motion, RestMonitor};

@@ -251,7 +251,7 @@ fn a_frozen_value_is_the_fifth_alike_after_the_followed_thing_has_left() {
 
 #[test]
 fn a_resolution_is_the_smallest_change_between_its_bounds() {
-    let mut resolution = Resolution::default();
+    let mut resolution = SensorStep::default();
     close(resolution.unseen_motion(2.0), 4.0 * 0.025 * 2.0);
     resolution.accept(&sample(0, [0.3, 0.4]), None);
     resolution.accept(&sample(1, [0.3, 0.4]), Some(&sample(0, [0.3, 0.4])));

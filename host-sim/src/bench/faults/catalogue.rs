@@ -6,10 +6,11 @@ use super::evidence::Evidence;
 use super::processes::{self, Stage};
 use super::rows::{Trial, actuation, bytes, needle, streams, time, values};
 use crate::bench::error::SimError;
+use crate::runtime::signals;
 
 /// How a row is tried.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Method {
+pub(crate) enum RowMethod {
     /// In lockstep and virtual time, from a seeded schedule.
     Lockstep(fn(&Trial<'_>, &mut Evidence) -> Result<(), SimError>),
     /// With real processes, in real time.
@@ -24,15 +25,15 @@ pub struct Row {
     /// What goes wrong.
     pub name: &'static str,
     /// How it is tried.
-    method: Method,
+    method: RowMethod,
 }
 
 const fn lockstep(id: u32, name: &'static str, run: fn(&Trial<'_>, &mut Evidence) -> Result<(), SimError>) -> Row {
-    Row { id, name, method: Method::Lockstep(run) }
+    Row { id, name, method: RowMethod::Lockstep(run) }
 }
 
 const fn real(id: u32, name: &'static str, run: fn(&Stage<'_>, &mut Evidence) -> Result<(), SimError>) -> Row {
-    Row { id, name, method: Method::Processes(run) }
+    Row { id, name, method: RowMethod::Processes(run) }
 }
 
 /// All rows in order.
@@ -92,8 +93,16 @@ impl Row {
     pub fn run(&self, table: &Table<f64, 2>, seed: u64, effort: f64) -> Result<Evidence, SimError> {
         let mut evidence = Evidence::default();
         match self.method {
-            Method::Lockstep(run) => run(&Trial { table, seed, without: Faults::NONE }, &mut evidence)?,
-            Method::Processes(run) => run(&Stage::new(table, seed, effort)?, &mut evidence)?,
+            RowMethod::Lockstep(run) => {
+                let trial = Trial { table, seed, without: Faults::NONE };
+                signals::ends_at_once(|| run(&trial, &mut evidence))?;
+            }
+            RowMethod::Processes(run) => {
+                let outcome = run(&Stage::new(table, seed, effort)?, &mut evidence);
+                // What was not waited for any longer is no evidence.
+                signals::check()?;
+                outcome?;
+            }
         }
         Ok(evidence)
     }
@@ -108,7 +117,7 @@ impl Row {
         table: &Table<f64, 2>,
         seed: u64,
     ) -> Result<Option<Evidence>, SimError> {
-        let Method::Lockstep(run) = self.method else { return Ok(None) };
+        let RowMethod::Lockstep(run) = self.method else { return Ok(None) };
         let mut evidence = Evidence::default();
         run(&Trial { table, seed, without: monitors }, &mut evidence)?;
         Ok(Some(evidence))
@@ -118,7 +127,7 @@ impl Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bench::faults::evidence::Verdict;
+    use crate::bench::faults::evidence::RowVerdict;
     use crate::bench::paper_table::paper_table;
 
     #[test]
@@ -126,7 +135,7 @@ mod tests {
         let table = paper_table().unwrap();
         for (place, row) in ROWS.iter().enumerate() {
             assert_eq!(row.id as usize, place + 1, "rows are in order");
-            if !matches!(row.method, Method::Lockstep(_)) {
+            if !matches!(row.method, RowMethod::Lockstep(_)) {
                 continue;
             }
             // The bytes of a table do not depend on a seed.
@@ -134,7 +143,7 @@ mod tests {
             for seed in 1..=seeds {
                 let evidence = row.run(&table, seed, 1.0).unwrap();
                 let failures = &evidence.failures;
-                assert_eq!(evidence.verdict(), Verdict::Passed, "row {} seed {seed}: {failures:?}", row.id);
+                assert_eq!(evidence.verdict(), RowVerdict::Passed, "row {} seed {seed}: {failures:?}", row.id);
                 assert!(evidence.injected > 0, "row {}", row.id);
             }
         }

@@ -18,7 +18,7 @@ use super::invariants::Invariants;
 use super::seam::{Channel, see};
 use super::shuttle::ShuttleDrive;
 use super::tissue::LinearTissue;
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::world::actuator::{ActuatorModel, PaddleActuator};
 use crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH;
 use crate::world::sensors::{Encoders, TargetSensor};
@@ -94,14 +94,14 @@ impl Setup {
 
 /// What the controller's traits see of the bench.
 #[derive(Debug, Default)]
-struct Link {
+struct BenchLink {
     needle: Channel<NeedleSample>,
     target: Channel<TargetSample>,
     paddle: Channel<PaddleSample>,
     sent: Option<PaddleCommand>,
 }
 
-impl SampleSource for Link {
+impl SampleSource for BenchLink {
     fn needle(&mut self) -> Option<NeedleSample> {
         self.needle.take()
     }
@@ -113,7 +113,7 @@ impl SampleSource for Link {
     }
 }
 
-impl CommandSink for Link {
+impl CommandSink for BenchLink {
     type Error = std::convert::Infallible;
     fn send(&mut self, command: &PaddleCommand) -> Result<(), Self::Error> {
         self.sent = Some(*command);
@@ -134,7 +134,7 @@ pub struct ClosedLoop<'t> {
     tick: u64,
     world: World<LinearTissue<'t>, ShuttleDrive>,
     random: Pcg64,
-    link: Link,
+    link: BenchLink,
     /// Commands on their way, with the time when the step that gave them has ended, ns.
     on_their_way: VecDeque<(u64, PaddleCommand)>,
     next_release_ns: u64,
@@ -173,7 +173,7 @@ impl<'t> ClosedLoop<'t> {
             tick: 0,
             world: setup.world(table),
             random: Pcg64::new(u128::from(setup.seed), FAULT_STREAM),
-            link: Link::default(),
+            link: BenchLink::default(),
             on_their_way: VecDeque::new(),
             next_release_ns: 0,
             wall_offset_ns: 0,

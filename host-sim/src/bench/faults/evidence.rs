@@ -11,7 +11,7 @@ const KEPT: usize = 5;
 
 /// Whether a row holds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Verdict {
+pub enum RowVerdict {
     /// Everything that it demands was seen.
     #[serde(rename = "passed")]
     Passed,
@@ -24,7 +24,7 @@ pub enum Verdict {
     NotRun,
 }
 
-impl std::fmt::Display for Verdict {
+impl std::fmt::Display for RowVerdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::Passed => "passed",
@@ -120,13 +120,13 @@ impl Evidence {
     }
 
     /// Whether the row holds.
-    pub fn verdict(&self) -> Verdict {
+    pub fn verdict(&self) -> RowVerdict {
         if self.failed > 0 || self.unaccounted > 0 {
-            Verdict::Failed
+            RowVerdict::Failed
         } else if self.not_run.is_some() {
-            Verdict::NotRun
+            RowVerdict::NotRun
         } else {
-            Verdict::Passed
+            RowVerdict::Passed
         }
     }
 }

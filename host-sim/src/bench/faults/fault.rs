@@ -1,5 +1,6 @@
 //! What can go wrong, by name, and when.
 
+use firmware::{Ledger, StreamLedger};
 use rand_distr::Distribution;
 use rand_distr::uniform::{UniformFloat, UniformInt, UniformSampler};
 use rand_pcg::Pcg64;
@@ -18,6 +19,15 @@ pub enum Stream {
 impl Stream {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Needle, Self::Target, Self::Paddle];
+
+    /// The controller's account of it.
+    pub const fn account(self, ledger: &Ledger) -> &StreamLedger {
+        match self {
+            Self::Needle => &ledger.needle,
+            Self::Target => &ledger.target,
+            Self::Paddle => &ledger.paddle,
+        }
+    }
 }
 
 /// One thing that goes wrong while it is active.

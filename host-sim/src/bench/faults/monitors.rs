@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::catalogue::{ROWS, Row};
-use super::evidence::Verdict;
+use super::evidence::RowVerdict;
 use crate::bench::error::SimError;
 
 /// Codes that tell of no monitor: what the law says of its own command, what only something outside of the controller
@@ -35,7 +35,7 @@ pub fn monitors_off(table: &Table<f64, 2>, seed: u64) -> Result<Vec<MonitorOff>,
     // The control: a row that fails with every monitor on says nothing.
     let holds = |row: &Row, without: Faults| -> Result<bool, SimError> {
         let evidence = row.run_without(without, table, seed)?;
-        Ok(evidence.is_none_or(|evidence| evidence.verdict() != Verdict::Failed))
+        Ok(evidence.is_none_or(|evidence| evidence.verdict() != RowVerdict::Failed))
     };
     let sound: Vec<&Row> = ROWS
         .iter()

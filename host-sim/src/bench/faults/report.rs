@@ -4,7 +4,7 @@ use firmware::Mode;
 use serde::{Deserialize, Serialize};
 
 use super::catalogue::Row;
-use super::evidence::{Evidence, Verdict};
+use super::evidence::{Evidence, RowVerdict};
 use super::random::Composed;
 use crate::record::export::csv::table;
 use crate::runtime::names;
@@ -34,7 +34,7 @@ pub struct RowResult {
     /// In one account and not in the other: 0.
     pub unaccounted: u64,
     /// Whether the row holds.
-    pub result: Verdict,
+    pub result: RowVerdict,
     /// Why it failed or was not run, and what is worth knowing.
     pub notes: Vec<String>,
 }
@@ -58,6 +58,15 @@ impl RowResult {
     }
 }
 
+/// What drives time in the catalogue.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum CatalogueMode {
+    /// Faults inside of the loop in virtual time; deaths of processes and the like need real ones.
+    #[default]
+    #[serde(rename = "rows 1 to 32 and random schedules: lockstep; rows 33 to 45: real processes")]
+    LockstepThenProcesses,
+}
+
 /// Result of `faults`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FaultsResult {
@@ -66,7 +75,7 @@ pub struct FaultsResult {
     /// Seed of phases, noise and schedules.
     pub seed: u64,
     /// Rows 1 to 32 are in lockstep, the others in real time.
-    pub mode: String,
+    pub mode: CatalogueMode,
     /// The rows that were tried.
     pub rows: Vec<RowResult>,
     /// Random schedules of several faults at once.
@@ -76,7 +85,7 @@ pub struct FaultsResult {
 impl FaultsResult {
     /// Rows that failed.
     pub fn failed(&self) -> usize {
-        self.rows.iter().filter(|row| row.result == Verdict::Failed).count()
+        self.rows.iter().filter(|row| row.result == RowVerdict::Failed).count()
     }
 
     /// `faults.csv`.
@@ -103,7 +112,8 @@ mod tests {
 
     #[test]
     fn the_csv_has_the_columns_and_quotes_commas() {
-        let row = RowResult { id: 8, name: "gaps of 1, 10".to_owned(), result: Verdict::Passed, ..Default::default() };
+        let row =
+            RowResult { id: 8, name: "gaps of 1, 10".to_owned(), result: RowVerdict::Passed, ..Default::default() };
         let csv = FaultsResult { rows: vec![row], ..Default::default() }.csv();
         let csv = String::from_utf8(csv).unwrap();
         let expected = "id,name,injected,detected,ticks_to_detect,max_error,final_state,unaccounted,result\n\

@@ -24,7 +24,7 @@ impl Behaviour {
 
 /// How wide the cells are that are simulated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Resolution {
+pub enum Detail {
     /// For a look.
     Quick,
     /// For numbers.

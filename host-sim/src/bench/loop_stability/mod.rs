@@ -18,7 +18,7 @@ use model_offline::solver::equilibrium::NewtonSettings;
 use model_offline::table::TableOptions;
 use nalgebra::Matrix2;
 
-use self::behaviour::Resolution;
+use self::behaviour::Detail;
 use self::cells::{Boundary, boundaries};
 use self::mismatch::{Mismatch, Refused, mismatches};
 use self::rate_limit::Cell;
@@ -34,7 +34,7 @@ pub struct StabilityResult {
     /// Its Jacobian at rest.
     pub jacobian: Matrix2<f64>,
     /// How wide cells are.
-    pub resolution: Resolution,
+    pub detail: Detail,
     /// Gain × delay × Jacobian error.
     pub boundaries: Vec<Boundary>,
     /// Table and tissue swapped, by paddle and depth; empty without inclusions.
@@ -50,7 +50,7 @@ pub struct StabilityResult {
 impl StabilityResult {
     /// Gains of the cells along every boundary.
     pub fn gains(&self) -> Vec<f64> {
-        cells::gains(self.resolution)
+        cells::gains(self.detail)
     }
 }
 
@@ -60,7 +60,7 @@ impl StabilityResult {
 /// [`SimError`]: tissue that cannot be modelled.
 pub fn simulate(
     scene: &Scene,
-    resolution: Resolution,
+    detail: Detail,
     threads: usize,
     progress: &dyn Fn(),
 ) -> Result<StabilityResult, SimError> {
@@ -72,25 +72,25 @@ pub fn simulate(
         .body(place, NewtonSettings::default())
         .and_then(|mut body| body.actuation_jacobian())
         .map_err(ModelError::from)?;
-    let boundaries = boundaries(&jacobian, resolution);
+    let boundaries = boundaries(&jacobian, detail);
     progress();
     let (mut rows, mut refused) = (Vec::new(), Vec::new());
     if !scene.inclusions.is_empty() {
-        let knots = match resolution {
-            Resolution::Quick => 6,
-            Resolution::Fine => 11,
+        let knots = match detail {
+            Detail::Quick => 6,
+            Detail::Fine => 11,
         };
         (rows, refused) = mismatches(scene, knots, threads)?;
     }
     progress();
-    let cells = rate_limit::map(resolution);
+    let cells = rate_limit::map(detail);
     progress();
     let lambda_max = TableOptions::default().lambda_max;
     Ok(StabilityResult {
         scene: scene.name.clone(),
         paddle,
         jacobian,
-        resolution,
+        detail,
         boundaries,
         mismatches: rows,
         refused,

@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 use firmware::limits::{Limits, PositionLimit};
 use nalgebra::Vector1;
 
-use super::behaviour::{Behaviour, Resolution};
+use super::behaviour::{Behaviour, Detail};
 
 /// Loop ticks per target sample.
 const TICKS_PER_SAMPLE: usize = 20;
@@ -22,14 +22,14 @@ pub const DELAYS: [u32; 2] = [1, 2];
 
 /// How the integral is kept while the actuator is at its rate limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Law {
+pub enum Integrator {
     /// It takes every correction: what a textbook integrator does.
     Plain,
     /// As the controller does it: a correction that asks for more of what is still pending is not taken.
     AntiWindup,
 }
 
-impl Law {
+impl Integrator {
     /// Name in files.
     pub fn name(self) -> &'static str {
         match self {
@@ -43,7 +43,7 @@ impl Law {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
     /// How the integral is kept.
-    pub law: Law,
+    pub integrator: Integrator,
     /// Delay d, target samples.
     pub delay: u32,
     /// Gain over its limit by linear theory.
@@ -57,7 +57,7 @@ pub struct Cell {
 }
 
 /// Simulates one loop: scalar plant e = 1 + u, measured every 20 ticks, `delay` samples late.
-pub fn simulate(law: Law, delay: u32, gain: f64, amplitude: f64) -> (Behaviour, f64) {
+pub fn simulate(integrator: Integrator, delay: u32, gain: f64, amplitude: f64) -> (Behaviour, f64) {
     let max_step = 1.0 / (amplitude * TICKS_PER_SAMPLE as f64);
     let limits = Limits { shape: PositionLimit::Norm, max_displacement: REACH, max_step };
     let zero = Vector1::zeros();
@@ -69,9 +69,9 @@ pub fn simulate(law: Law, delay: u32, gain: f64, amplitude: f64) -> (Behaviour, 
         pending.push_back(error);
         let measured = pending.pop_front().unwrap_or(error);
         let correction = Vector1::new(-gain * measured);
-        integral = match law {
-            Law::Plain => limits.clamp_position(&(integral + correction)),
-            Law::AntiWindup => limits.integrate(&integral, &correction, &zero, &paddle),
+        integral = match integrator {
+            Integrator::Plain => limits.clamp_position(&(integral + correction)),
+            Integrator::AntiWindup => limits.integrate(&integral, &correction, &zero, &paddle),
         };
         for _ in 0..TICKS_PER_SAMPLE {
             paddle = limits.command(&paddle, &integral).displacement;
@@ -92,21 +92,21 @@ pub fn simulate(law: Law, delay: u32, gain: f64, amplitude: f64) -> (Behaviour, 
 }
 
 /// The whole map.
-pub fn map(resolution: Resolution) -> Vec<Cell> {
-    let (gains, amplitudes) = match resolution {
-        Resolution::Quick => (9, 9),
-        Resolution::Fine => (17, 17),
+pub fn map(detail: Detail) -> Vec<Cell> {
+    let (gains, amplitudes) = match detail {
+        Detail::Quick => (9, 9),
+        Detail::Fine => (17, 17),
     };
     let log = |from: f64, to: f64, count: u32, i: u32| from * (to / from).powf(f64::from(i) / f64::from(count - 1));
     let mut cells = Vec::new();
-    for law in [Law::Plain, Law::AntiWindup] {
+    for integrator in [Integrator::Plain, Integrator::AntiWindup] {
         for delay in DELAYS {
             let limit = firmware::loop_stability::gain_limit(0.0, delay);
             for g in 0..gains {
                 for a in 0..amplitudes {
                     let (gain_share, amplitude) = (log(0.08, 1.6, gains, g), log(0.1, 100.0, amplitudes, a));
-                    let (behaviour, remaining) = simulate(law, delay, gain_share * limit, amplitude);
-                    cells.push(Cell { law, delay, gain_share, amplitude, behaviour, remaining });
+                    let (behaviour, remaining) = simulate(integrator, delay, gain_share * limit, amplitude);
+                    cells.push(Cell { integrator, delay, gain_share, amplitude, behaviour, remaining });
                 }
             }
         }
@@ -120,11 +120,19 @@ mod tests {
 
     #[test]
     fn small_errors_follow_linear_theory() {
-        for law in [Law::Plain, Law::AntiWindup] {
+        for integrator in [Integrator::Plain, Integrator::AntiWindup] {
             for delay in DELAYS {
                 let limit = firmware::loop_stability::gain_limit(0.0, delay);
-                assert_eq!(simulate(law, delay, 0.95 * limit, 0.1).0, Behaviour::Settles, "{law:?} {delay}");
-                assert_ne!(simulate(law, delay, 1.05 * limit, 0.1).0, Behaviour::Settles, "{law:?} {delay}");
+                assert_eq!(
+                    simulate(integrator, delay, 0.95 * limit, 0.1).0,
+                    Behaviour::Settles,
+                    "{integrator:?} {delay}"
+                );
+                assert_ne!(
+                    simulate(integrator, delay, 1.05 * limit, 0.1).0,
+                    Behaviour::Settles,
+                    "{integrator:?} {delay}"
+                );
             }
         }
     }

@@ -4,11 +4,11 @@ use firmware::Faults;
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
-use crate::bench::result::{Frame, SeriesPoint, StrategyResult};
+use crate::bench::result::{BodyFrame, SeriesPoint, StrategyResult};
 use crate::record::export;
-use crate::runtime::mode::RunMode;
 use crate::runtime::plant::PlantLoop;
-use crate::world::tissue::{PlantChoice, TissuePlant, TissueResponse as _};
+use crate::runtime::time::mode::RunMode;
+use crate::world::tissue::{TissuePlant, TissueResponse as _, WantedPlant};
 use crate::world::truth::Truth;
 use model_offline::output::table_text::hex;
 
@@ -79,9 +79,9 @@ pub(super) fn measure(
 
 /// The body along the insertion, solved once more after the run at some of its ticks: nothing is added to a loop on
 /// the machine's clock. Ends early where the tissue has no equilibrium with such large steps.
-fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Frame> {
+fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<BodyFrame> {
     let position = paddle.and_then(|index| model.paddle_position(index));
-    let (Ok(mut tissue), Some(last)) = (TissuePlant::new(model, position, PlantChoice::Full), truths.last()) else {
+    let (Ok(mut tissue), Some(last)) = (TissuePlant::new(model, position, WantedPlant::Full), truths.last()) else {
         return Vec::new();
     };
     let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
@@ -96,7 +96,7 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Fra
         if tissue.step(truth.depth, Vector2::from(truth.paddle)).is_err() {
             break;
         }
-        frames.push(Frame {
+        frames.push(BodyFrame {
             depth: truth.depth,
             nodes: tissue.deformed_nodes().into_iter().map(|node| node.map(rounded)).collect(),
         });

@@ -17,21 +17,21 @@ use crate::exchange::{Departure, PlantPorts, Space};
 use crate::record::error::FileError;
 use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
-use crate::record::recording::{Header, Record, Recording};
-use crate::runtime::accounts::{CommandAccount, ControllerAccounts};
-use crate::runtime::child::{ControllerCall, ControllerProcess};
-use crate::runtime::durations::LoopTiming;
+use crate::record::recording::{Record, Recording, RecordingHeader};
+use crate::runtime::accounting::accounts::{CommandAccount, ControllerAccounts};
+use crate::runtime::accounting::ledger::LedgerResult;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
-use crate::runtime::ledger::LedgerResult;
-use crate::runtime::mode::RunMode;
+use crate::runtime::peer::child::{ControllerCall, ControllerProcess};
 use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::plant::free_run::FreeRun;
 use crate::runtime::plant::lockstep::{self, Pace};
 use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
 use crate::runtime::plant::{PlantLoop, published, waiting_command};
 use crate::runtime::signals;
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::time::durations::LoopTiming;
+use crate::runtime::time::mode::RunMode;
 use crate::world::World;
 use crate::world::simulation::Simulation;
 use crate::world::truth::Truth;
@@ -45,7 +45,7 @@ const WATCHED_PATIENCE_S: f64 = 24.0 * 3600.0;
 
 /// A result and the files that belong to it.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct MeasuredInsertion {
     /// The result.
     pub result: StrategyResult,
     /// Its files.
@@ -111,7 +111,7 @@ pub struct ControllerSetup<'a> {
 /// One insertion that is to be simulated.
 ///
 /// ```
-/// use host_sim::{Insertion, Label, LoopSettings, Simulation};
+/// use host_sim::{SimulatedInsertion, Label, LoopSettings, Simulation};
 /// use model_offline::{placement::discretise, scene::Scene};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -120,7 +120,7 @@ pub struct ControllerSetup<'a> {
 /// let loop_settings = LoopSettings { rate: 50.0, ..LoopSettings::default() };
 /// let simulation = Simulation { loop_settings, ..Simulation::new(&scene).with_insertion(1.0) };
 /// let label = Label { tissue: "inclusion", table_tissue: "inclusion", strategy: "static" };
-/// let insertion = Insertion::new(&model, &simulation, &label);
+/// let insertion = SimulatedInsertion::new(&model, &simulation, &label);
 ///
 /// let without = insertion.uncontrolled(None)?.result;
 /// let held = insertion.uncontrolled(Some(2))?.result;
@@ -129,7 +129,7 @@ pub struct ControllerSetup<'a> {
 /// # }
 /// ```
 #[derive(Clone, Copy)]
-pub struct Insertion<'a> {
+pub struct SimulatedInsertion<'a> {
     /// The tissue.
     pub model: &'a TissueModel,
     /// Its numbers.
@@ -142,14 +142,14 @@ pub struct Insertion<'a> {
     pub progress: &'a dyn Fn(),
 }
 
-impl std::fmt::Debug for Insertion<'_> {
+impl std::fmt::Debug for SimulatedInsertion<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Insertion").field("label", &self.label).finish_non_exhaustive()
+        f.debug_struct("SimulatedInsertion").field("label", &self.label).finish_non_exhaustive()
     }
 }
 
 /// A controlled insertion that is over.
-struct Finished<'m> {
+struct FinishedInsertion<'m> {
     plant: PlantLoop<'m>,
     accounts: ControllerAccounts,
     ticks: Vec<ControllerTick>,
@@ -157,7 +157,7 @@ struct Finished<'m> {
     plant_timing: Option<LoopTiming>,
 }
 
-impl<'a> Insertion<'a> {
+impl<'a> SimulatedInsertion<'a> {
     /// An insertion without files for other tools, whose progress nobody follows.
     pub fn new(model: &'a TissueModel, simulation: &'a Simulation, label: &'a Label<'a>) -> Self {
         Self { model, simulation, label, extras: Extras::default(), progress: &|| {} }
@@ -167,7 +167,7 @@ impl<'a> Insertion<'a> {
     ///
     /// # Errors
     /// [`SimError`].
-    pub fn uncontrolled(&self, paddle: Option<u32>) -> Result<Measured, SimError> {
+    pub fn uncontrolled(&self, paddle: Option<u32>) -> Result<MeasuredInsertion, SimError> {
         let Self { model, simulation, label, extras, progress } = *self;
         let mut plant = PlantLoop::new(World::new(model, paddle, simulation)?, simulation);
         plant.world().start_needle(0);
@@ -189,14 +189,14 @@ impl<'a> Insertion<'a> {
         if extras.vtu {
             artifacts.extend(paraview::series(model, paddle, plant.truths(), 0, &label.stem()));
         }
-        Ok(Measured { result, artifacts })
+        Ok(MeasuredInsertion { result, artifacts })
     }
 
     /// With the controller as a process of its own.
     ///
     /// # Errors
     /// [`SimError`].
-    pub fn controlled(&self, controller: &ControllerSetup<'_>) -> Result<Measured, SimError> {
+    pub fn controlled(&self, controller: &ControllerSetup<'_>) -> Result<MeasuredInsertion, SimError> {
         let Self { model, simulation, label, .. } = *self;
         // Before there is anything to tidy up: a reduced model is trained here, which looks at no signal.
         let plant = signals::ends_at_once(|| self.plant(controller))?;
@@ -224,12 +224,12 @@ impl<'a> Insertion<'a> {
         result.ledger = Some(run.ledger);
         result.timing = run.accounts.timing;
         result.plant_timing = run.plant_timing;
-        Ok(Measured { result, artifacts })
+        Ok(MeasuredInsertion { result, artifacts })
     }
 
-    fn recording(&self, controller: &ControllerSetup<'_>, run: &Finished<'_>) -> Recording {
+    fn recording(&self, controller: &ControllerSetup<'_>, run: &FinishedInsertion<'_>) -> Recording {
         let settings = self.simulation.loop_settings.settings(controller.table.validity.depth_end);
-        let header = Header {
+        let header = RecordingHeader {
             mode: controller.mode,
             seed: self.simulation.seed,
             scene_hash: self.model.scene().hash(),
@@ -282,7 +282,7 @@ impl<'a> Insertion<'a> {
         controller: &ControllerSetup<'_>,
         space: &Space,
         mut plant: PlantLoop<'a>,
-    ) -> Result<Finished<'a>, SimError> {
+    ) -> Result<FinishedInsertion<'a>, SimError> {
         let Self { model, simulation, .. } = *self;
         let table = space.root().join("controller.table");
         std::fs::write(&table, controller.table_bytes).map_err(FileError::write(&table))?;
@@ -306,7 +306,7 @@ impl<'a> Insertion<'a> {
         let (accounts, ticks) = child.finish()?;
         commands.end(waiting_command(&mut ports)?);
         let ledger = accounts.ledger(published(&ports), &commands);
-        Ok(Finished { plant, accounts, ticks, ledger, plant_timing })
+        Ok(FinishedInsertion { plant, accounts, ticks, ledger, plant_timing })
     }
 
     fn start(

@@ -7,12 +7,13 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::machine::Disturbance;
-use crate::runtime::clock::{Scheduling, now_ns};
-use crate::runtime::durations::{Distribution, Durations, LoopDurations, LoopTiming};
+use crate::bench::rounds::MeasuredLoop;
+use crate::runtime::accounting::ledger::TickResult;
 use crate::runtime::error::RuntimeError;
-use crate::runtime::ledger::TickResult;
 use crate::runtime::names;
-use crate::runtime::periodic::{PeriodicLoop, Served};
+use crate::runtime::time::clock::{Scheduling, now_ns};
+use crate::runtime::time::durations::{Distribution, Durations, LoopDurations, LoopTiming};
+use crate::runtime::time::periodic::{PeriodicLoop, Served};
 
 /// From the set-up to the first release of a block.
 const LEAD_NS: u64 = 5_000_000;
@@ -21,12 +22,12 @@ const VOID_STEAL: f64 = 0.01;
 
 /// What a controller says about itself in a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Answer {
+pub(super) struct ModeAnswer {
     mode: Mode,
     faults: Faults,
 }
 
-impl Answer {
+impl ModeAnswer {
     pub(super) fn of(command: &PaddleCommand) -> Self {
         let mode = Mode::from_wire(command.state).unwrap_or_default();
         Self { mode, faults: Faults::from_bits(command.faults) }
@@ -46,7 +47,7 @@ impl Answer {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stamps {
     /// The controller's mode and reasons; none without a controller.
-    pub(super) answer: Option<Answer>,
+    pub(super) answer: Option<ModeAnswer>,
     /// When its input was measured and when its command was there, ns.
     pub(super) exchanged_ns: Option<(u64, u64)>,
 }
@@ -55,7 +56,7 @@ pub(super) struct Stamps {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftRun {
     /// What was being measured.
-    pub measurement: String,
+    pub measurement: MeasuredLoop,
     /// Round, from 1.
     pub round: u64,
     /// Release of the round, or exchange, at which RUN ended.
@@ -72,9 +73,8 @@ pub struct LeftRun {
 
 impl LeftRun {
     /// The answer of a controller that should be in RUN, if it is not.
-    pub(super) fn found(measurement: &str, round: u64, tick: u64, answer: Answer) -> Option<Self> {
-        let Answer { mode, faults } = answer;
-        let measurement = measurement.to_owned();
+    pub(super) fn found(measurement: MeasuredLoop, round: u64, tick: u64, answer: ModeAnswer) -> Option<Self> {
+        let ModeAnswer { mode, faults } = answer;
         (mode != Mode::Run).then_some(Self { measurement, round, tick, mode: Some(mode), faults })
     }
 }
@@ -84,7 +84,7 @@ const MODES: [Option<Mode>; 4] = [None, Some(Mode::Run), Some(Mode::Hold), Some(
 
 /// Blocks of one kind of loop.
 pub(super) struct Blocks {
-    name: &'static str,
+    measured: MeasuredLoop,
     rate_hz: f64,
     ticks: u64,
     scheduling: Scheduling,
@@ -117,7 +117,7 @@ pub struct BlockResult {
 }
 
 /// What all blocks of one kind of loop come to.
-pub(super) struct Finished {
+pub(super) struct FinishedBlocks {
     /// In RUN; of a loop without a controller: all of it.
     pub(super) timing: LoopTiming,
     pub(super) more: BlockResult,
@@ -128,9 +128,9 @@ pub(super) struct Finished {
 
 impl Blocks {
     /// Blocks in which `ticks` releases come due.
-    pub(super) fn new(name: &'static str, rate_hz: f64, ticks: u64, scheduling: &Scheduling) -> Self {
+    pub(super) fn new(measured: MeasuredLoop, rate_hz: f64, ticks: u64, scheduling: &Scheduling) -> Self {
         Self {
-            name,
+            measured,
             rate_hz,
             ticks,
             scheduling: scheduling.clone(),
@@ -169,7 +169,7 @@ impl Blocks {
             self.record(&served, &stamps);
             standing = Some(mode);
             let round = self.medians_ns.len() as u64 + 1;
-            let found = |answer| LeftRun::found(self.name, round, release.tick, answer);
+            let found = |answer| LeftRun::found(self.measured, round, release.tick, answer);
             left_run = left_run.or_else(|| stamps.answer.and_then(found));
         }
         if let Some(unserved) = periodic.unserved() {
@@ -201,7 +201,7 @@ impl Blocks {
     }
 
     /// Everything that was measured.
-    pub(super) fn finish(self) -> Finished {
+    pub(super) fn finish(self) -> FinishedBlocks {
         let given = |durations: &Durations| Some(durations.distribution()).filter(|found| found.count > 0);
         let in_mode = |(mode, durations): (&Option<Mode>, &LoopDurations)| {
             durations.in_mode(*mode, self.rate_hz, &self.scheduling)
@@ -227,7 +227,7 @@ impl Blocks {
             blocks: self.medians_ns.len() as u64,
         };
         let timing = if none.ticks > 0 { none } else { run };
-        Finished { timing, more, left_run: self.left_run, ticks }
+        FinishedBlocks { timing, more, left_run: self.left_run, ticks }
     }
 }
 

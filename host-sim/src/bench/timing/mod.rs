@@ -14,26 +14,27 @@ mod stimulus;
 
 use std::path::PathBuf;
 
-use firmware::Controller;
 use firmware::contract::Table;
+use firmware::{Controller, Faults};
 use model_offline::table::to_bytes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use self::blocks::{BlockResult, LeftRun};
-use self::blocks::{Blocks, Finished, Stamps, ratios};
+use self::blocks::{Blocks, FinishedBlocks, Stamps, ratios};
 use self::machine::{Disturbance, pin, unpin};
 use self::own::Own;
 use self::partner::{Partner, Running};
 use self::peer::Transport;
 use super::error::SimError;
 use super::paper_table::paper_table;
+use super::rounds::{AllVoid, MeasuredLoop};
 use crate::record::error::FileError;
-use crate::runtime::clock::{Scheduling, now_ns, release_real_time, request_real_time_at};
-use crate::runtime::durations::{Distribution, Durations, LoopTiming};
+use crate::runtime::accounting::ledger::TickResult;
 use crate::runtime::error::RuntimeError;
-use crate::runtime::ledger::TickResult;
 use crate::runtime::signals;
+use crate::runtime::time::clock::{Scheduling, now_ns, release_real_time, request_real_time_at};
+use crate::runtime::time::durations::{Distribution, Durations, LoopTiming};
 use crate::world::loop_settings::LoopSettings;
 
 /// Rounds of blocks: enough for a range of ratios.
@@ -106,6 +107,25 @@ pub struct TimingResult {
     pub pinned: bool,
 }
 
+impl TimingResult {
+    /// Refuses a measurement of which a comparison has no round left: whatever else it shows, it is no check of the loop.
+    ///
+    /// # Errors
+    /// [`AllVoid`] of the first such comparison.
+    pub fn check_rounds(&self) -> Result<(), AllVoid> {
+        let compared = [
+            (MeasuredLoop::Controller, &self.lateness_ratios),
+            (MeasuredLoop::Exchange, &self.exchange_lateness_ratios),
+            (MeasuredLoop::Link, &self.link_over_bare),
+            (MeasuredLoop::Socket, &self.socket_over_link),
+        ];
+        let Some((measured, _)) = compared.into_iter().find(|(_, ratios)| ratios.is_empty()) else { return Ok(()) };
+        let left = || self.left_run.iter().filter(|left| left.measurement == measured);
+        let faults = left().fold(Faults::NONE, |all, left| all | left.faults);
+        Err(AllVoid { measured, rounds: ROUNDS, left_run: left().count() as u64, faults })
+    }
+}
+
 /// One rate of the sweep.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SweepResult {
@@ -145,7 +165,7 @@ pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
     let before = Disturbance::now();
     let pinned = options.cpu.is_some_and(pin);
     let scheduling = request_real_time_at(options.priority);
-    let measurement = Measurement { options, table: &table, controller: &controller, partner, scheduling };
+    let measurement = TimingMeasurement { options, table: &table, controller: &controller, partner, scheduling };
     let outcome = measurement.measure();
     release_real_time();
     unpin();
@@ -156,7 +176,7 @@ pub fn timing(options: &TimingOptions) -> Result<TimingResult, SimError> {
 }
 
 /// Everything that the measurements share.
-struct Measurement<'t> {
+struct TimingMeasurement<'t> {
     options: &'t TimingOptions,
     table: &'t Table<f64, 2>,
     controller: &'t Controller<'t, f64>,
@@ -164,7 +184,7 @@ struct Measurement<'t> {
     scheduling: Scheduling,
 }
 
-impl Measurement<'_> {
+impl TimingMeasurement<'_> {
     fn measure(&self) -> Result<TimingResult, SimError> {
         let mut result = TimingResult::default();
         self.periodic(&mut result)?;
@@ -181,9 +201,9 @@ impl Measurement<'_> {
         let loop_settings = LoopSettings { rate: rate_hz, ..self.partner.loop_settings };
         let controller = Controller::new(self.table, &loop_settings.settings(self.table.validity.depth_end))?;
         let mut own = Own::in_run(&controller, self.table, &loop_settings)?;
-        let mut blocks = Blocks::new("sweep", rate_hz, (SWEEP_S * rate_hz) as u64, &self.scheduling);
+        let mut blocks = Blocks::new(MeasuredLoop::Sweep, rate_hz, (SWEEP_S * rate_hz) as u64, &self.scheduling);
         blocks.block(|release| Ok(Stamps { answer: Some(own.step(release.tick)), exchanged_ns: None }))?;
-        let Finished { timing, more, ticks, .. } = blocks.finish();
+        let FinishedBlocks { timing, more, ticks, .. } = blocks.finish();
         let outside = more.outside_run.iter().map(|timing| timing.deadline_misses).sum::<u64>();
         Ok(SweepResult { rate_hz, ticks, deadline_misses: timing.deadline_misses + outside })
     }
@@ -192,8 +212,9 @@ impl Measurement<'_> {
     fn periodic(&self, result: &mut TimingResult) -> Result<(), SimError> {
         let Self { options, partner, .. } = self;
         let ticks = ((options.seconds * options.rate) as u64 / (3 * ROUNDS)).max(1);
-        let [mut empty, mut loaded, mut exchange] = ["empty loop", "controller", "exchange"]
-            .map(|name| Blocks::new(name, options.rate, ticks, &self.scheduling));
+        let [mut empty, mut loaded, mut exchange] =
+            [MeasuredLoop::Empty, MeasuredLoop::Controller, MeasuredLoop::Exchange]
+                .map(|measured| Blocks::new(measured, options.rate, ticks, &self.scheduling));
         let mut not_in_ledger = 0;
         for _ in 0..ROUNDS {
             empty.block(|_| Ok(Stamps::default()))?;
@@ -236,7 +257,7 @@ impl Measurement<'_> {
             let start_ns = now_ns();
             own.answer(&inputs);
             step.record(now_ns() - start_ns);
-            if let Some(left) = LeftRun::found("step back to back", 1, tick, own.said()) {
+            if let Some(left) = LeftRun::found(MeasuredLoop::BackToBack, 1, tick, own.said()) {
                 result.left_run.push(left);
                 break;
             }
@@ -283,7 +304,7 @@ fn exchange_often(
             signals::check()?;
         }
         let stamps = running.exchange(tick)?;
-        if let Some(left) = stamps.answer.and_then(|answer| LeftRun::found(running.name(), round, tick, answer)) {
+        if let Some(left) = stamps.answer.and_then(|answer| LeftRun::found(running.measured(), round, tick, answer)) {
             return Ok(Some(left));
         }
         if let (true, Some((start_ns, end_ns))) = (tick >= cold, stamps.exchanged_ns) {
@@ -291,4 +312,45 @@ fn exchange_often(
         }
     }
     Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use firmware::Mode;
+
+    #[test]
+    fn a_comparison_without_a_round_is_refused_and_one_round_is_enough() {
+        let left = |round| LeftRun {
+            measurement: MeasuredLoop::Exchange,
+            round,
+            tick: 3,
+            mode: Some(Mode::Safe),
+            faults: if round == 1 { Faults::OVERRUN } else { Faults::WATCHDOG },
+        };
+        let mut result = TimingResult {
+            lateness_ratios: vec![1.1],
+            exchange_lateness_ratios: vec![1.2],
+            link_over_bare: vec![1.3],
+            socket_over_link: vec![1.4],
+            left_run: vec![left(1), left(2)],
+            ..TimingResult::default()
+        };
+        assert_eq!(result.check_rounds(), Ok(()));
+        result.exchange_lateness_ratios.clear();
+        let faults = Faults::OVERRUN | Faults::WATCHDOG;
+        let void = AllVoid { measured: MeasuredLoop::Exchange, rounds: ROUNDS, left_run: 2, faults };
+        assert_eq!(result.check_rounds(), Err(void));
+        type Ratios = fn(&mut TimingResult) -> &mut Vec<f64>;
+        let others: [Ratios; 3] = [
+            |result| &mut result.lateness_ratios,
+            |result| &mut result.link_over_bare,
+            |result| &mut result.socket_over_link,
+        ];
+        for take in others {
+            let mut result = TimingResult { exchange_lateness_ratios: vec![1.2], ..result.clone() };
+            take(&mut result).clear();
+            assert!(result.check_rounds().is_err());
+        }
+    }
 }

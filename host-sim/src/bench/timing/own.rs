@@ -4,7 +4,7 @@ use firmware::contract::{PaddleCommand, Table};
 use firmware::inputs::TickLedger;
 use firmware::{Controller, Inputs, State};
 
-use super::blocks::Answer;
+use super::blocks::ModeAnswer;
 use super::stimulus::Stimulus;
 use crate::runtime::error::RuntimeError;
 use crate::world::loop_settings::LoopSettings;
@@ -40,13 +40,13 @@ impl<'c> Own<'c> {
         for tick in 0..TICKS_TO_RUN {
             let inputs = own.inputs_at(tick);
             own.answer(&inputs);
-            if Answer::of(&own.command).is_run() {
+            if ModeAnswer::of(&own.command).is_run() {
                 own.armed_after = tick + 1;
                 own.stimulus.start_needle(own.armed_after * period_ns);
                 return Ok(own);
             }
         }
-        Err(Answer::of(&own.command).never_armed(TICKS_TO_RUN, period_ns))
+        Err(ModeAnswer::of(&own.command).never_armed(TICKS_TO_RUN, period_ns))
     }
 
     fn inputs_at(&mut self, tick: u64) -> Inputs {
@@ -67,12 +67,12 @@ impl<'c> Own<'c> {
     }
 
     /// What it said last.
-    pub(super) fn said(&self) -> Answer {
-        Answer::of(&self.command)
+    pub(super) fn said(&self) -> ModeAnswer {
+        ModeAnswer::of(&self.command)
     }
 
     /// A release since RUN, skipped ones included.
-    pub(super) fn step(&mut self, release: u64) -> Answer {
+    pub(super) fn step(&mut self, release: u64) -> ModeAnswer {
         let inputs = self.inputs(release);
         self.answer(&inputs);
         self.said()

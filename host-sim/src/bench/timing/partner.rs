@@ -9,16 +9,17 @@ use std::time::{Duration, Instant};
 use firmware::contract::{PaddleCommand, Table};
 use iceoryx2::service::ipc;
 
-use super::blocks::{Answer, Stamps};
+use super::blocks::{ModeAnswer, Stamps};
 use super::own::TICKS_TO_RUN;
 use super::peer::{Bare, DATAGRAM, Transport};
 use super::stimulus::{Samples, Stimulus};
+use crate::bench::rounds::MeasuredLoop;
 use crate::exchange::{Departure, PlantPorts, Space};
 use crate::process::dies_with_parent;
-use crate::runtime::child::describe_exit;
-use crate::runtime::clock::now_ns;
 use crate::runtime::error::{Role, RuntimeError};
+use crate::runtime::peer::child::describe_exit;
 use crate::runtime::signals;
+use crate::runtime::time::clock::now_ns;
 use crate::world::loop_settings::LoopSettings;
 
 /// How long the other process may take to be there, and to answer.
@@ -96,13 +97,13 @@ impl Running {
         for tick in 0..TICKS_TO_RUN {
             signals::check()?;
             let stamps = running.at(tick)?;
-            if stamps.answer.is_some_and(Answer::is_run) {
+            if stamps.answer.is_some_and(ModeAnswer::is_run) {
                 running.armed_after = tick + 1;
                 running.stimulus.start_needle(running.armed_after * running.period_ns);
                 return Ok(running);
             }
         }
-        let answer = Answer::of(&running.last.unwrap_or_default());
+        let answer = ModeAnswer::of(&running.last.unwrap_or_default());
         Err(answer.never_armed(TICKS_TO_RUN, running.period_ns))
     }
 
@@ -138,12 +139,12 @@ impl Running {
         Ok(Self { ends, child, space, stimulus, last: None, transport, period_ns, armed_after: 0 })
     }
 
-    /// What is exchanged, for people.
-    pub(super) const fn name(&self) -> &'static str {
+    /// What is measured with it.
+    pub(super) const fn measured(&self) -> MeasuredLoop {
         match self.transport {
-            Transport::Link => "exchange over shared memory",
-            Transport::Bare => "bare iceoryx2",
-            Transport::Socket => "exchange over a Unix socket",
+            Transport::Link => MeasuredLoop::Link,
+            Transport::Bare => MeasuredLoop::Bare,
+            Transport::Socket => MeasuredLoop::Socket,
         }
     }
 
@@ -168,7 +169,7 @@ impl Running {
             Ends::Socket(socket) => over_socket(socket, &samples, &mut self.last),
             Ends::Closed => Err(silent()),
         }?;
-        Ok(Stamps { answer: self.last.as_ref().map(Answer::of), exchanged_ns: Some(exchanged_ns) })
+        Ok(Stamps { answer: self.last.as_ref().map(ModeAnswer::of), exchanged_ns: Some(exchanged_ns) })
     }
 }
 

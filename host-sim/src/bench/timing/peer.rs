@@ -16,9 +16,9 @@ use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::machine::pin;
 use crate::exchange::{ControllerPorts, Space};
-use crate::runtime::clock::{release_real_time, request_real_time_at};
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::signals;
+use crate::runtime::time::clock::{release_real_time, request_real_time_at};
 use crate::world::loop_settings::LoopSettings;
 
 /// What is exchanged, and over what.

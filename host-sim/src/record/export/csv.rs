@@ -161,9 +161,9 @@ mod tests {
     use firmware::Settings;
 
     use super::*;
-    use crate::record::recording::Header;
-    use crate::runtime::mode::RunMode;
-    use crate::runtime::tick::ControllerTick;
+    use crate::record::recording::RecordingHeader;
+    use crate::runtime::accounting::tick::ControllerTick;
+    use crate::runtime::time::mode::RunMode;
 
     fn record(tick: u64, time_ns: u64, truth_ns: Option<u64>) -> Record {
         let inputs = firmware::Inputs { tick, time_ns, ..Default::default() };
@@ -178,7 +178,7 @@ mod tests {
 
     fn recorded(records: Vec<Record>) -> Vec<Vec<String>> {
         let settings = Settings::new(1_000_000, 20_000_000, 0);
-        let header = Header { mode: RunMode::Lockstep, seed: 1, scene_hash: [0; 32], settings, table: vec![] };
+        let header = RecordingHeader { mode: RunMode::Lockstep, seed: 1, scene_hash: [0; 32], settings, table: vec![] };
         lines(&recording(&Recording { header, records }, &Vector2::x(), "mm"))
     }
 

@@ -23,8 +23,8 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use crate::record::recording::Recording;
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::accounting::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 use crate::world::truth::Truth;
 
 /// A sample of the needle's encoder.

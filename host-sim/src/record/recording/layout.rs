@@ -5,13 +5,13 @@ use firmware::law::Direction;
 use firmware::limits::PositionLimit;
 use sha2::{Digest, Sha256};
 
-use super::{BODY_BYTES, FORMAT_VERSION, Header, MAGIC, Record, RecordingError, TICK_MARK};
-use crate::exchange::bytes::{Reader, Writer};
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::{ControllerTick, TICK_BYTES};
+use super::{BODY_BYTES, FORMAT_VERSION, MAGIC, Record, RecordingError, RecordingHeader, TICK_MARK};
+use crate::exchange::bytes::{ByteReader, ByteWriter};
+use crate::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
+use crate::runtime::time::mode::RunMode;
 use crate::world::truth::Truth;
 
-pub(super) fn encode_header(header: &Header, writer: &mut Writer) {
+pub(super) fn encode_header(header: &RecordingHeader, writer: &mut ByteWriter) {
     writer.bytes(&MAGIC);
     writer.u32(FORMAT_VERSION);
     writer.u32(match header.mode {
@@ -43,7 +43,7 @@ pub(super) fn encode_header(header: &Header, writer: &mut Writer) {
     writer.bytes(&header.table);
 }
 
-pub(super) fn decode_header(reader: &mut Reader<'_>) -> Result<Header, RecordingError> {
+pub(super) fn decode_header(reader: &mut ByteReader<'_>) -> Result<RecordingHeader, RecordingError> {
     if reader.array() != Some(MAGIC) {
         return Err(RecordingError::NotARecording);
     }
@@ -54,7 +54,7 @@ pub(super) fn decode_header(reader: &mut Reader<'_>) -> Result<Header, Recording
     decode_header_fields(reader).ok_or(RecordingError::Header)
 }
 
-fn decode_header_fields(reader: &mut Reader<'_>) -> Option<Header> {
+fn decode_header_fields(reader: &mut ByteReader<'_>) -> Option<RecordingHeader> {
     let mode = match reader.u32()? {
         1 => RunMode::Lockstep,
         2 => RunMode::FreeRun,
@@ -89,10 +89,10 @@ fn decode_header_fields(reader: &mut Reader<'_>) -> Option<Header> {
     if table_hash != <[u8; 32]>::from(Sha256::digest(&table)) {
         return None;
     }
-    Some(Header { mode, seed, scene_hash, settings, table })
+    Some(RecordingHeader { mode, seed, scene_hash, settings, table })
 }
 
-pub(super) fn encode_record(record: &Record, writer: &mut Writer) {
+pub(super) fn encode_record(record: &Record, writer: &mut ByteWriter) {
     writer.u32(TICK_MARK);
     record.tick.encode(writer);
     writer.u32(u32::from(record.truth.is_some()));
@@ -105,7 +105,7 @@ pub(super) fn encode_record(record: &Record, writer: &mut Writer) {
     }
 }
 
-pub(super) fn decode_record(reader: &mut Reader<'_>) -> Option<Record> {
+pub(super) fn decode_record(reader: &mut ByteReader<'_>) -> Option<Record> {
     let tick = ControllerTick::decode(reader)?;
     let truth = match reader.u32()? {
         0 => None,

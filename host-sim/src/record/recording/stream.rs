@@ -13,11 +13,11 @@ use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use super::{Chain, Header, Record};
+use super::{Chain, Record, RecordingHeader};
 use crate::record::error::FileError;
-use crate::runtime::accounts::RecordAccount;
+use crate::runtime::accounting::accounts::RecordAccount;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::controller::TickRecorder;
-use crate::runtime::tick::ControllerTick;
 
 /// Ticks that wait for the writer: two seconds at 1 kHz, more than any disk takes to answer.
 const RING: usize = 2048;
@@ -39,12 +39,12 @@ impl StreamRecorder {
     ///
     /// # Errors
     /// [`FileError::Write`] when there can be no such file.
-    pub fn create(path: &Path, header: &Header) -> Result<Self, FileError> {
+    pub fn create(path: &Path, header: &RecordingHeader) -> Result<Self, FileError> {
         let file = File::create(path).map_err(FileError::write(path))?;
         let (producer, consumer) = RingBuffer::new(RING);
         let stop = Arc::new(AtomicBool::new(false));
         let (chain, start) = Chain::start(header);
-        let writer = Writer { file, chain, consumer, stop: Arc::clone(&stop), account: RecordAccount::default() };
+        let writer = FileWriter { file, chain, consumer, stop: Arc::clone(&stop), account: RecordAccount::default() };
         let writer = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || writer.run(&start))
@@ -68,7 +68,7 @@ impl TickRecorder for StreamRecorder {
     }
 }
 
-struct Writer {
+struct FileWriter {
     file: File,
     chain: Chain,
     consumer: Consumer<ControllerTick>,
@@ -76,7 +76,7 @@ struct Writer {
     account: RecordAccount,
 }
 
-impl Writer {
+impl FileWriter {
     fn run(mut self, start: &[u8]) -> RecordAccount {
         self.write(start);
         loop {
@@ -129,11 +129,11 @@ mod tests {
     use super::*;
     use crate::record::error::RecordingError;
     use crate::record::recording::Recording;
-    use crate::runtime::mode::RunMode;
+    use crate::runtime::time::mode::RunMode;
 
-    fn header() -> Header {
+    fn header() -> RecordingHeader {
         let settings = Settings::new(1_000_000, 20_000_000, 0);
-        Header { mode: RunMode::FreeRun, seed: 1, scene_hash: [0; 32], settings, table: vec![1, 2, 3] }
+        RecordingHeader { mode: RunMode::FreeRun, seed: 1, scene_hash: [0; 32], settings, table: vec![1, 2, 3] }
     }
 
     #[test]

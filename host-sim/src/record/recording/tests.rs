@@ -30,7 +30,7 @@ fn recording(ticks: u64) -> Recording {
         })
         .collect();
     Recording {
-        header: Header {
+        header: RecordingHeader {
             mode: RunMode::Lockstep,
             seed: 7,
             scene_hash: [9; 32],

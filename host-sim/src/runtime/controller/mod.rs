@@ -12,16 +12,16 @@ use firmware::io::{CommandSink, SampleSource};
 use firmware::{Faults, Inputs, Mode};
 use iceoryx2::service::Service;
 
-use super::accounts::{ControllerAccounts, RecordAccount, SequenceSpan};
-use super::clock::{now_ns, release_real_time, request_real_time};
-use super::durations::{LoopDurations, LoopTiming};
+use super::accounting::accounts::{ControllerAccounts, RecordAccount, SequenceSpan};
+use super::accounting::ledger::TickResult;
+use super::accounting::tick::ControllerTick;
 use super::error::{Role, RuntimeError};
 use super::executor::StepExecutor;
-use super::ledger::TickResult;
 use super::peer::{Patience, Peer};
-use super::periodic::PeriodicLoop;
 use super::signals;
-use super::tick::ControllerTick;
+use super::time::clock::{now_ns, release_real_time, request_real_time};
+use super::time::durations::{LoopDurations, LoopTiming};
+use super::time::periodic::PeriodicLoop;
 use crate::exchange::{ClockKind, ControllerPorts, LinkError};
 use crate::world::loop_settings::LoopSettings;
 

@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 
 use super::ControlLoop;
 use crate::exchange::{ControllerPorts, Departure, Space};
-use crate::runtime::accounts::ControllerAccounts;
+use crate::runtime::accounting::accounts::ControllerAccounts;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::error::{Role, RuntimeError};
-use crate::runtime::introduction::Introduction;
-use crate::runtime::mode::RunMode;
+use crate::runtime::peer::introduction::Introduction;
 use crate::runtime::peer::{Patience, Peer};
-use crate::runtime::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 use crate::world::loop_settings::LoopSettings;
 
 /// What `controller --json` writes.
@@ -43,7 +43,7 @@ pub struct Service {
 
 /// What is left when all is over.
 #[derive(Debug)]
-pub struct Served {
+pub struct ServedPlant {
     /// The accounts.
     pub accounts: ControllerAccounts,
     /// Every tick that there was room for.
@@ -55,14 +55,14 @@ pub struct Served {
 /// Serves a plant until it says stop. Leaves nothing behind in shared memory, however it ends.
 ///
 /// # Errors
-/// [`RuntimeError`] of whatever happens before the first tick and after the last; [`Served::ended`] has the rest.
-pub fn serve(control_loop: ControlLoop<'_>, space: &Space, service: &Service) -> Result<Served, RuntimeError> {
+/// [`RuntimeError`] of whatever happens before the first tick and after the last; [`ServedPlant::ended`] has the rest.
+pub fn serve(control_loop: ControlLoop<'_>, space: &Space, service: &Service) -> Result<ServedPlant, RuntimeError> {
     let outcome = serve_in(control_loop, space, service);
     space.leave::<ipc::Service>(Departure::First);
     outcome
 }
 
-fn serve_in(mut control_loop: ControlLoop<'_>, space: &Space, service: &Service) -> Result<Served, RuntimeError> {
+fn serve_in(mut control_loop: ControlLoop<'_>, space: &Space, service: &Service) -> Result<ServedPlant, RuntimeError> {
     let elsewhere = || Peer::Elsewhere(Box::new(space.clone()), Role::Plant);
     let mut peer = service.parent.map_or_else(elsewhere, Peer::Parent);
     let mut ports = ControllerPorts::<ipc::Service>::open(space)?;
@@ -77,5 +77,5 @@ fn serve_in(mut control_loop: ControlLoop<'_>, space: &Space, service: &Service)
         RunMode::FreeRun => control_loop.free_run(&mut ports, &mut peer, service.timeout, &service.loop_settings),
     };
     let (accounts, ticks) = control_loop.end(&mut ports)?;
-    Ok(Served { accounts, ticks, ended })
+    Ok(ServedPlant { accounts, ticks, ended })
 }

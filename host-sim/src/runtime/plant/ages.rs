@@ -3,7 +3,7 @@
 use firmware::Mode;
 use firmware::contract::PaddleCommand;
 
-use crate::runtime::durations::{Distribution, Durations};
+use crate::runtime::time::durations::{Distribution, Durations};
 
 /// Samples whose time is remembered: as many as a controller may be late before it goes to SAFE, many times over.
 const REMEMBERED: usize = 4096;

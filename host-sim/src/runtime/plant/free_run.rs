@@ -10,12 +10,12 @@ use iceoryx2::service::Service;
 
 use super::PlantLoop;
 use crate::exchange::{ClockFrame, ClockKind, PlantPorts, Space};
-use crate::runtime::accounts::CommandAccount;
-use crate::runtime::clock::{now_ns, release_real_time, request_real_time};
-use crate::runtime::durations::{LoopDurations, LoopTiming};
+use crate::runtime::accounting::accounts::CommandAccount;
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::peer::Peer;
-use crate::runtime::periodic::PeriodicLoop;
+use crate::runtime::time::clock::{now_ns, release_real_time, request_real_time};
+use crate::runtime::time::durations::{LoopDurations, LoopTiming};
+use crate::runtime::time::periodic::PeriodicLoop;
 
 /// From the start frame to tick 0: time for the controller to fall asleep.
 const LEAD_NS: u64 = 20_000_000;

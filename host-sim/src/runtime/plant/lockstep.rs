@@ -7,7 +7,7 @@ use iceoryx2::service::Service;
 
 use super::PlantLoop;
 use crate::exchange::{ClockFrame, ClockKind, PlantPorts};
-use crate::runtime::accounts::CommandAccount;
+use crate::runtime::accounting::accounts::CommandAccount;
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::signals;

@@ -14,8 +14,8 @@ use iceoryx2::service::Service;
 
 use self::ages::InputAges;
 use self::observer::{Moment, Observer};
-use super::clock::now_ns;
 use super::error::RuntimeError;
+use super::time::clock::now_ns;
 use crate::exchange::{LinkError, PlantPorts};
 use crate::world::World;
 use crate::world::error::WorldError;

@@ -2,7 +2,7 @@
 
 use model_offline::model::TissueModel;
 
-use crate::runtime::mode::RunMode;
+use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::TissuePlant;
 use crate::world::truth::Truth;
 

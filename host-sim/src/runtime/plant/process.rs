@@ -10,12 +10,12 @@ use super::free_run::{FreeRun, Succession};
 use super::lockstep::Pace;
 use super::{PlantLoop, lockstep, published};
 use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
-use crate::runtime::accounts::CommandAccount;
-use crate::runtime::durations::LoopTiming;
+use crate::runtime::accounting::accounts::CommandAccount;
 use crate::runtime::error::{Role, RuntimeError};
-use crate::runtime::introduction::Introduction;
-use crate::runtime::mode::RunMode;
+use crate::runtime::peer::introduction::Introduction;
 use crate::runtime::peer::{Patience, Peer};
+use crate::runtime::time::durations::LoopTiming;
+use crate::runtime::time::mode::RunMode;
 use crate::world::loop_settings::LoopSettings;
 
 /// What `plant --json` writes.

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use firmware::{Faults, Mode};
 use rand_pcg::Pcg64;
 
-use super::stage::{Process, Stage, children, descriptors, left_behind, ms, read_json, unaccounted, wait_until};
+use super::stage::{Process, Stage, children, descriptors, left_behind, ms, pause, read_json, unaccounted, wait_until};
 use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
 use crate::bench::faults::fault::below;
@@ -17,6 +17,7 @@ use crate::record::recording::{Record, Recording};
 use crate::record::replay::replay;
 use crate::runtime::controller::process::ControllerResult;
 use crate::runtime::plant::process::PlantResult;
+use crate::runtime::signals;
 
 /// Pairs of processes at work at once.
 const WORKERS: u64 = 4;
@@ -51,7 +52,7 @@ pub(crate) fn plant_killed(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
                         if trial >= repetitions {
                             return Ok(());
                         }
-                        crate::runtime::signals::check()?;
+                        signals::check()?;
                         let mut random = Pcg64::new(u128::from(stage.seed) << 64 | u128::from(trial), 33);
                         // Half of them within the start, half in the middle of things.
                         let phase =
@@ -74,7 +75,7 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Result<
     let link = stage.link();
     let (mut controller, record, json) = stage.controller(&link, &[])?;
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
-    std::thread::sleep(ms(phase));
+    pause(ms(phase));
     plant.kill();
     let killed = plant.was_killed();
     evidence.require(killed, || format!("{}: it had ended before: {}", what(), plant.message()));
@@ -151,11 +152,12 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
         if started.elapsed() > ms(9000) {
             break;
         }
+        signals::check()?;
         let what = || format!("controller {trial}");
         let (mut controller, record, _) = stage.controller(&link, &[])?;
         let armed = reaches(&record, Mode::Run, &mut controller);
         evidence.require(armed, || format!("{}: no RUN: {}", what(), controller.message()));
-        std::thread::sleep(ms(below(&mut random, 300)));
+        pause(ms(below(&mut random, 300)));
         if plant.wait(ms(0)).is_some() {
             break;
         }
@@ -220,11 +222,11 @@ pub(crate) fn killed_at_start(stage: &Stage<'_>, evidence: &mut Evidence) -> Res
     };
     let mut in_the_middle = 0;
     for trial in 0..stage.repetitions(100) {
-        crate::runtime::signals::check()?;
+        signals::check()?;
         let before = space.traces();
         let mut process =
             if trial % 2 == 0 { stage.controller(&link, &[])?.0 } else { stage.plant(&link, &["--duration", "60"])?.0 };
-        std::thread::sleep(std::time::Duration::from_micros(below(&mut random, 3 * mark_us)));
+        pause(std::time::Duration::from_micros(below(&mut random, 3 * mark_us)));
         process.kill();
         evidence.require(process.was_killed(), || format!("it had ended before: {}", process.message()));
         evidence.injected += 1;
@@ -283,7 +285,7 @@ pub(crate) fn cycles(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), S
     let mut settled = [0; 2];
     let mut now = [0; 2];
     for cycle in 1..=repetitions {
-        crate::runtime::signals::check()?;
+        signals::check()?;
         let (mut controller, record, _) = stage.controller(&link, &[])?;
         let armed = reaches(&record, Mode::Run, &mut controller);
         evidence.require(armed, || format!("cycle {cycle}: no RUN: {}", controller.message()));

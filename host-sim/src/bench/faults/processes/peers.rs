@@ -14,7 +14,7 @@ use nalgebra::Vector2;
 use rand_pcg::Pcg64;
 use rustix::process::Signal;
 
-use super::stage::{Stage, TIMEOUT, left_behind, ms, read_json, unaccounted, wait_until};
+use super::stage::{Stage, TIMEOUT, left_behind, ms, pause, read_json, unaccounted, wait_until};
 use crate::bench::error::SimError;
 use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::{below, between};
@@ -23,6 +23,7 @@ use crate::record::recording::Recording;
 use crate::runtime::controller::process::ControllerResult;
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::plant::process::PlantResult;
+use crate::runtime::signals;
 
 fn nothing_left(link: &str, evidence: &mut Evidence) -> Result<(), SimError> {
     let left = left_behind(link)?;
@@ -49,7 +50,7 @@ pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Res
     let link = stage.link();
     let (mut first, _, json) = stage.controller(&link, &[])?;
     let (mut plant, plant_json) = stage.plant(&link, &["--insertion-time", "2", "--duration", "2.5"])?;
-    std::thread::sleep(ms(600));
+    pause(ms(600));
     for _ in 0..3 {
         let (mut second, ..) = stage.controller(&link, &[])?;
         evidence.injected += 1;
@@ -79,9 +80,9 @@ pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<
     let link = stage.link();
     let (mut controller, _, json) = stage.controller(&link, &[])?;
     let (mut plant, plant_json) = stage.plant(&link, &["--insertion-time", "2.5", "--duration", "3"])?;
-    std::thread::sleep(ms(1000));
+    pause(ms(1000));
     controller.signal(Signal::STOP);
-    std::thread::sleep(ms(1000));
+    pause(ms(1000));
     controller.signal(Signal::CONT);
     evidence.injected += 1;
     let codes = [plant.code(), controller.code()];
@@ -106,7 +107,7 @@ pub(crate) fn other_user(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(
     let link = stage.link();
     let (mut controller, ..) = stage.controller(&link, &[])?;
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
-    std::thread::sleep(ms(700));
+    pause(ms(700));
     let traces = Space::new(&link)?.traces();
     evidence.require(traces.len() > 5, || format!("only {} names", traces.len()));
     for path in &traces {
@@ -237,6 +238,7 @@ fn garbage_on(
     let limits = (stage.table.paddle.max_displacement, stage.table.paddle.max_rate * 1e-3);
     let mut last: Option<PaddleCommand> = None;
     for tick in 0..TICKS {
+        signals::check()?;
         let time_ns = tick * 1_000_000;
         let (needle, target, paddle) = garbage_samples(tick, time_ns, random);
         evidence.injected += garbage_among(tick, time_ns, &needle, &target, &paddle);
@@ -284,7 +286,7 @@ fn garbage_on(
 
 fn wait_until_spinning(mut condition: impl FnMut() -> bool) {
     let until = std::time::Instant::now() + Duration::from_secs(5);
-    while !condition() && std::time::Instant::now() < until {
+    while !condition() && std::time::Instant::now() < until && signals::check().is_ok() {
         std::hint::spin_loop();
     }
 }

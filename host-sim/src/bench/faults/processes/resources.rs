@@ -6,7 +6,7 @@ use firmware::Mode;
 use rustix::process::Signal;
 
 use super::deaths::reaches;
-use super::stage::{Process, Stage, left_behind, ms, read_json, unaccounted};
+use super::stage::{Process, Stage, left_behind, ms, pause, read_json, unaccounted};
 use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
 use crate::exchange::Space;
@@ -97,14 +97,14 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
             .unwrap_or_default()
     };
     let before = records().len();
-    std::thread::sleep(ms(500));
+    pause(ms(500));
     let now = records();
     let running = now.last().is_some_and(|record| record.tick.command.state == Mode::Run as u32);
     let went_on = now.len() > before + 200 && running;
     evidence
         .require(went_on, || format!("{} ticks in 500 ms after the deletion, in RUN: {running}", now.len() - before));
     plant.kill();
-    std::thread::sleep(ms(700));
+    pause(ms(700));
     // Its marks are gone, so that nobody can tell that the plant is dead; the age of its samples can.
     controller.signal(Signal::TERM);
     let code = controller.code();

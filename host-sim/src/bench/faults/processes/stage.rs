@@ -18,6 +18,7 @@ use crate::exchange::{Departure, LinkError, Space};
 use crate::record::error::FileError;
 use crate::runtime::controller::process::ControllerResult;
 use crate::runtime::error::RuntimeError;
+use crate::runtime::signals;
 
 /// How long any of them may take to end.
 pub(super) const TIMEOUT: Duration = Duration::from_secs(20);
@@ -156,14 +157,14 @@ impl Process {
         let _ = self.child.wait();
     }
 
-    /// How it ended, if it does within `timeout`.
+    /// How it ended, if it does within `timeout`; not waited for once a signal asks for the end.
     pub(super) fn wait(&mut self, timeout: Duration) -> Option<ExitStatus> {
         let until = Instant::now() + timeout;
         loop {
             if let Ok(Some(status)) = self.child.try_wait() {
                 return Some(status);
             }
-            if Instant::now() > until {
+            if Instant::now() > until || signals::check().is_err() {
                 return None;
             }
             std::thread::sleep(Duration::from_millis(2));
@@ -230,14 +231,20 @@ pub(super) const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 
-/// Waits until `condition` holds.
+/// Lets time pass, until a signal asks for the end.
+pub(super) fn pause(duration: Duration) {
+    wait_until(duration, || false);
+}
+
+/// Waits until `condition` holds; not once a signal asks for the end.
 pub(super) fn wait_until(timeout: Duration, mut condition: impl FnMut() -> bool) -> bool {
     let until = Instant::now() + timeout;
     while !condition() {
-        if Instant::now() > until {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() || signals::check().is_err() {
             return false;
         }
-        std::thread::sleep(ms(5));
+        std::thread::sleep(left.min(ms(5)));
     }
     true
 }

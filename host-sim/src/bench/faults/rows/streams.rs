@@ -4,7 +4,7 @@ use firmware::detection::{
     FROZEN_SAMPLES, FROZEN_TRAVEL, NEEDLE_CONTRADICTION_TRAVEL, SAFE_AGE_FLOOR_NS, TARGET_SAMPLES_TO_HOLD,
     TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
 };
-use firmware::inputs::{Discard, StreamLedger};
+use firmware::inputs::Discard;
 use firmware::{Faults, Mode, Settings};
 
 use super::{FOR_EVER, Trial, comes_back, during, same_motion, stays_safe_until_rearmed};
@@ -21,15 +21,6 @@ fn age_limits(stream: Stream, settings: &Settings) -> [u64; 2] {
     match stream {
         Stream::Target => [target(TARGET_SAMPLES_TO_HOLD), target(TARGET_SAMPLES_TO_SAFE).max(floor)],
         Stream::Needle | Stream::Paddle => [TICKS_TO_HOLD, floor.max(10 * TICKS_TO_HOLD)],
-    }
-}
-
-fn ledger<'b>(bench: &'b ClosedLoop<'_>, stream: Stream) -> &'b StreamLedger {
-    let ledger = bench.state.ledger();
-    match stream {
-        Stream::Needle => &ledger.needle,
-        Stream::Target => &ledger.target,
-        Stream::Paddle => &ledger.paddle,
     }
 }
 
@@ -89,12 +80,12 @@ pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Sim
                 after_a_target_sample(&mut bench);
                 ticks = gap * bench.setup().settings.target_period_ns / bench.setup().settings.loop_period_ns;
             }
-            let missed = ledger(&bench, stream).lost;
+            let missed = stream.account(bench.state.ledger()).lost;
             during(&mut bench, Fault::Lost(stream), ticks);
             let found = bench.until(40, carries(Faults::SAMPLE_GAP)).map(|after| after + ticks);
             evidence.detect(found, ticks + 20, what);
             bench.run(100);
-            let counted = ledger(&bench, stream).lost - missed;
+            let counted = stream.account(bench.state.ledger()).lost - missed;
             evidence.require(counted == gap, || format!("{}: {counted} counted", what()));
             evidence.close(&bench, what);
         }
@@ -110,7 +101,7 @@ pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
     let same = same_motion(&mut twins, 1100);
     evidence.require(same, || "Target: a duplicate moved the paddle".to_owned());
     let [_, doubled] = &twins;
-    let duplicates = ledger(doubled, Stream::Target).duplicates;
+    let duplicates = Stream::Target.account(doubled.state.ledger()).duplicates;
     let repeated = doubled.audit.tally(Stream::Target).repeated;
     evidence.injected += repeated;
     evidence.detected += duplicates;
@@ -127,7 +118,7 @@ pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
             evidence.detect(found, 2, || format!("{stream:?}"));
             bench.run(3);
         }
-        let counted = ledger(&bench, stream).duplicates;
+        let counted = stream.account(bench.state.ledger()).duplicates;
         evidence.require(counted == 100, || format!("{stream:?}: {counted} of 100 duplicates counted"));
         evidence.expect_mode(&bench, Mode::Run, || format!("{stream:?}"));
         evidence.close(&bench, || format!("{stream:?}"));
@@ -151,7 +142,7 @@ pub(crate) fn reordered(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<()
             evidence.detect(found, spacing, || format!("{stream:?}"));
             bench.run(spacing);
         }
-        let counted = ledger(&bench, stream).discarded_for(Discard::Late);
+        let counted = stream.account(bench.state.ledger()).discarded_for(Discard::Late);
         evidence.require(counted == 20, || format!("{stream:?}: {counted} of 20 discarded as late"));
         evidence.expect_mode(&bench, Mode::Run, || format!("{stream:?}"));
         evidence.close(&bench, || format!("{stream:?}"));

@@ -8,9 +8,9 @@ use crate::bench::error::SimError;
 use crate::bench::faults::closed_loop::ClosedLoop;
 use crate::bench::faults::evidence::{Evidence, carries, is_in};
 use crate::bench::faults::fault::{Event, Fault, Stream, below};
-use crate::record::recording::{Header, Record, Recording};
-use crate::runtime::mode::RunMode;
-use crate::runtime::tick::ControllerTick;
+use crate::record::recording::{Record, Recording, RecordingHeader};
+use crate::runtime::accounting::tick::ControllerTick;
+use crate::runtime::time::mode::RunMode;
 
 /// Row 1: a step over its budget is counted, whole periods are skipped, the phase stays, nothing runs twice.
 pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
@@ -115,13 +115,13 @@ pub(crate) fn wall_clock(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
 }
 
 /// What is left of 2000 ticks.
-struct Run {
+struct WallClockRun {
     record: Vec<u8>,
     /// What a wall clock shows at the end, ns.
     wall_ns: i64,
 }
 
-fn run_with(trial: &Trial<'_>, events: &[Event], evidence: &mut Evidence) -> Result<Run, SimError> {
+fn run_with(trial: &Trial<'_>, events: &[Event], evidence: &mut Evidence) -> Result<WallClockRun, SimError> {
     let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
     for event in events {
         bench.inject_at(*event);
@@ -129,11 +129,11 @@ fn run_with(trial: &Trial<'_>, events: &[Event], evidence: &mut Evidence) -> Res
     let exchanges: Vec<ControllerTick> = (0..2000).filter_map(|_| bench.step()).collect();
     evidence.expect_mode(&bench, Mode::Run, || "wall clock".to_owned());
     evidence.close(&bench, || "wall clock".to_owned());
-    Ok(Run { record: recording(trial, &bench, &exchanges), wall_ns: bench.wall_clock_ns() })
+    Ok(WallClockRun { record: recording(trial, &bench, &exchanges), wall_ns: bench.wall_clock_ns() })
 }
 
 fn recording(trial: &Trial<'_>, bench: &ClosedLoop<'_>, exchanges: &[ControllerTick]) -> Vec<u8> {
-    let header = Header {
+    let header = RecordingHeader {
         mode: RunMode::Lockstep,
         seed: trial.seed,
         scene_hash: trial.table.scene_hash,

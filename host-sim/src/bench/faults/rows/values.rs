@@ -11,13 +11,7 @@ use crate::bench::faults::evidence::{Evidence, carries, is_in};
 use crate::bench::faults::fault::{Fault, Stream, below, between};
 
 fn refusals(bench: &ClosedLoop<'_>, stream: Stream, reason: Discard) -> u64 {
-    let ledger = bench.state.ledger();
-    match stream {
-        Stream::Needle => &ledger.needle,
-        Stream::Target => &ledger.target,
-        Stream::Paddle => &ledger.paddle,
-    }
-    .discarded_for(reason)
+    stream.account(bench.state.ledger()).discarded_for(reason)
 }
 
 /// A fault of single samples, and what they are refused for.

@@ -1,0 +1,171 @@
+//! How well the target is held, and where the loop stops being stable.
+
+use super::*;
+
+#[test]
+fn the_right_table_leaves_almost_no_error() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.run(5500);
+    assert_eq!(closed.state.mode(), Mode::Run);
+    assert!(closed.worst < 0.002 / 10.0, "worst {}", closed.worst);
+    assert!(closed.plant.target().x.abs() < 1e-6);
+}
+
+#[test]
+fn a_wrong_table_is_corrected_by_feedback() {
+    let table = table();
+    for direction in [crate::law::Direction::Inverse, crate::law::Direction::MinimumNorm] {
+        let mut closed = Loop::new(&table, &Settings { direction, ..settings() });
+        closed.plant.push = 0.035;
+        closed.plant.jacobian = jacobian() * 0.7;
+        closed.run(6500);
+        assert!(closed.worst < 0.0035 / 5.0, "worst {}", closed.worst);
+        assert!(closed.plant.target().x.abs() < 1e-6);
+    }
+}
+
+#[test]
+fn a_slow_target_sensor_makes_no_oscillation() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings::new(MS, 33 * MS, 20 * MS));
+    closed.plant.target_period = 33;
+    closed.plant.speed = 0.0;
+    closed.plant.offset = 1e-3;
+    closed.run(200);
+    let mut last = closed.plant.target().x;
+    for _ in 0..2000 {
+        closed.tick(|_| {});
+        let error = closed.plant.target().x;
+        assert!(error >= -1e-12 && error <= last + 1e-12, "neither overshoot nor return");
+        last = error;
+    }
+    assert_eq!(closed.state.mode(), Mode::Run);
+    assert!(last < 1e-6);
+}
+
+/// Final size of the orthogonal error at g·λ = `ratio` × limit, relative to its start, with everything linear.
+fn growth(ratio: f64) -> f64 {
+    let mut table = table();
+    table.paddle.max_rate = 1e3;
+    let limit = loop_stability::gain_limit(0.0, 1);
+    let mut closed = Loop::new(&table, &Settings { loop_gain: Some(ratio * limit), ..settings() });
+    closed.plant.speed = 0.0;
+    let start = 1e-5;
+    closed.plant.offset = start;
+    let mut end: f64 = 0.0;
+    for tick in 0..2400 {
+        let inputs = closed.plant.sense();
+        let command = closed.controller.step(&mut closed.state, &inputs);
+        closed.plant.act(&command);
+        if tick >= 2200 {
+            end = end.max(closed.plant.target().x.abs());
+        }
+    }
+    end / start
+}
+
+#[test]
+fn the_sampled_loop_is_stable_exactly_up_to_the_theoretical_limit() {
+    assert!(growth(0.25) < 1e-3);
+    assert!(growth(0.9) < 0.1);
+    assert!(growth(1.1) > 10.0);
+}
+
+#[test]
+fn a_sign_error_of_the_plant_trips_and_right_signs_never_do() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.plant.jacobian = -jacobian();
+    closed.run(5000);
+    assert!(closed.state.faults().contains(Faults::DIVERGENCE), "worst {}", closed.worst);
+    assert!(closed.worst < 0.01, "worst {}", closed.worst);
+    for (scale, push) in [(0.3, 0.02), (1.0, 0.05), (1.5, -0.03), (0.5, 0.06)] {
+        let mut closed = Loop::new(&table, &settings());
+        closed.plant.jacobian = jacobian() * scale;
+        closed.plant.push = push;
+        closed.run(5500);
+        let faults = closed.state.faults();
+        assert_eq!(closed.state.mode(), Mode::Run, "scale {scale} push {push}: {faults}");
+    }
+}
+
+#[test]
+fn saturation_recovers_without_overshoot() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.plant.speed = 0.0;
+    closed.run(100);
+    // The paddle can take away 0.05/‖J⁻¹n‖ = 0.0152.
+    for _ in 0..9000 {
+        closed.plant.offset += 2e-6;
+        closed.tick(|_| {});
+    }
+    closed.run(2000);
+    assert_eq!(closed.state.mode(), Mode::Run, "{}", closed.state.faults());
+    assert!(closed.plant.target().x > 2e-3);
+    for _ in 0..5000 {
+        closed.plant.offset -= 2e-6;
+        closed.tick(|_| {});
+        assert!(closed.plant.target().x > -2.2e-4, "overshoot {}", closed.plant.target().x);
+    }
+    closed.run(1000);
+    assert!(closed.plant.target().x.abs() < 1e-5);
+}
+
+/// Long before the paddle is at its limit: corrections that act are what tells a wrong sign.
+#[test]
+fn a_sign_error_is_found_before_saturation() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.plant.jacobian = -jacobian();
+    let mut limited = false;
+    while closed.state.mode() != Mode::Safe {
+        closed.tick(|_| {});
+        limited |= closed.state.faults().contains(Faults::POSITION_LIMITED);
+        assert!(closed.plant.tick < 5000, "never found");
+    }
+    assert!(closed.state.faults().contains(Faults::DIVERGENCE) && !limited);
+}
+
+#[test]
+fn the_delay_and_the_gain_in_use_are_told() {
+    let table = table();
+    let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 38 * MS)).unwrap();
+    assert_eq!(controller.delay_samples(), 2);
+    assert!((controller.loop_gain() - 4.0 / 27.0).abs() < 1e-15);
+}
+
+/// A target that is pushed away so far that the paddle needs many samples to get there at its full rate.
+#[test]
+fn a_long_motion_at_full_rate_does_not_overshoot() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings { loop_gain: Some(0.9), ..settings() });
+    closed.plant.speed = 0.0;
+    closed.plant.offset = 8e-3;
+    let mut least: f64 = 8e-3;
+    for _ in 0..2000 {
+        closed.tick(|_| {});
+        least = least.min(closed.plant.target().x);
+    }
+    assert!(least > -4e-4, "overshoot {least}");
+    assert!(closed.plant.target().x.abs() < 1e-5, "{}", closed.plant.target().x);
+}
+
+#[test]
+fn single_precision_follows_double() {
+    let table = table();
+    let single_table = table.cast::<f32>();
+    single_table.validate().unwrap();
+    let mut closed = Loop::new(&table, &settings());
+    let single = Controller::new(&single_table, &settings()).unwrap();
+    let mut state = State::<f32>::new();
+    for _ in 0..5000 {
+        let mut seen = Inputs::default();
+        let command = closed.tick(|inputs| seen = *inputs);
+        let other = single.step(&mut state, &seen);
+        assert_eq!(other.state, command.state);
+        let distance = Vector2::from(other.displacement) - Vector2::from(command.displacement);
+        assert!(distance.norm() < 1e-6);
+    }
+}

@@ -1,0 +1,46 @@
+//! Tables as files: read, and held against the scene that is simulated.
+
+use std::path::Path;
+
+use firmware::contract::{Table, decode};
+use model_offline::scene::Scene;
+
+use crate::bench::error::SimError;
+use crate::bench::tissue_variant::TissueVariant;
+use crate::record::files::read_bytes;
+
+/// Reads and validates a table file.
+///
+/// # Errors
+/// [`SimError::File`], [`SimError::Table`].
+pub fn read_table(path: &Path) -> Result<EncodedTable, SimError> {
+    let bytes = read_bytes(path)?;
+    let table = decode(&bytes).map_err(|source| SimError::Table { path: path.to_owned(), source })?;
+    Ok(EncodedTable { table, bytes })
+}
+
+/// A table, and the bytes that the controller decodes.
+#[derive(Clone, Debug)]
+pub struct EncodedTable {
+    /// The table in double precision.
+    pub table: Table<f64, 2>,
+    /// Its bytes in the controller's number type.
+    pub bytes: Vec<u8>,
+}
+
+/// Refuses a table in other units of length and stress than `expected`.
+///
+/// # Errors
+/// [`SimError::TableUnits`].
+pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -> Result<(), SimError> {
+    let found = [table.units.length.as_str().to_owned(), table.units.stress.as_str().to_owned()];
+    if found == *expected {
+        return Ok(());
+    }
+    Err(SimError::TableUnits { path: path.to_owned(), found, expected: expected.clone() })
+}
+
+/// Whether a table was computed from this scene, with or without its inclusions.
+pub fn is_of(table: &Table<f64, 2>, scene: &Scene) -> bool {
+    TissueVariant::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash)
+}

@@ -1,0 +1,417 @@
+//! Strategies compared: placement, tables, one insertion after the other, one result.
+
+mod cases;
+mod encoded_table;
+mod progress;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use firmware::Controller;
+use model_offline::model::ModelError;
+use model_offline::output::table_text::hex;
+use model_offline::parallel;
+use model_offline::placement::study::steps;
+use model_offline::placement::{PlacementOptions, PlacementStudy};
+use model_offline::scene::Scene;
+use model_offline::table::{TableOptions, build, to_bytes};
+use sha2::{Digest, Sha256};
+
+use self::cases::{Case, cases};
+pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
+pub use self::progress::{Progress, Silent};
+use super::describe;
+use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
+use super::strategy::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
+use super::tissue_variant::{TableTissue, TissueVariant};
+use crate::bench::error::SimError;
+use crate::exchange::board::{Image, Processor};
+use crate::record::files::Artifact;
+use crate::runtime::executor::{Hardware, ScalarChoice};
+use crate::runtime::plant::observer::Spectator;
+use crate::runtime::signals;
+use crate::runtime::time::mode::RunMode;
+use crate::world::simulation::Simulation;
+
+/// What is compared, and how.
+#[derive(Clone, Debug)]
+pub struct ComparisonOptions {
+    /// Tissue of the simulation; none: both, and the inclusion with a table that does not know it.
+    pub tissue: Option<TissueVariant>,
+    /// Tissue that the planner and the table believe in; none: the simulation's.
+    pub table_tissue: Option<TissueVariant>,
+    /// Controller table to use instead of computing one.
+    pub table: Option<PathBuf>,
+    /// Whether a table of another scene is used all the same.
+    pub allow_other_scene: bool,
+    /// What drives time; none: lockstep, then the dynamic strategy once more in free-run.
+    pub mode: Option<RunMode>,
+    /// What computes the controller's steps.
+    pub hardware: Hardware,
+    /// Number type of the controller.
+    pub scalar: ScalarChoice,
+    /// Files for other tools.
+    pub extras: Extras,
+    /// Threads for placement and for strategies without a controller.
+    pub threads: usize,
+    /// The program that serves as the controller's process: `host-sim`.
+    pub program: PathBuf,
+}
+
+impl ComparisonOptions {
+    /// Everything, on this machine, with `program` (`host-sim`) as the controller's process.
+    pub fn new(program: PathBuf) -> Self {
+        Self {
+            tissue: None,
+            table_tissue: None,
+            table: None,
+            allow_other_scene: false,
+            mode: None,
+            hardware: Hardware::default(),
+            scalar: ScalarChoice::default(),
+            extras: Extras::default(),
+            threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            program,
+        }
+    }
+}
+
+/// A tissue of the comparison, with its placement study.
+#[derive(Debug)]
+struct Studied {
+    tissue: TissueVariant,
+    study: PlacementStudy,
+}
+
+/// `none` and `static` of a case.
+type Uncontrolled = (Option<MeasuredInsertion>, Option<MeasuredInsertion>);
+
+/// Nothing depends on the table without a paddle: a case that did not run it is held against that of its tissue.
+fn against_none_of_the_same_tissue(cases: &mut [CaseResult]) {
+    let none: Vec<(TissueVariant, f64)> = cases
+        .iter()
+        .filter_map(|case| Some((case.tissue, case.strategies.none.as_ref()?.max_orthogonal_error)))
+        .collect();
+    for case in cases.iter_mut().filter(|case| case.improvement_over_none.is_none()) {
+        let strategies = &case.strategies;
+        let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+        let error = none.iter().find(|(tissue, _)| *tissue == case.tissue);
+        case.improvement_over_none = error.zip(dynamic).map(|((_, none), dynamic)| none / dynamic.max_orthogonal_error);
+    }
+}
+
+/// A comparison that is ready to run.
+///
+/// ```no_run
+/// use host_sim::{Comparison, ComparisonOptions, Silent, Simulation};
+/// use model_offline::scene::Scene;
+///
+/// # fn main() -> Result<(), host_sim::SimError> {
+/// let scene = Scene::read("my.toml".as_ref())?;
+/// let simulation = Simulation::new(&scene);
+/// let options = ComparisonOptions::new("target/release/host-sim".into());
+/// let compared = Comparison::prepare(scene, simulation, options, &Silent)?.run(None)?;
+/// for case in &compared.result.cases {
+///     println!("{}: {:?} times less", case.tissue, case.improvement);
+/// }
+/// host_sim::report::directory::write_run("my-report".as_ref(), &compared.result, compared.artifacts)?;
+/// # Ok(())
+/// # }
+/// ```
+///
+/// The scene is studied and the tables are computed; nothing is simulated yet.
+pub struct Comparison<'p> {
+    scene: Scene,
+    simulation: Simulation,
+    options: ComparisonOptions,
+    progress: &'p dyn Progress,
+    started: Instant,
+    cases: Vec<Case>,
+    studied: Vec<Studied>,
+    tables: Vec<EncodedTable>,
+}
+
+impl std::fmt::Debug for Comparison<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Comparison").field("options", &self.options).finish_non_exhaustive()
+    }
+}
+
+/// The result of a comparison, with the files that belong to it.
+#[derive(Clone, Debug)]
+pub struct Compared {
+    /// The result.
+    pub result: RunResult,
+    /// Its files.
+    pub artifacts: Vec<Artifact>,
+}
+
+impl<'p> Comparison<'p> {
+    /// Studies the placements and computes the tables.
+    ///
+    /// # Errors
+    /// [`SimError`]: options that do not go together, a scene or a table that cannot be used, settings that the
+    /// controller refuses.
+    pub fn prepare(
+        scene: Scene,
+        simulation: Simulation,
+        options: ComparisonOptions,
+        progress: &'p dyn Progress,
+    ) -> Result<Self, SimError> {
+        let started = Instant::now();
+        if options.hardware == Hardware::Qemu {
+            if options.mode == Some(RunMode::FreeRun) {
+                return Err(SimError::QemuIsLockstepOnly);
+            }
+            // Before anybody waits for the controller: compiling takes a while the first time.
+            Image::build(options.scalar.kind(), Processor::Double)?;
+        }
+        let given = options.table.as_deref().map(read_table).transpose()?;
+        if let (Some(path), Some(given)) = (&options.table, &given) {
+            check_units(&given.table, path, &[scene.length_unit.clone(), scene.stress_unit.clone()])?;
+            if !options.allow_other_scene && !is_of(&given.table, &scene) {
+                return Err(SimError::OtherScene { path: path.clone(), scene: scene.name.clone() });
+            }
+        }
+        let cases = cases([options.tissue, options.table_tissue], &scene, given.as_ref().map(|given| &given.table))?;
+        let mut comparison =
+            Self { scene, simulation, options, progress, started, cases, studied: Vec::new(), tables: Vec::new() };
+        comparison.study()?;
+        comparison.tables = comparison.compute_tables(given.as_ref())?;
+        Ok(comparison)
+    }
+
+    /// Simulates everything; `spectator` looks on at what has a controller.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn run(&self, spectator: Option<&dyn Spectator>) -> Result<Compared, SimError> {
+        let mut artifacts = Vec::new();
+        let mut results = Vec::new();
+        for ((case, uncontrolled), table) in self.cases.iter().zip(self.uncontrolled()?).zip(&self.tables) {
+            let (strategies, files) = self.strategies(case, uncontrolled, table, spectator)?;
+            artifacts.extend(files);
+            results.push(self.case_result(case, table, strategies)?);
+        }
+        against_none_of_the_same_tissue(&mut results);
+        signals::check()?;
+        Ok(Compared { result: self.result(results), artifacts })
+    }
+
+    /// The last case's scene and table, for who wants to go on.
+    pub fn last_case(&self) -> Option<(&Scene, &EncodedTable)> {
+        let (case, table) = self.cases.iter().zip(&self.tables).next_back()?;
+        Some((self.studied(case.tissue).model.scene(), table))
+    }
+
+    /// Its options.
+    pub fn options(&self) -> &ComparisonOptions {
+        &self.options
+    }
+
+    /// Its numbers.
+    pub fn simulation(&self) -> &Simulation {
+        &self.simulation
+    }
+
+    fn study(&mut self) -> Result<(), SimError> {
+        let occurs = |tissue| {
+            let is_its = move |case: &Case| case.tissue == tissue || case.table_tissue == tissue;
+            self.cases.iter().any(is_its)
+        };
+        let tissues: Vec<TissueVariant> = TissueVariant::ALL.into_iter().filter(|tissue| occurs(*tissue)).collect();
+        let studies: u64 = tissues.iter().map(|tissue| steps(&tissue.of(&self.scene))).sum();
+        let ticks = (self.simulation.duration_s * self.simulation.loop_settings.rate) as u64;
+        let runs: u64 = self.cases.iter().map(|case| case.runs(self.options.mode)).sum();
+        self.progress.begin(studies + runs * ticks);
+        for tissue in tissues {
+            self.progress.say(&format!("{tissue}: placement"));
+            let step = || self.progress.step();
+            let options = PlacementOptions { threads: self.options.threads, progress: &step, newton: None };
+            let study = PlacementStudy::run(&tissue.of(&self.scene), &options)?;
+            signals::check()?;
+            self.studied.push(Studied { tissue, study });
+        }
+        Ok(())
+    }
+
+    fn studied(&self, tissue: TissueVariant) -> &PlacementStudy {
+        let found = self.studied.iter().find(|studied| studied.tissue == tissue);
+        &found.expect("the tissues of all cases are studied").study
+    }
+
+    /// A table for every case.
+    fn compute_tables(&self, given: Option<&EncodedTable>) -> Result<Vec<EncodedTable>, SimError> {
+        let loop_settings = &self.simulation.loop_settings;
+        self.cases
+            .iter()
+            .map(|case| {
+                let EncodedTable { table, bytes } = match given {
+                    Some(given) => given.clone(),
+                    None => self.compute_table(case.table_tissue)?,
+                };
+                // Refused settings are bad input: found before anything runs.
+                Controller::new(&table, &loop_settings.settings(table.validity.depth_end))?;
+                let bytes = self.options.scalar.encode(&table, bytes);
+                let bytes = bytes.map_err(|source| SimError::Table { path: "as another scalar".into(), source })?;
+                Ok(EncodedTable { table, bytes })
+            })
+            .collect()
+    }
+
+    fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
+        self.progress.say(&format!("{tissue}: controller table"));
+        let studied = self.studied(tissue);
+        let paddle = studied.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
+        let table = build(&studied.model, paddle, &TableOptions::default())?;
+        let bytes = to_bytes(&table)?;
+        Ok(EncodedTable { table, bytes })
+    }
+
+    /// `none` and `static` of all cases, on all threads: nothing in them runs in real time.
+    fn uncontrolled(&self) -> Result<Vec<Uncontrolled>, SimError> {
+        self.progress.say("strategies without a controller");
+        let jobs: Vec<(usize, Option<u32>, &str)> = self
+            .cases
+            .iter()
+            .enumerate()
+            .flat_map(|(i, case)| {
+                let none = (!case.is_mismatch).then_some((i, None, "none"));
+                let paddle = self.studied(case.table_tissue).placement.optimum.static_paddle;
+                none.into_iter().chain([(i, Some(paddle), "static")])
+            })
+            .collect();
+        let outcomes = parallel::map(jobs.len(), self.options.threads, |job| {
+            let (i, paddle, strategy) = jobs[job];
+            let label = self.cases[i].label(strategy);
+            self.insertion(&self.cases[i], &label, &|| self.progress.step()).uncontrolled(paddle)
+        });
+        let mut results: Vec<_> = self.cases.iter().map(|_| (None, None)).collect();
+        for ((i, paddle, _), outcome) in jobs.iter().zip(outcomes) {
+            let measured = Some(outcome?);
+            match paddle {
+                None => results[*i].0 = measured,
+                Some(_) => results[*i].1 = measured,
+            }
+        }
+        Ok(results)
+    }
+
+    fn insertion<'a>(&'a self, case: &Case, label: &'a Label<'a>, progress: &'a dyn Fn()) -> SimulatedInsertion<'a> {
+        SimulatedInsertion {
+            model: &self.studied(case.tissue).model,
+            simulation: &self.simulation,
+            label,
+            extras: self.options.extras,
+            progress,
+        }
+    }
+
+    /// Everything about one case.
+    fn strategies(
+        &self,
+        case: &Case,
+        (none, static_paddle): Uncontrolled,
+        table: &EncodedTable,
+        spectator: Option<&dyn Spectator>,
+    ) -> Result<(Strategies, Vec<Artifact>), SimError> {
+        let mut artifacts = Vec::new();
+        let mut keep = |measured: MeasuredInsertion| {
+            artifacts.extend(measured.artifacts);
+            measured.result
+        };
+        let mut strategies = Strategies {
+            none: none.map(&mut keep),
+            static_paddle: static_paddle.map(&mut keep),
+            ..Strategies::default()
+        };
+        if self.options.mode != Some(RunMode::FreeRun) {
+            strategies.dynamic = Some(keep(self.dynamic(case, table, RunMode::Lockstep, spectator)?));
+        }
+        let free_run = match self.options.mode {
+            None => !case.is_mismatch && self.options.hardware == Hardware::Native,
+            Some(mode) => mode == RunMode::FreeRun,
+        };
+        if free_run {
+            strategies.dynamic_free_run = Some(keep(self.dynamic(case, table, RunMode::FreeRun, spectator)?));
+        }
+        Ok((strategies, artifacts))
+    }
+
+    fn dynamic(
+        &self,
+        case: &Case,
+        table: &EncodedTable,
+        mode: RunMode,
+        spectator: Option<&dyn Spectator>,
+    ) -> Result<MeasuredInsertion, SimError> {
+        let label = case.label(match mode {
+            RunMode::Lockstep => "dynamic",
+            RunMode::FreeRun => "dynamic-free-run",
+        });
+        self.progress.say(&format!("{}: dynamic, {mode}", case.tissue));
+        let controller = ControllerSetup {
+            program: &self.options.program,
+            table: &table.table,
+            table_bytes: &table.bytes,
+            mode,
+            hardware: self.options.hardware,
+            spectator,
+        };
+        self.insertion(case, &label, &|| self.progress.step()).controlled(&controller)
+    }
+
+    fn case_result(&self, case: &Case, encoded: &EncodedTable, strategies: Strategies) -> Result<CaseResult, SimError> {
+        let EncodedTable { table, bytes } = encoded;
+        let settings = self.simulation.loop_settings.settings(table.validity.depth_end);
+        let controller = Controller::new(table, &settings)?;
+        let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+        let over = |strategy: &Option<StrategyResult>| {
+            let factor = |dynamic: &StrategyResult| {
+                strategy.as_ref().map(|other| other.max_orthogonal_error / dynamic.max_orthogonal_error)
+            };
+            dynamic.and_then(factor)
+        };
+        let (improvement, improvement_over_none) = (over(&strategies.static_paddle), over(&strategies.none));
+        Ok(CaseResult {
+            tissue: case.tissue,
+            table_tissue: TableTissue::believed(table, &self.scene),
+            table: TableResult {
+                hash: hex(&Sha256::digest(bytes)),
+                scene_hash: hex(&table.scene_hash),
+                paddle: table.paddle.index,
+                knots: table.knots.len(),
+                bytes: bytes.len(),
+                loop_gain: controller.loop_gain(),
+                delay_samples: controller.delay_samples(),
+                depth: table.knots.iter().map(|knot| knot.depth).collect(),
+                paddle_path: table.knots.iter().map(|knot| knot.paddle_path.into()).collect(),
+            },
+            strategies,
+            improvement,
+            improvement_over_none,
+        })
+    }
+
+    fn placements(&self) -> Vec<PlacementResult> {
+        self.studied.iter().map(|studied| describe::placement(studied.tissue, &studied.study)).collect()
+    }
+
+    fn result(&self, cases: Vec<CaseResult>) -> RunResult {
+        RunResult {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: self.scene.name.clone(),
+            units: [self.scene.length_unit.clone(), self.scene.stress_unit.clone()],
+            mode: self.options.mode.unwrap_or(RunMode::Lockstep),
+            seed: self.simulation.seed,
+            settings: describe::settings(&self.scene, &self.simulation),
+            geometry: describe::geometry(&self.scene, &self.studied[0].study.model),
+            placements: self.placements(),
+            cases,
+            wall_s: self.started.elapsed().as_secs_f64(),
+            command: describe::command_line(),
+            platform: format!("{} {}", std::env::consts::ARCH, std::env::consts::OS),
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! Who is told how far a long computation has come.
+
+/// Somebody who wants to know how far a comparison has come.
+pub trait Progress: Sync {
+    /// So many steps there will be.
+    fn begin(&self, steps: u64) {
+        let _ = steps;
+    }
+
+    /// One of them is done.
+    fn step(&self) {}
+
+    /// What is being done from now on.
+    fn say(&self, what: &str) {
+        let _ = what;
+    }
+}
+
+/// Nobody wants to know.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Silent;
+
+impl Progress for Silent {}
+
+impl Progress for indicatif::ProgressBar {
+    fn begin(&self, steps: u64) {
+        self.set_length(steps);
+    }
+
+    fn step(&self) {
+        self.inc(1);
+    }
+
+    fn say(&self, what: &str) {
+        self.set_message(what.to_owned());
+    }
+}

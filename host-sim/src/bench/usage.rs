@@ -1,0 +1,89 @@
+//! What is asked for and makes no sense, and what to ask for instead.
+
+use std::path::PathBuf;
+
+/// Options that cannot be obeyed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UsageError {
+    /// The report's directory would lie in one that is not there.
+    #[error("--out {}: the directory {} does not exist; make it, or name another", directory.display(), parent.display())]
+    NoParent {
+        /// Directory of the report.
+        directory: PathBuf,
+        /// Where it would lie.
+        parent: PathBuf,
+    },
+    /// The report's directory has something else in it.
+    #[error(
+        "--out {}: it exists and is not the report of a former run; name another directory", directory.display()
+    )]
+    NotAReport {
+        /// Directory of the report.
+        directory: PathBuf,
+    },
+    /// The report writes a file of this name itself.
+    #[error("--json {}: the report has a file of that name itself; name another ending in .json", path.display())]
+    NameOfTheReport {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A budget cannot be understood.
+    #[error("the budget {} cannot be understood; `host-sim board RECORDING --write-budget FILE` writes one", path.display())]
+    Budget {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        source: Box<toml::de::Error>,
+    },
+    /// More ticks than are kept.
+    #[error(
+        "--duration {duration_s} s at --rate {rate_hz} Hz are {ticks:.0} ticks, at most {most:.0} are kept; simulate a \
+         shorter time or a slower loop"
+    )]
+    TooManyTicks {
+        /// Duration, s.
+        duration_s: f64,
+        /// Rate of the loop, Hz.
+        rate_hz: f64,
+        /// Their product.
+        ticks: f64,
+        /// How many are kept.
+        most: f64,
+    },
+    /// This machine has no such processor.
+    #[error("--cpu {cpu}: this machine has processors 0 to {last}")]
+    NoProcessor {
+        /// The processor.
+        cpu: usize,
+        /// The last one there is.
+        last: usize,
+    },
+    /// The catalogue of faults has no such row.
+    #[error("--only {row}: the catalogue has rows 1 to {last}")]
+    NoRow {
+        /// The row.
+        row: u32,
+        /// The last one there is.
+        last: usize,
+    },
+    /// No controller runs that could be re-armed.
+    #[error("no controller of this user is running; `host-sim controller --table FILE` starts one")]
+    NoController,
+    /// Another process, or somebody else's.
+    #[error("process {process} is no controller of this user; without a number the only one that runs is meant")]
+    NotAController {
+        /// Its id.
+        process: i32,
+    },
+    /// More than one controller could be meant.
+    #[error("several controllers are running: say which, {}", list(processes))]
+    SeveralControllers {
+        /// Their ids.
+        processes: Vec<i32>,
+    },
+}
+
+fn list(processes: &[i32]) -> String {
+    processes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or ")
+}

@@ -1,0 +1,185 @@
+//! What the strategies do along the insertion.
+
+use maud::{Markup, html};
+use model_offline::output::chart::number::{NO_NUMBER, in_unit, number, plain};
+use model_offline::output::chart::{Axis, Colour, Dash, Drawing, Panel, Place, ReferenceLine, Series};
+
+use super::embed::CHART_WIDTH;
+use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::runtime::names;
+
+/// Strategies in the order in which they are shown: class of their line and name.
+pub(super) fn strategies(case: &CaseResult) -> Vec<(&'static str, &'static str, &StrategyResult)> {
+    let all = &case.strategies;
+    [
+        ("none", "no paddle", &all.none),
+        ("static", "static", &all.static_paddle),
+        ("dynamic", "dynamic", &all.dynamic),
+        ("free", "dynamic, free-run", &all.dynamic_free_run),
+    ]
+    .into_iter()
+    .filter_map(|(class, name, strategy)| strategy.as_ref().map(|strategy| (class, name, strategy)))
+    .collect()
+}
+
+/// Whether a strategy has a controller.
+fn is_dynamic(class: &str) -> bool {
+    matches!(class, "dynamic" | "free")
+}
+
+/// A case in words.
+pub(super) fn case_name(case: &CaseResult) -> String {
+    if case.table_tissue.is(case.tissue) {
+        format!("{}, table of the same tissue", case.tissue)
+    } else {
+        format!("{}, table of tissue {}", case.tissue, case.table_tissue)
+    }
+}
+
+/// Colour and pattern of a strategy's line, the same in every chart.
+fn look(class: &str) -> (Colour, Dash) {
+    match class {
+        "static" => (Colour::Vermillion, Dash::Dashed),
+        "dynamic" => (Colour::Blue, Dash::Solid),
+        "free" => (Colour::Green, Dash::DashDot),
+        _ => (Colour::Quiet, Dash::Dotted),
+    }
+}
+
+/// The charts of one case with their identifiers in the page.
+#[derive(Debug)]
+pub(super) struct CaseCharts(Vec<(String, Panel)>);
+
+impl CaseCharts {
+    /// Each as a drawing of the page.
+    pub(super) fn drawings(&self) -> Vec<Drawing> {
+        let draw = |(id, panel): &(String, Panel)| {
+            let mut drawing = panel.drawing(CHART_WIDTH);
+            drawing.id.clone_from(id);
+            drawing
+        };
+        self.0.iter().map(draw).collect()
+    }
+
+    /// The charts themselves.
+    pub(super) fn panels(self) -> impl Iterator<Item = Panel> {
+        self.0.into_iter().map(|chart| chart.1)
+    }
+
+    /// Where the page's slider finds the horizontal axes that it moves along.
+    pub(super) fn spans(&self) -> impl Iterator<Item = (String, [f64; 4])> {
+        let along_depth = self.0.iter().filter(|(_, panel)| panel.cursor);
+        along_depth.map(|(id, panel)| (id.clone(), panel.horizontal_span(CHART_WIDTH)))
+    }
+}
+
+fn zero() -> ReferenceLine {
+    ReferenceLine::new("", Place::Y(0.0), Dash::Solid)
+}
+
+fn errors(strategy: &StrategyResult) -> Vec<(f64, f64)> {
+    strategy.series.iter().map(|point| (point.depth, point.orthogonal_error)).collect()
+}
+
+/// Tissue, and table where that is of another one.
+fn short_name(case: &CaseResult) -> String {
+    if case.table_tissue.is(case.tissue) {
+        case.tissue.to_string()
+    } else {
+        format!("{} (table: {})", case.tissue, case.table_tissue)
+    }
+}
+
+/// Error of all strategies.
+fn error_panel(run: &RunResult, case: &CaseResult) -> Panel {
+    let title = case.improvement.filter(|factor| factor.is_finite()).map_or_else(
+        || format!("Tissue {}: all strategies", short_name(case)),
+        |factor| format!("Tissue {}: static error {} × dynamic", short_name(case), number(factor, 2)),
+    );
+    let depth = Axis::linear("needle depth", &run.units[0]).range(0.0, run.settings.depth);
+    let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));
+    panel.description = format!("Orthogonal error along the insertion, {}", case_name(case));
+    panel.lines.push(zero());
+    for (class, name, strategy) in strategies(case).into_iter().filter(|shown| shown.0 != "free") {
+        let name = strategy.paddle.map_or_else(|| name.to_owned(), |paddle| format!("{name}, paddle {paddle}"));
+        let (colour, dash) = look(class);
+        panel.series.push(Series::curve(&name, colour, dash, errors(strategy)));
+    }
+    panel
+}
+
+/// Error of the dynamic strategies, enlarged, beside the sensor's noise.
+fn enlarged_panel(run: &RunResult, case: &CaseResult) -> Panel {
+    let dynamic = || strategies(case).into_iter().filter(|(class, ..)| is_dynamic(class));
+    let largest = dynamic().map(|(.., strategy)| strategy.max_orthogonal_error).fold(0.0, f64::max);
+    let title = format!("Dynamic alone, enlarged: at most {}", number(largest, 2));
+    let depth = Axis::linear("needle depth", &run.units[0]).range(0.0, run.settings.depth);
+    let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));
+    panel.description = format!("Orthogonal error of the dynamic paddle, enlarged, {}", case_name(case));
+    panel.lines.push(zero());
+    let noise = run.settings.noise;
+    if noise > 0.0 {
+        for level in [noise, -noise] {
+            panel.lines.push(ReferenceLine::new("±1 σ of the sensor's noise", Place::Y(level), Dash::DashDot));
+        }
+    }
+    for (class, name, strategy) in dynamic() {
+        let (colour, dash) = look(class);
+        panel.series.push(Series::curve(name, colour, dash, errors(strategy)));
+    }
+    panel
+}
+
+/// Displacement of the paddle over time.
+fn paddle_panel(run: &RunResult, case: &CaseResult, name: &str, strategy: &StrategyResult) -> Panel {
+    // Before that, the controller waits for its sensors.
+    let series = || strategy.series.iter().filter(|point| point.time_s >= 0.0);
+    let farthest = series().map(|p| p.paddle[0].hypot(p.paddle[1])).fold(0.0, f64::max);
+    let times = series().map(|p| p.time_s).chain([0.0, run.settings.duration_s]);
+    let mut panel = Panel::new(
+        &format!("Paddle displacement: at most {}", number(farthest, 2)),
+        Axis::linear("time since the start of the needle", "s").enclosing(times),
+        Axis::linear("displacement", &run.units[0]),
+    );
+    panel.description = format!("Paddle displacement over time, {}", case_name(case));
+    for (axis, dash) in [Dash::Solid, Dash::Dashed].into_iter().enumerate() {
+        let points = series().map(|p| (p.time_s, p.paddle[axis])).collect();
+        panel.series.push(Series::curve(&format!("{}, {name}", ["x", "y"][axis]), Colour::Blue, dash, points));
+    }
+    panel
+}
+
+/// Error of all strategies, error of the dynamic ones enlarged, paddle displacement.
+pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> CaseCharts {
+    let mut charts = vec![("error", Panel { cursor: true, ..error_panel(run, case) })];
+    if let Some((_, name, strategy)) = strategies(case).into_iter().find(|(class, ..)| is_dynamic(class)) {
+        charts.push(("enlarged", Panel { cursor: true, ..enlarged_panel(run, case) }));
+        charts.push(("paddle", paddle_panel(run, case, name, strategy)));
+    }
+    CaseCharts(charts.into_iter().map(|(what, panel)| (format!("case{number}-{what}"), panel)).collect())
+}
+
+/// Every strategy of every case in numbers.
+pub(super) fn table(run: &RunResult) -> Markup {
+    let unit = &run.units[0];
+    html! {
+        div.scroll { table {
+            caption { span { "Target displacement orthogonal to the needle over the whole insertion" } }
+            thead { tr {
+                th { "tissue" } th.left { "table of" } th.left { "strategy" } th.left { "mode" } th { "paddle" }
+                th { (in_unit("largest error", unit)) } th { (in_unit("at depth", unit)) } th { (in_unit("RMS error", unit)) }
+                th { (in_unit("paddle travel", unit)) } th.left { "final state" } th.left { "faults ever present" }
+            } }
+            tbody { @for case in &run.cases { @for (_, name, strategy) in strategies(case) {
+                tr {
+                    td { (case.tissue) } td.left { (case.table_tissue) } td.left { (name) } td.left { (strategy.mode) }
+                    td { (strategy.paddle.map_or_else(|| NO_NUMBER.to_owned(), |index| index.to_string())) }
+                    td { (number(strategy.max_orthogonal_error, 4)) } td { (plain(strategy.max_error_depth)) }
+                    td { (number(strategy.rms_orthogonal_error, 4)) }
+                    td { (number(strategy.paddle_travel, 4)) }
+                    td.left { (names::mode::name(strategy.final_state)) } td.wrap { (strategy.faults) }
+                }
+            } } }
+        } }
+    }
+}

@@ -1,0 +1,325 @@
+//! The report: one HTML file and pictures, made from a [`RunResult`] alone.
+//!
+//! The page needs no network and no script to be read: the script only moves the bodies along the insertion. Charts come
+//! from [`model_offline::output::chart`] and are styled by the page, so that they follow light, dark and print.
+
+mod attachments;
+mod embed;
+mod insertion;
+mod ledger;
+mod placement;
+mod scene;
+mod settings;
+mod slider;
+mod style;
+mod timing;
+mod view;
+
+pub use self::attachments::Attachments;
+pub(crate) use self::view::mesh;
+
+#[cfg(test)]
+mod tests;
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use model_offline::output::chart::number::{in_unit, number, plain};
+use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
+
+use self::embed::{charts, inline, panels};
+use self::insertion::{CaseCharts, case_charts, case_name, strategies};
+use super::paper::{is_paper, paper_optima};
+use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+
+const SCRIPT: &str = include_str!("page.js");
+/// Whatever a string in the result says, the page loads nothing.
+const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
+
+/// Identifiers and titles of the parts.
+const PARTS: [(&str, &str); 7] = [
+    ("scene", "The scene"),
+    ("static", "Static paddle: error against position"),
+    ("controllability", "Dynamic paddle: controllability"),
+    ("insertion", "Error along the insertion"),
+    ("timing", "Timing of the loop"),
+    ("ledger", "Ledger"),
+    ("repeat", "To repeat it"),
+];
+
+/// The dynamic strategy of a case: lockstep, or free-run where that is all.
+fn dynamic(case: &CaseResult) -> Option<&StrategyResult> {
+    case.strategies.dynamic.as_ref().or(case.strategies.dynamic_free_run.as_ref())
+}
+
+/// The result in one sentence.
+fn sentence(run: &RunResult) -> String {
+    let best = |placement: &PlacementResult| (placement.best_static, placement.best_dynamic);
+    let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, p.tissue)).collect();
+    let all_agree = paper.iter().zip(&run.placements).all(|(paper, placement)| *paper == Some(best(placement)));
+    let placements: Vec<String> = run
+        .placements
+        .iter()
+        .zip(&paper)
+        .map(|(placement, paper)| {
+            let (static_paddle, dynamic) = best(placement);
+            let found = match paper {
+                Some((static_paddle, dynamic)) if !all_agree => format!(" (the paper: {static_paddle} and {dynamic})"),
+                _ => String::new(),
+            };
+            format!(
+                "tissue {}: best static paddle {static_paddle}, best dynamic paddle {dynamic}{found}",
+                placement.tissue
+            )
+        })
+        .collect();
+    let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
+    let reduction = reduction(run, |case| case.improvement).map_or_else(String::new, |range| {
+        let none = reduction(run, |case| case.improvement_over_none)
+            .map_or_else(String::new, |range| format!(" and {range} times smaller than without a paddle"));
+        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's{none}")
+    });
+    let text = format!("{}{agreement}{reduction}.", placements.join("; "));
+    text.replacen("tissue", "Tissue", 1)
+}
+
+/// How many times smaller the dynamic paddle's largest error is than another one, over all cases.
+fn reduction(run: &RunResult, factor: impl Fn(&CaseResult) -> Option<f64>) -> Option<String> {
+    let factors: Vec<f64> = run.cases.iter().filter_map(factor).filter(|factor| factor.is_finite()).collect();
+    let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = factors.iter().copied().fold(0.0, f64::max);
+    // Small factors with a digit behind the point: "1 times smaller" says nothing.
+    let factor = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
+    let range = if factor(low) == factor(high) { factor(low) } else { format!("{} to {}", factor(low), factor(high)) };
+    (!factors.is_empty()).then_some(range)
+}
+
+fn head(run: &RunResult) -> Markup {
+    let unit = &run.units[0];
+    html! {
+        p.quiet { "Stillpoint report" }
+        h1 { "Scene " (run.scene) }
+        p.lead { (sentence(run)) }
+        div.scroll { table {
+            caption { span {
+                (in_unit("Largest target displacement orthogonal to the needle", unit)) " over an insertion of "
+                (plain(run.settings.depth)) " in " (plain(run.settings.insertion_s)) " s; paddle in brackets"
+            } }
+            thead { tr {
+                th { "tissue" } th { "no paddle" } th { "static" } th { "dynamic" } th { "static / dynamic" } th { "none / dynamic" }
+                th.left { "table made from" }
+            } }
+            tbody { @for case in &run.cases { tr {
+                td { (case.tissue) }
+                td { (largest(case.strategies.none.as_ref())) }
+                td { (largest(case.strategies.static_paddle.as_ref())) }
+                td.best { (largest(dynamic(case))) }
+                td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
+                td { (case.improvement_over_none.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
+                td.left { (case.table_tissue) }
+            } } }
+        } }
+        p.quiet {
+            "Strategies compared in " (run.mode) ", seed " (run.seed) ". Lengths are in the scene's own unit"
+            @if unit == "1" { ", which has no name" } @else { ", " (unit) } "."
+        }
+        @if is_paper(&run.scene) {
+            p.notice {
+                b { "The geometry is inferred." } " The paper's Figure 1 survives only as its caption. Outline, immobile \
+                edge and needle contact of this scene were chosen so that all four optima that the paper reports come out; \
+                paddles and material are from its Tables I and II. Agreement of the optima is therefore no independent \
+                confirmation, and single values are not expected to match."
+            }
+        }
+        nav { ol { @for (id, title) in PARTS { li { a href=(format!("#{id}")) { (title) } } } } }
+    }
+}
+
+fn largest(strategy: Option<&StrategyResult>) -> String {
+    strategy.map_or_else(
+        || "–".to_owned(),
+        |strategy| {
+            let paddle = strategy.paddle.map_or_else(String::new, |index| format!(" ({index})"));
+            format!("{}{paddle}", number(strategy.max_orthogonal_error, 3))
+        },
+    )
+}
+
+fn part(number: usize, content: &Markup) -> Markup {
+    let (id, title) = PARTS[number];
+    html! { section id=(id) { h2 { (number + 1) ". " (title) } (content) } }
+}
+
+fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
+    let frames = strategies_of(run).map(|strategy| strategy.frames.len()).max().unwrap_or(0);
+    html! {
+        figure.scene { (inline(&scene::at_rest(run))) figcaption {
+            "At rest: outline, nodes (dots), immobile boundary (hatched), needle with its contact and direction, paddle \
+             positions with their numbers (the best dynamic one blue, with a star)"
+            @if !run.geometry.inclusions.is_empty() { ", inclusion of the tissue “inclusion”" }
+            ", target (ring with cross). Equal scales on both axes."
+        } }
+        h3 { "The body under each strategy" }
+        p { "At the end of the insertion, or wherever the slider is. Colour is the size of the displacement from rest; \
+             dashed is the outline at rest. Displacements are drawn as they are, not enlarged." }
+        fieldset.needs-script.on-screen {
+            legend { "Along the insertion" }
+            @for (i, case) in run.cases.iter().enumerate() {
+                label { input type="radio" name="case" value=(i) checked[i == 0]; " " (case_name(case)) } " "
+            }
+            div.slide {
+                label for="depth-slider" { (in_unit("needle depth", &run.units[0])) }
+                input #depth-slider type="range" min="0" max="200" value="200";
+                output #depth-reading for="depth-slider" {}
+            }
+        }
+        @for (i, case) in run.cases.iter().enumerate() {
+            div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
+        }
+        figure.colours { (inline(&surface.colour_bar(run))) }
+        p.quiet {
+            @if frames > 1 { "Between " (frames) " solved states per strategy the slider interpolates. " }
+            "A strategy that would repeat another case is left out."
+        }
+    }
+}
+
+fn strategies_of(run: &RunResult) -> impl Iterator<Item = &StrategyResult> {
+    run.cases.iter().flat_map(strategies).map(|(.., strategy)| strategy)
+}
+
+fn static_part(run: &RunResult) -> Markup {
+    html! {
+        p { "The paddle is attached and held while the needle goes in. The best place is where the target's largest \
+             displacement orthogonal to the needle is smallest." }
+        (panels(&placement::static_charts(run)))
+        @if is_paper(&run.scene) {
+            p.quiet { "The values of the paper's Figures 2 and 3 are not available, only the optima that its text names: \
+                       4 in homogeneous tissue, 2 with the inclusion. These are marked." }
+        }
+        (placement::static_table(run))
+    }
+}
+
+fn controllability_part(run: &RunResult) -> Markup {
+    html! {
+        p { "How far the paddle has to move to move the target by one unit orthogonal to the needle: ‖J⁻¹n‖, where J is \
+             d(target)/d(paddle) at rest with the needle held. Less is better." }
+        (panels(&placement::controllability_charts(run)))
+        (placement::controllability_table(run))
+    }
+}
+
+fn insertion_part(run: &RunResult, cases: &[CaseCharts]) -> Markup {
+    html! {
+        p { "Signed displacement of the true target orthogonal to the needle. The dynamic error is far smaller than the \
+             others, so it is also drawn alone, on its own scale." }
+        @for (case, drawn) in run.cases.iter().zip(cases) {
+            h3 { "Tissue: " (case_name(case)) }
+            (charts(&drawn.drawings()))
+        }
+        (insertion::table(run))
+    }
+}
+
+/// The page.
+pub fn render(run: &RunResult) -> String {
+    render_with(run, &Attachments::default())
+}
+
+/// The page with what other commands have left beside it.
+pub fn render_with(run: &RunResult, attachments: &Attachments) -> String {
+    let attached = attachments.section();
+    let surface = scene::Surface::new(run);
+    let cases: Vec<CaseCharts> = run.cases.iter().enumerate().map(|(i, case)| case_charts(run, i, case)).collect();
+    let parts = [
+        scene_part(run, &surface),
+        static_part(run),
+        controllability_part(run),
+        insertion_part(run, &cases),
+        timing::section(run),
+        ledger::section(run),
+        settings::section(run),
+    ];
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                link rel="icon" href="data:,";
+                title { "Stillpoint: " (run.scene) }
+                style { (PreEscaped(style::page())) }
+            }
+            body {
+                main {
+                    (head(run))
+                    @for (i, content) in parts.iter().enumerate() { (part(i, content)) }
+                    @if let Some(attached) = &attached {
+                        section #attached { h2 { (parts.len() + 1) ". From other commands" } (attached) }
+                    }
+                }
+                script type="application/json" #insertion-data { (PreEscaped(slider::data(run, &surface, &cases))) }
+                script { (PreEscaped(SCRIPT)) }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// Panels as a file of their own.
+fn figure(title: String, panels: Vec<Panel>, columns: usize) -> String {
+    Figure { title, caption: String::new(), panels, columns }.svg()
+}
+
+/// The best paddle of every tissue.
+fn best(run: &RunResult, of: fn(&PlacementResult) -> u32) -> String {
+    let names = run.placements.iter().map(|placement| format!("{} {}", placement.tissue, of(placement)));
+    names.collect::<Vec<_>>().join(", ")
+}
+
+/// The scene at rest and its body side by side, under a title.
+fn scene_picture(run: &RunResult, drawings: &[Drawing]) -> String {
+    let title = format!("Scene {}: at rest, and at full depth under the dynamic paddle", run.scene);
+    let scene = sheet("", drawings, 2);
+    let caption =
+        "Dots: nodes; hatched: immobile; ring: target; numbers: paddle positions, the best dynamic one with a star.";
+    sheet(&title, &[heading(&title, caption, scene.size[0]), scene], 1).file()
+}
+
+/// Pictures for use elsewhere: file name and SVG, on a white ground.
+pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
+    let surface = scene::Surface::new(run);
+    let mut scene = vec![scene::at_rest(run)];
+    if let Some((i, case)) = run.cases.iter().enumerate().find(|(_, case)| dynamic(case).is_some()) {
+        let body = |strategy| surface.body(run, String::new(), &format!("dynamic, case {i}"), strategy);
+        let body = dynamic(case).map(body);
+        scene.extend(body.map(|body| sheet("", &[body, surface.colour_bar(run)], 1)));
+    }
+    let insertion: Vec<Panel> =
+        run.cases.iter().enumerate().flat_map(|(i, case)| case_charts(run, i, case).panels()).collect();
+    let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
+    let reduction = reduction(run, |case| case.improvement).map_or_else(
+        || "Error along the insertion".to_owned(),
+        |range| format!("The dynamic paddle's largest error is {range} times smaller than the static one's"),
+    );
+    let static_title = format!("Best static paddle: {}", best(run, |placement| placement.best_static));
+    let dynamic_title = format!("Best dynamic paddle: {}", best(run, |placement| placement.best_dynamic));
+    let mut pictures = vec![
+        ("scene.svg", scene_picture(run, &scene)),
+        ("static-error.svg", figure(static_title, placement::static_charts(run), 2)),
+        ("controllability.svg", figure(dynamic_title, placement::controllability_charts(run), 2)),
+        ("error-along-insertion.svg", figure(reduction, insertion, columns)),
+    ];
+    let mut timing = timing::charts(run);
+    timing.truncate(3);
+    if !timing.is_empty() {
+        pictures
+            .push(("timing-histogram.svg", figure("Timing of the controller's loop, free-run".to_owned(), timing, 3)));
+    }
+    pictures
+}
+
+/// Histograms of loops with bins of 1 µs and logarithmic axes, as one picture.
+pub fn timing_histograms(loops: &[(&str, &crate::runtime::time::durations::LoopTiming)]) -> String {
+    figure("Timing of the loops".to_owned(), timing::histograms(loops), 3)
+}

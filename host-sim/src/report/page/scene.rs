@@ -1,0 +1,234 @@
+//! The scene at rest, and the body that the strategies leave behind.
+
+use std::collections::BTreeSet;
+
+use maud::{Markup, html};
+use model_offline::output::chart::number::{in_unit, number};
+use model_offline::output::chart::style::band;
+use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
+
+use super::embed::inline;
+use super::view::{PlaneView, along, inside, middle};
+use crate::bench::result::{CaseResult, Geometry, RunResult, StrategyResult};
+
+/// Width of the scene and of a body, px.
+const SCENE_WIDTH: f64 = 420.0;
+const BODY_WIDTH: f64 = 300.0;
+
+/// Short strokes on the outer side of the immobile boundary.
+fn hatch(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, part: &[[f64; 2]]) {
+    drawing.polyline("immobile", &view.path(part));
+    for edge in part.windows(2) {
+        let [dx, dy] = [edge[1][0] - edge[0][0], edge[1][1] - edge[0][1]];
+        let length = dx.hypot(dy);
+        let [tx, ty] = [dx / length, dy / length];
+        let step = 0.03 * view.extent;
+        let probe = along(along(edge[0], [tx, ty], 0.5 * length), [ty, -tx], 0.01 * view.extent);
+        let outward = if inside(&geometry.outline, probe) { [-ty, tx] } else { [ty, -tx] };
+        let strokes = (length / step).clamp(0.0, 500.0) as u32;
+        for i in 0..=strokes {
+            let root = along(edge[0], [tx, ty], f64::from(i) * length / f64::from(strokes.max(1)));
+            let tip = along(along(root, outward, 0.8 * step), [tx, ty], -0.6 * step);
+            drawing.line("hatch", view.at(root), view.at(tip));
+        }
+    }
+}
+
+/// The needle's axis with a point at its contact.
+fn needle(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, depth: f64) {
+    let [from, to] = view.needle(geometry, depth);
+    let way = [to[0] - from[0], to[1] - from[1]];
+    let length = way[0].hypot(way[1]);
+    let [tx, ty] = [way[0] / length, way[1] / length];
+    let root = along(to, [tx, ty], -11.0);
+    drawing.open_group("shaft");
+    drawing.line("needle", from, root);
+    drawing.polygon("arrow", &[to, along(root, [ty, -tx], 5.5), along(root, [-ty, tx], 5.5)]);
+    drawing.close_group();
+}
+
+/// Ring and cross, with a rim that separates it from any ground.
+fn target(drawing: &mut Drawing, [x, y]: Px) {
+    drawing.open_group("aim");
+    for class in ["under", "target"] {
+        drawing.circle(class, [x, y], 6.0);
+        drawing.line(class, [x - 10.0, y], [x + 10.0, y]);
+        drawing.line(class, [x, y - 10.0], [x, y + 10.0]);
+    }
+    drawing.close_group();
+}
+
+/// A number beside a paddle, outside of the body.
+fn beside(geometry: &Geometry, extent: f64, segment: &[[f64; 2]; 2]) -> [f64; 2] {
+    let [dx, dy] = [segment[1][0] - segment[0][0], segment[1][1] - segment[0][1]];
+    let length = dx.hypot(dy);
+    let normal = [dy / length, -dx / length];
+    let centre = middle(segment);
+    let way = if inside(&geometry.outline, along(centre, normal, 0.02 * extent)) { -0.05 } else { 0.05 };
+    along(centre, normal, way * extent)
+}
+
+/// The scene at rest with everything named.
+pub(super) fn at_rest(run: &RunResult) -> Drawing {
+    let geometry = &run.geometry;
+    let view = PlaneView::new(run, SCENE_WIDTH);
+    let mut drawing = Drawing::new(view.size(), format!("Scene {} at rest", run.scene));
+    drawing.polygon("body", &view.path(&geometry.outline));
+    for inclusion in &geometry.inclusions {
+        drawing.polygon("inclusion", &view.path(inclusion));
+    }
+    geometry.nodes.iter().for_each(|node| drawing.circle("node", view.at(*node), 1.7));
+    geometry.immobile.iter().for_each(|part| hatch(&mut drawing, &view, geometry, part));
+    drawing.polyline("contact", &view.path(&geometry.needle_contact));
+    needle(&mut drawing, &view, geometry, 0.0);
+    let dynamic: BTreeSet<u32> = run.placements.iter().map(|placement| placement.best_dynamic).collect();
+    for paddle in &geometry.paddles {
+        let best = dynamic.contains(&paddle.index);
+        let (class, number) =
+            if best { ("paddle best", format!("{}★", paddle.index)) } else { ("paddle", paddle.index.to_string()) };
+        let [mut from, mut to] = paddle.segment;
+        // Neighbours share a node: a gap shows where one ends.
+        (from, to) = (along(from, sub(to, from), 0.1), along(to, sub(to, from), -0.1));
+        drawing.line(class, view.at(from), view.at(to));
+        let at = view.at(beside(geometry, view.extent, &paddle.segment));
+        drawing.text("title halo", [at[0], at[1] + 4.5], Anchor::Middle, &number);
+    }
+    target(&mut drawing, view.at(geometry.target));
+    words(&mut drawing, &view, geometry);
+    drawing
+}
+
+fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+/// Names of the parts, beside them.
+fn words(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry) {
+    let [x, y] = view.at(geometry.target);
+    drawing.text("tick halo", [x - 12.0, y - 12.0], Anchor::End, "target");
+    let [needle, _] = view.needle(geometry, 0.0);
+    drawing.text("tick halo", [needle[0] + 9.0, needle[1] + 12.0], Anchor::Start, "needle");
+    if let Some(inclusion) = geometry.inclusions.first() {
+        let low = view.path(inclusion).iter().map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max);
+        let [x, _] = view.at(middle(inclusion));
+        drawing.text("tick halo", [x, low + 14.0], Anchor::Middle, "inclusion");
+    }
+    if let Some(part) = geometry.immobile.first() {
+        let [x, y] = view.at(middle(part));
+        let (anchor, shift) = if x > 0.5 * view.size()[0] { (Anchor::End, -10.0) } else { (Anchor::Start, 10.0) };
+        drawing.text("tick halo", [x + shift, y + 4.0], anchor, "immobile");
+    }
+}
+
+/// The nodes of a frame in a drawing, px, with their displacement from rest, px.
+pub(super) fn displaced(view: &PlaneView, geometry: &Geometry, nodes: &[[f64; 2]]) -> Vec<(Px, f64)> {
+    let rest = geometry.nodes.iter().map(|node| view.at(*node));
+    nodes
+        .iter()
+        .zip(rest)
+        .map(|(node, rest)| {
+            let now = view.at(*node);
+            (now, (now[0] - rest[0]).hypot(now[1] - rest[1]))
+        })
+        .collect()
+}
+
+/// What all bodies of a page share.
+#[derive(Debug)]
+pub(super) struct Surface {
+    pub(super) view: PlaneView,
+    pub(super) triangles: Vec<[usize; 3]>,
+    pub(super) boundary: Vec<usize>,
+    /// Displacement at which the colours end, px.
+    pub(super) largest: f64,
+}
+
+impl Surface {
+    pub(super) fn new(run: &RunResult) -> Self {
+        let view = PlaneView::new(run, BODY_WIDTH);
+        let geometry = &run.geometry;
+        let strategies = run.cases.iter().flat_map(super::insertion::strategies);
+        let largest = strategies
+            .flat_map(|(.., strategy)| displaced(&view, geometry, &strategy.deformed_nodes))
+            .map(|(_, displacement)| displacement)
+            .filter(|displacement| displacement.is_finite())
+            .fold(0.0, f64::max);
+        Self {
+            triangles: super::view::triangles(geometry),
+            boundary: super::view::boundary(geometry, view.extent),
+            view,
+            largest: largest.max(f64::MIN_POSITIVE),
+        }
+    }
+
+    /// The body at full depth: displacement field, outlines, needle, paddle, target.
+    pub(super) fn body(&self, run: &RunResult, id: String, name: &str, strategy: &StrategyResult) -> Drawing {
+        let (view, geometry) = (&self.view, &run.geometry);
+        let nodes = displaced(view, geometry, &strategy.deformed_nodes);
+        let mut drawing = Drawing::new(view.size(), format!("Body at full depth: {name}"));
+        drawing.id = id;
+        drawing.open_group("field");
+        for corners in &self.triangles {
+            let corners: Vec<_> = corners.iter().filter_map(|corner| nodes.get(*corner)).collect();
+            let displacement = corners.iter().map(|corner| corner.1).sum::<f64>() / corners.len().max(1) as f64;
+            let points: Vec<Px> = corners.iter().map(|corner| corner.0).collect();
+            drawing.polygon(&band(displacement / self.largest), &points);
+        }
+        drawing.close_group();
+        drawing.polygon("rest", &view.path(&geometry.outline));
+        let edge: Vec<Px> = self.boundary.iter().filter_map(|i| nodes.get(*i)).map(|node| node.0).collect();
+        drawing.polygon("edge", &edge);
+        geometry.immobile.iter().for_each(|part| hatch(&mut drawing, view, geometry, part));
+        needle(&mut drawing, view, geometry, run.settings.depth);
+        let end = strategy.series.last();
+        let moved = end.map_or([0.0; 2], |point| point.paddle);
+        if let Some(paddle) = geometry.paddles.iter().find(|paddle| Some(paddle.index) == strategy.paddle) {
+            let segment = paddle.segment.map(|point| view.at([point[0] + moved[0], point[1] + moved[1]]));
+            drawing.open_group("tool");
+            drawing.line("paddle best", segment[0], segment[1]);
+            let [x, y] = view.at(beside(geometry, view.extent, &paddle.segment));
+            drawing.text("title halo", [x, y + 4.5], Anchor::Middle, &paddle.index.to_string());
+            drawing.close_group();
+        }
+        let at = end.map_or(geometry.target, |point| {
+            along(
+                along(geometry.target, geometry.needle_axis, point.axial),
+                geometry.orthogonal,
+                point.orthogonal_error,
+            )
+        });
+        target(&mut drawing, view.at(at));
+        drawing
+    }
+
+    /// The colours and what they mean.
+    pub(super) fn colour_bar(&self, run: &RunResult) -> Drawing {
+        let what = in_unit("size of the displacement", &run.units[0]);
+        colour_bar(BODY_WIDTH, &what, self.largest / self.view.length(1.0))
+    }
+}
+
+/// The strategies of a case side by side.
+pub(super) fn bodies(run: &RunResult, surface: &Surface, case_number: usize, case: &CaseResult) -> Markup {
+    html! {
+        div.bodies {
+            @for (class, name, strategy) in super::insertion::strategies(case).iter().filter(|shown| shown.0 != "free") {
+                figure {
+                    (inline(&surface.body(run, body_id(case_number, class), name, strategy)))
+                    figcaption {
+                        b { (name) @if let Some(paddle) = strategy.paddle { ", paddle " (paddle) } }
+                        " · " output id=(format!("{}-numbers", body_id(case_number, class))) {
+                            "orthogonal error at the end "
+                            (strategy.series.last().map_or_else(String::new, |point| number(point.orthogonal_error, 3)))
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Identifier of a body in the page.
+pub(super) fn body_id(case: usize, class: &str) -> String {
+    format!("body{case}-{class}")
+}

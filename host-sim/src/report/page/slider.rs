@@ -1,0 +1,100 @@
+//! What the page's slider needs: the body along the way and the time series, as numbers only.
+
+use model_offline::output::chart::style::BANDS;
+use serde::Serialize;
+
+use super::insertion::{CaseCharts, strategies};
+use super::scene::{Surface, body_id};
+use crate::bench::result::{RunResult, StrategyResult};
+
+/// Points of a time series that the slider can show.
+const POINTS: usize = 200;
+
+#[derive(Serialize)]
+struct Data<'a> {
+    depth: f64,
+    bands: usize,
+    largest: f64,
+    triangles: &'a [[usize; 3]],
+    boundary: &'a [usize],
+    rest: Vec<[f64; 2]>,
+    target: [f64; 2],
+    axis: [f64; 2],
+    normal: [f64; 2],
+    scale: f64,
+    bodies: Vec<DrawnBody>,
+    charts: Vec<(String, [f64; 4])>,
+}
+
+#[derive(Serialize)]
+struct DrawnBody {
+    id: String,
+    frames: Vec<DrawnFrame>,
+    /// Depth, orthogonal error, axial displacement, paddle x, paddle y.
+    series: Vec<[f64; 5]>,
+    /// Displacement of the paddle in the drawing.
+    paddle_end: [f64; 2],
+}
+
+#[derive(Serialize)]
+struct DrawnFrame {
+    depth: f64,
+    nodes: Vec<[f64; 2]>,
+}
+
+fn rounded(point: [f64; 2]) -> [f64; 2] {
+    point.map(|value| (value * 10.0).round() / 10.0)
+}
+
+/// Five significant digits are more than anybody reads.
+fn short(value: f64) -> f64 {
+    format!("{value:.4e}").parse().unwrap_or(value)
+}
+
+fn body(run: &RunResult, surface: &Surface, id: String, strategy: &StrategyResult) -> DrawnBody {
+    let frame = |depth: f64, nodes: &[[f64; 2]]| DrawnFrame {
+        depth,
+        nodes: surface.view.path(nodes).into_iter().map(rounded).collect(),
+    };
+    let rest = frame(0.0, &run.geometry.nodes);
+    let frames = strategy.frames.iter().map(|one| frame(one.depth, &one.nodes));
+    let stride = strategy.series.len().div_ceil(POINTS).max(1);
+    let last = strategy.series.len().saturating_sub(1);
+    let points = strategy.series.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
+    let [px, py] = strategy.series.last().map_or([0.0; 2], |point| point.paddle);
+    DrawnBody {
+        id,
+        frames: std::iter::once(rest).chain(frames).collect(),
+        series: points
+            .map(|(_, p)| [p.depth, p.orthogonal_error, p.axial, p.paddle[0], p.paddle[1]].map(short))
+            .collect(),
+        paddle_end: [px, py],
+    }
+}
+
+/// JSON that is safe inside of a script element.
+pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) -> String {
+    let mut bodies = Vec::new();
+    for (number, case) in run.cases.iter().enumerate() {
+        for (class, _, strategy) in strategies(case).into_iter().filter(|shown| shown.0 != "free") {
+            bodies.push(body(run, surface, body_id(number, class), strategy));
+        }
+    }
+    let geometry = &run.geometry;
+    let data = Data {
+        depth: run.settings.depth,
+        bands: BANDS,
+        largest: surface.largest,
+        triangles: &surface.triangles,
+        boundary: &surface.boundary,
+        rest: surface.view.path(&geometry.nodes).into_iter().map(rounded).collect(),
+        target: surface.view.at(geometry.target),
+        axis: geometry.needle_axis,
+        normal: geometry.orthogonal,
+        scale: surface.view.length(1.0),
+        bodies,
+        charts: charts.iter().flat_map(CaseCharts::spans).collect(),
+    };
+    // Numbers that are not finite become null, which the page skips.
+    serde_json::to_string(&data).unwrap_or_else(|_| "null".to_owned()).replace('<', "\\u003c")
+}

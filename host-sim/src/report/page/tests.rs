@@ -1,0 +1,308 @@
+//! Every chart is there, every string escaped, every number finite.
+
+use super::*;
+use crate::bench::result::*;
+use crate::bench::study_failure::StudyFailure;
+use crate::bench::tissue_variant::{TableTissue, TissueVariant};
+use crate::runtime::accounting::ledger::{LedgerResult, StreamResult};
+use crate::runtime::time::clock::Scheduling;
+use crate::runtime::time::durations::{Distribution, LoopTiming};
+use crate::runtime::time::mode::RunMode;
+use firmware::{Discard, Faults};
+use model_offline::discretization::Integration;
+use model_offline::solver::equilibrium::FailureReason;
+
+const EVIL: &str = "<script>alert(\"x\")</script>&'";
+
+fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
+    let depths = [0.0, 0.05, 0.1];
+    let series = depths.map(|depth| SeriesPoint {
+        time_s: depth * 50.0,
+        depth,
+        orthogonal_error: error * depth * 10.0,
+        axial: 0.2 * depth,
+        paddle: [depth, -depth],
+    });
+    let nodes = rest().iter().map(|[x, y]| [x + 0.01 * y, *y]).collect::<Vec<_>>();
+    let controlled = paddle == Some(1);
+    StrategyResult {
+        mode,
+        paddle,
+        max_orthogonal_error: error,
+        max_error_depth: 0.1,
+        rms_orthogonal_error: 0.5 * error,
+        paddle_travel: 0.0,
+        final_state: None,
+        faults: Faults::NONE,
+        ledger: controlled.then(|| LedgerResult {
+            needle: StreamResult {
+                published: 1_234_567,
+                discarded_for: vec![(Discard::Late, 3)],
+                ..StreamResult::default()
+            },
+            ..LedgerResult::default()
+        }),
+        timing: (mode == RunMode::FreeRun).then(timing),
+        plant_timing: (mode == RunMode::FreeRun).then(timing),
+        seed: 1,
+        table_hash: Some(EVIL.to_owned()),
+        scene_hash: EVIL.to_owned(),
+        recording: Some(RecordingResult { file: EVIL.to_owned(), sha256: EVIL.to_owned(), ticks: 3 }),
+        csv: Some(EVIL.to_owned()),
+        series: series.to_vec(),
+        deformed_nodes: nodes.clone(),
+        frames: vec![BodyFrame { depth: 0.05, nodes: rest() }, BodyFrame { depth: 0.1, nodes }],
+        plant_step_us: 1.0,
+        plant: crate::world::tissue::PlantAccount::default(),
+    }
+}
+
+fn timing() -> LoopTiming {
+    let distribution = Distribution {
+        count: 3,
+        p50_ns: 1_000,
+        p999_ns: 900_000,
+        max_ns: 900_000,
+        bins_us: vec![(0, 1), (1, 1), (900, 1)],
+        ..Distribution::default()
+    };
+    LoopTiming {
+        rate_hz: 1000.0,
+        ticks: 3,
+        scheduling: Scheduling::default(),
+        release_lateness: distribution.clone(),
+        execution_time: distribution.clone(),
+        response_time: distribution,
+        ..LoopTiming::default()
+    }
+}
+
+fn rest() -> Vec<[f64; 2]> {
+    (0..9).map(|i| [f64::from(i % 3) * 0.5, f64::from(i / 3) * 0.5]).collect()
+}
+
+fn paddle_placement(index: u32) -> PaddlePlacement {
+    PaddlePlacement {
+        index,
+        jacobian: [[1.0, 0.0], [0.0, 1.0]],
+        controllability_measure: Some(3.0 + f64::from(index)),
+        best_direction: Some([1.0, 0.0]),
+        depth: vec![0.1],
+        orthogonal: vec![-0.001 * f64::from(index)],
+        max_orthogonal: 0.001 * f64::from(index),
+        reached_depth: 0.1,
+        failure: Some(StudyFailure { reason: FailureReason::NotConverged, detail: EVIL.to_owned() }),
+    }
+}
+
+fn run(scene: &str) -> RunResult {
+    let placement = |tissue: TissueVariant| PlacementResult {
+        tissue,
+        nodes: 9,
+        integration: Integration::default(),
+        wall_s: 0.1,
+        best_static: 1,
+        best_dynamic: 1,
+        paddles: vec![paddle_placement(1), paddle_placement(2)],
+        no_paddle: None,
+    };
+    let case = |tissue: TissueVariant, table_tissue: TableTissue| CaseResult {
+        tissue,
+        table_tissue,
+        table: TableResult {
+            hash: EVIL.to_owned(),
+            scene_hash: EVIL.to_owned(),
+            paddle: 1,
+            knots: 2,
+            bytes: 100,
+            loop_gain: 0.2,
+            delay_samples: 1,
+            depth: vec![0.0, 0.1],
+            paddle_path: vec![[0.0; 2]; 2],
+        },
+        strategies: Strategies {
+            none: Some(strategy(RunMode::Lockstep, None, 2e-3)),
+            static_paddle: Some(strategy(RunMode::Lockstep, Some(2), 4e-4)),
+            dynamic: Some(strategy(RunMode::Lockstep, Some(1), 1e-5)),
+            dynamic_free_run: Some(strategy(RunMode::FreeRun, Some(1), 1e-5)),
+        },
+        improvement: Some(40.0),
+        improvement_over_none: Some(200.0),
+    };
+    RunResult {
+        format: FORMAT,
+        version: EVIL.to_owned(),
+        scene: scene.to_owned(),
+        units: [EVIL.to_owned(), EVIL.to_owned()],
+        mode: RunMode::Lockstep,
+        seed: 1,
+        settings: SimulationSettings {
+            rate_hz: 1000.0,
+            insertion_s: 5.0,
+            duration_s: 5.5,
+            depth: 0.1,
+            target_rate_hz: 50.0,
+            target_latency_ms: 20.0,
+            noise: 1e-5,
+            paddle_lag_ms: 0.0,
+            paddle_delay_ticks: 0,
+            paddle_gain: 1.0,
+            paddle_max_rate: 0.1,
+            paddle_max_displacement: 0.1,
+        },
+        geometry: Geometry {
+            outline: vec![[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
+            immobile: vec![vec![[1.0, 0.0], [1.0, 1.0]]],
+            needle_contact: vec![[0.4, 1.0], [0.6, 1.0]],
+            needle_axis: [0.0, -1.0],
+            orthogonal: [1.0, 0.0],
+            target: [0.5, 0.5],
+            paddles: vec![
+                PaddleGeometry { index: 1, segment: [[0.0, 0.5], [0.0, 0.0]] },
+                PaddleGeometry { index: 2, segment: [[0.0, 0.5], [0.0, 1.0]] },
+            ],
+            inclusions: vec![vec![[0.6, 0.6], [0.8, 0.6], [0.8, 0.8]]],
+            nodes: rest(),
+        },
+        placements: vec![placement(TissueVariant::Homogeneous), placement(TissueVariant::Inclusion)],
+        cases: vec![
+            case(TissueVariant::Homogeneous, TableTissue::OfThisScene(TissueVariant::Homogeneous)),
+            case(TissueVariant::Inclusion, TableTissue::OfAnotherScene(EVIL.to_owned())),
+        ],
+        wall_s: 1.0,
+        command: vec!["host-sim".to_owned(), EVIL.to_owned()],
+        platform: EVIL.to_owned(),
+    }
+}
+
+/// Every drawing of a page, read as XML.
+fn drawings(page: &str) -> Vec<&str> {
+    page.split("<svg").skip(1).map(|rest| &rest[..rest.find("</svg>").unwrap()]).collect()
+}
+
+fn labels(page: &str) -> Vec<String> {
+    drawings(page)
+        .iter()
+        .map(|drawing| {
+            let text = format!("<svg{drawing}</svg>");
+            let document = roxmltree::Document::parse(&text).unwrap();
+            document.root_element().attribute("aria-label").unwrap().to_owned()
+        })
+        .collect()
+}
+
+fn assert_finite(svg: &str) {
+    for wrong in ["NaN", "inf", "null"] {
+        // Words may have these letters; coordinates stand in quotation marks or between commas and spaces.
+        for start in ["\"", ",", " ", "-"] {
+            for end in ["\"", ",", " "] {
+                assert!(!svg.contains(&format!("{start}{wrong}{end}")), "{wrong}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_part_and_every_chart_is_there() {
+    let page = render(&run("paper"));
+    for (id, title) in PARTS {
+        assert!(page.contains(&format!("<section id=\"{id}\">")), "{title}");
+    }
+    let labels = labels(&page);
+    for (start, number) in [
+        ("Scene paper at rest", 1),
+        ("Body at full depth", 6),
+        ("Colours", 1),
+        ("Static error", 2),
+        ("Controllability measure", 2),
+        ("Orthogonal error along the insertion", 2),
+        ("Orthogonal error of the dynamic paddle", 2),
+        ("Paddle displacement", 2),
+        ("Histogram of the release lateness", 2),
+        ("Histogram of the execution time", 2),
+        ("Histogram of the response time", 2),
+    ] {
+        assert_eq!(labels.iter().filter(|label| label.starts_with(start)).count(), number, "{start}");
+    }
+    assert!(page.contains("The geometry is inferred."));
+    assert!(!render(&run("mine")).contains("The geometry is inferred."));
+}
+
+#[test]
+fn strings_of_the_result_are_text() {
+    let page = render(&run(EVIL));
+    assert!(!page.contains("<script>alert"));
+    assert_eq!(page.matches("<script").count(), 2, "the data and the page's own script");
+    assert!(page.contains("&lt;script&gt;alert"));
+    // Nothing to load, and nothing that could be.
+    for address in ["http:", "https:", "src=", "url(", "@import"] {
+        assert!(!page.contains(address), "{address}");
+    }
+}
+
+#[test]
+fn numbers_that_are_none_leave_the_page_whole() {
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut run = run("paper");
+        run.placements[0].paddles[0].orthogonal = vec![wrong];
+        run.placements[0].paddles[1].orthogonal.clear();
+        run.placements[0].paddles[1].controllability_measure = Some(wrong);
+        run.placements[1].paddles[1].best_direction = None;
+        run.placements[1].paddles[0].max_orthogonal = wrong;
+        run.cases[0].improvement = Some(wrong);
+        run.geometry.nodes[4] = [wrong, wrong];
+        run.geometry.target = [wrong, 0.0];
+        let dynamic = run.cases[0].strategies.dynamic.as_mut().unwrap();
+        dynamic.series[1].orthogonal_error = wrong;
+        dynamic.series[2].paddle = [wrong, 0.0];
+        dynamic.deformed_nodes[3] = [wrong, 0.0];
+        dynamic.frames[0].nodes[3] = [wrong, 0.0];
+        dynamic.max_orthogonal_error = wrong;
+        let page = render(&run);
+        drawings(&page).into_iter().for_each(assert_finite);
+        labels(&page);
+        for (name, svg) in pictures(&run) {
+            assert_finite(&svg);
+            roxmltree::Document::parse(&svg).unwrap_or_else(|error| panic!("{name}: {error}"));
+        }
+    }
+}
+
+#[test]
+fn results_with_nothing_in_them_have_a_page() {
+    let mut run = run("mine");
+    run.cases.clear();
+    run.placements.clear();
+    run.geometry = Geometry { needle_axis: [0.0, -1.0], ..empty_geometry() };
+    labels(&render(&run)).iter().for_each(|label| assert!(!label.is_empty()));
+    pictures(&run).iter().for_each(|(_, svg)| assert_finite(svg));
+}
+
+fn empty_geometry() -> Geometry {
+    Geometry {
+        outline: Vec::new(),
+        immobile: Vec::new(),
+        needle_contact: Vec::new(),
+        needle_axis: [0.0; 2],
+        orthogonal: [0.0; 2],
+        target: [0.0; 2],
+        paddles: Vec::new(),
+        inclusions: Vec::new(),
+        nodes: Vec::new(),
+    }
+}
+
+#[test]
+fn pictures_are_files_of_their_own() {
+    let pictures = pictures(&run(EVIL));
+    let names: Vec<_> = pictures.iter().map(|picture| picture.0).collect();
+    let expected =
+        ["scene.svg", "static-error.svg", "controllability.svg", "error-along-insertion.svg", "timing-histogram.svg"];
+    assert_eq!(names, expected);
+    for (name, svg) in pictures {
+        let document = roxmltree::Document::parse(&svg).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(document.root_element().attribute("viewBox").is_some());
+        assert!(!svg.contains("var("), "{name}");
+        assert!(svg.contains("fill=\"#ffffff\""), "{name}");
+    }
+}

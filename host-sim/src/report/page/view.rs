@@ -1,0 +1,166 @@
+//! The plane of the scene on paper, and the body's nodes as a surface.
+
+use model_offline::output::chart::{Plane, Px};
+use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+
+use crate::bench::result::{Geometry, RunResult};
+
+/// Length of the needle outside the tissue, as a part of the scene's size.
+const NEEDLE: f64 = 0.16;
+/// Room around the scene, as a part of its size.
+const MARGIN: f64 = 0.07;
+
+/// Equal scales on both axes, y upwards.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlaneView {
+    plane: Plane,
+    /// Larger side of the scene, length.
+    pub(super) extent: f64,
+}
+
+impl PlaneView {
+    /// Everything that is ever drawn, this wide.
+    pub(super) fn new(run: &RunResult, width: f64) -> Self {
+        let geometry = &run.geometry;
+        let strategies = run.cases.iter().flat_map(super::insertion::strategies);
+        let deformed = strategies.flat_map(|(.., strategy)| &strategy.deformed_nodes);
+        let mut bounds = Bounds::default();
+        geometry.outline.iter().chain(&geometry.nodes).chain(deformed).for_each(|point| bounds.add(*point));
+        let extent = bounds.extent();
+        bounds.add(along(middle(&geometry.needle_contact), geometry.needle_axis, -NEEDLE * extent));
+        let margin = MARGIN * bounds.extent();
+        let plane = Plane::new(bounds.low.map(|low| low - margin), bounds.high.map(|high| high + margin), width);
+        Self { plane, extent }
+    }
+
+    /// Width and height, px.
+    pub(super) fn size(&self) -> Px {
+        self.plane.size
+    }
+
+    /// A length, px.
+    pub(super) fn length(&self, length: f64) -> f64 {
+        self.plane.length(length)
+    }
+
+    /// A point, px.
+    pub(super) fn at(&self, point: [f64; 2]) -> Px {
+        self.plane.at(point)
+    }
+
+    /// Points, px.
+    pub(super) fn path(&self, points: &[[f64; 2]]) -> Vec<Px> {
+        self.plane.path(points)
+    }
+
+    /// From the far end of the needle to its contact, at this depth.
+    pub(super) fn needle(&self, geometry: &Geometry, depth: f64) -> [Px; 2] {
+        let contact = middle(&geometry.needle_contact);
+        [-NEEDLE * self.extent + depth, depth].map(|way| self.at(along(contact, geometry.needle_axis, way)))
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Bounds {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Default for Bounds {
+    fn default() -> Self {
+        Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] }
+    }
+}
+
+impl Bounds {
+    fn add(&mut self, point: [f64; 2]) {
+        if point.iter().all(|value| value.is_finite()) {
+            for (i, value) in point.into_iter().enumerate() {
+                self.low[i] = self.low[i].min(value);
+                self.high[i] = self.high[i].max(value);
+            }
+        }
+    }
+
+    fn extent(&self) -> f64 {
+        (self.high[0] - self.low[0]).max(self.high[1] - self.low[1])
+    }
+}
+
+/// Mean of points.
+pub(super) fn middle(points: &[[f64; 2]]) -> [f64; 2] {
+    [0, 1].map(|i| points.iter().map(|point| point[i]).sum::<f64>() / points.len().max(1) as f64)
+}
+
+/// A point some way along a direction.
+pub(super) fn along(from: [f64; 2], direction: [f64; 2], way: f64) -> [f64; 2] {
+    [from[0] + direction[0] * way, from[1] + direction[1] * way]
+}
+
+/// Whether a point is inside of a polygon.
+pub(super) fn inside(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
+    edges(polygon)
+        .filter(|([ax, ay], [bx, by])| (ay > &y) != (by > &y) && x < ax + (y - ay) / (by - ay) * (bx - ax))
+        .count()
+        % 2
+        == 1
+}
+
+fn edges(polygon: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
+    polygon.iter().copied().zip(polygon.iter().copied().cycle().skip(1))
+}
+
+struct Site {
+    position: Point2<f64>,
+    index: usize,
+}
+
+impl HasPosition for Site {
+    type Scalar = f64;
+    fn position(&self) -> Point2<f64> {
+        self.position
+    }
+}
+
+/// Triangles between nodes that cover the body; none when they cannot be formed.
+pub(super) fn triangles(geometry: &Geometry) -> Vec<[usize; 3]> {
+    mesh(&geometry.nodes, &geometry.outline)
+}
+
+/// The same for nodes in an outline.
+pub(crate) fn mesh(nodes: &[[f64; 2]], outline: &[[f64; 2]]) -> Vec<[usize; 3]> {
+    let sites = nodes.iter().enumerate();
+    let sites = sites.map(|(index, [x, y])| Site { position: Point2::new(*x, *y), index }).collect();
+    let Ok(triangulation) = DelaunayTriangulation::<Site>::bulk_load(sites) else {
+        return Vec::new();
+    };
+    let smallest = 1e-6 * triangulation.inner_faces().map(|face| face.area()).fold(0.0, f64::max);
+    triangulation
+        .inner_faces()
+        .filter(|face| face.area() > smallest)
+        .map(|face| face.vertices().map(|vertex| vertex.data().index))
+        .filter(|corners| inside(outline, middle(&corners.map(|corner| nodes[corner]))))
+        .collect()
+}
+
+/// Nodes on the outline, in its order.
+pub(super) fn boundary(geometry: &Geometry, extent: f64) -> Vec<usize> {
+    let mut found = Vec::new();
+    let mut before = 0.0;
+    for (start, end) in edges(&geometry.outline) {
+        let [dx, dy] = [end[0] - start[0], end[1] - start[1]];
+        let length = dx.hypot(dy);
+        for (i, node) in geometry.nodes.iter().enumerate() {
+            let [x, y] = [node[0] - start[0], node[1] - start[1]];
+            let (way, off) = ((x * dx + y * dy) / length, (x * dy - y * dx) / length);
+            let close = 1e-6 * extent;
+            // The end belongs to the next edge.
+            if off.abs() < close && way > -close && way < length - close {
+                found.push((before + way, i));
+            }
+        }
+        before += length;
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, i)| i).collect()
+}

@@ -1,0 +1,178 @@
+//! The first screen: what was found, in a few lines.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use model_offline::scene::PlantModel;
+
+use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::report::paper::paper_optima;
+use crate::runtime::names;
+use crate::runtime::time::durations::LoopTiming;
+
+/// The summary of a run that is at `directory`.
+pub fn summary(run: &RunResult, directory: &Path) -> String {
+    let mut text = String::new();
+    // A string takes everything.
+    let _ = write_all(&mut text, run, directory);
+    text
+}
+
+fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::Result {
+    let settings = &run.settings;
+    writeln!(text, "Scene {}, {}, seed {}\n", run.scene, run.mode, run.seed)?;
+    writeln!(text, "Best paddle       static   dynamic")?;
+    for placement in &run.placements {
+        let paper = match paper_optima(&run.scene, placement.tissue) {
+            None => String::new(),
+            Some((static_paddle, dynamic)) => {
+                let agrees = (static_paddle, dynamic) == (placement.best_static, placement.best_dynamic);
+                let verdict = if agrees { "same" } else { "DIFFERENT" };
+                format!("      paper: {static_paddle} and {dynamic}, {verdict}")
+            }
+        };
+        writeln!(
+            text,
+            "  {:<15} {:>6} {:>9}{paper}",
+            placement.tissue.name(),
+            placement.best_static,
+            placement.best_dynamic
+        )?;
+    }
+    writeln!(
+        text,
+        "\nLargest target displacement orthogonal to the needle, depth {} in {} s,\n\
+         target seen at {} Hz, {} ms late, noise {:.1e}; paddle in brackets",
+        settings.depth, settings.insertion_s, settings.target_rate_hz, settings.target_latency_ms, settings.noise
+    )?;
+    writeln!(text, "  {:<13} {:<13} {:>10} {:>13} {:>13}", "tissue", "table", "none", "static", "dynamic")?;
+    for case in &run.cases {
+        write_case(text, case)?;
+    }
+    write_plant(text, run)?;
+    write_loop(text, run)?;
+    writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
+}
+
+fn error(strategy: Option<&StrategyResult>) -> String {
+    let Some(strategy) = strategy else {
+        return "–".to_owned();
+    };
+    let paddle = strategy.paddle.map_or_else(String::new, |index| format!(" ({index})"));
+    format!("{:.6}{paddle}", strategy.max_orthogonal_error)
+}
+
+fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
+    let strategies = &case.strategies;
+    let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+    write!(
+        text,
+        "  {:<13} {:<13} {:>10} {:>13} {:>13}",
+        case.tissue.name(),
+        case.table_tissue,
+        error(strategies.none.as_ref()),
+        error(strategies.static_paddle.as_ref()),
+        error(dynamic),
+    )?;
+    match (case.improvement, dynamic) {
+        (Some(factor), Some(dynamic)) => {
+            let none =
+                case.improvement_over_none.map_or_else(String::new, |factor| format!("{} of none, ", share(factor)));
+            writeln!(text, "   {} of static, {none}{}", share(factor), names::mode::name(dynamic.final_state))
+        }
+        _ => writeln!(text),
+    }
+}
+
+/// An error over another one, by how many times it is smaller; a digit more where that is few.
+fn share(factor: f64) -> String {
+    if factor < 10.0 { format!("1/{factor:.1}") } else { format!("1/{factor:.0}") }
+}
+
+const fn plant_name(model: PlantModel) -> &'static str {
+    match model {
+        PlantModel::Full => "full",
+        PlantModel::Reduced => "reduced",
+        PlantModel::Condensed => "condensed",
+    }
+}
+
+/// What answered for the tissue, where it was not the full model: how far off it was, and how often it could not.
+fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
+    for case in &run.cases {
+        let strategies = &case.strategies;
+        for strategy in [&strategies.dynamic, &strategies.dynamic_free_run].into_iter().flatten() {
+            let plant = &strategy.plant;
+            if plant.fallbacks == 0 && plant.first_fallback.is_none() && plant.model == PlantModel::Full {
+                continue;
+            }
+            write!(text, "  {}, {}: tissue {}", case.tissue, strategy.mode, plant_name(plant.model))?;
+            if let (Some(modes), Some([points, all])) = (plant.modes, plant.points) {
+                write!(text, " ({modes} modes, {points} of {all} points)")?;
+            }
+            write!(text, ", {:.1} µs a step", strategy.plant_step_us)?;
+            if let Some(error) = plant.error_at_end {
+                write!(text, ", {error:.1e} from the full model at the end")?;
+            }
+            if let Some(full) = plant.full_step_us {
+                write!(text, "; the full model takes {full:.0} µs, too long for the period")?;
+            }
+            if plant.fallbacks > 0 {
+                write!(text, "; the full model answered {} steps", plant.fallbacks)?;
+            }
+            match &plant.first_fallback {
+                Some(why) => writeln!(text, ": {why}")?,
+                None => writeln!(text)?,
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Both sides of a loop on the machine's clock: the counts first, then how late.
+fn write_free_run(text: &mut String, case: &CaseResult, free_run: &StrategyResult) -> std::fmt::Result {
+    let us = |ns: u64| ns as f64 * 1e-3;
+    let sides = [("controller", &free_run.timing), ("plant", &free_run.plant_timing)];
+    let sides: Vec<_> = sides.into_iter().filter_map(|(side, timing)| Some((side, timing.as_ref()?))).collect();
+    let counts: Vec<_> = sides
+        .iter()
+        .map(|(side, timing)| {
+            let LoopTiming { ticks, deadline_misses, skipped, .. } = timing;
+            format!("{side} {ticks} ticks, {deadline_misses} deadline misses, {skipped} skipped")
+        })
+        .collect();
+    let state = names::mode::name(free_run.final_state);
+    writeln!(text, "  {}: {}; ended in {state}", case.tissue, counts.join("; "))?;
+    for (side, LoopTiming { release_lateness: lateness, scheduling, .. }) in sides {
+        let [p50, p99, max] = [lateness.p50_ns, lateness.p99_ns, lateness.max_ns].map(us);
+        let policy = &scheduling.policy;
+        writeln!(text, "    {side}: lateness p50 {p50:.0} µs, p99 {p99:.0} µs, max {max:.0} µs; {policy}")?;
+    }
+    Ok(())
+}
+
+fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {
+    let strategies = || run.cases.iter().map(|case| &case.strategies);
+    if strategies().any(|strategies| strategies.dynamic_free_run.is_some()) {
+        writeln!(text, "\nFree-run at {} Hz, from the scheduled time", run.settings.rate_hz)?;
+    }
+    for case in &run.cases {
+        if let Some(free_run) = &case.strategies.dynamic_free_run {
+            write_free_run(text, case, free_run)?;
+        }
+    }
+    let ledgers: Vec<_> = strategies()
+        .flat_map(|strategies| [&strategies.dynamic, &strategies.dynamic_free_run])
+        .flatten()
+        .filter_map(|strategy| strategy.ledger.as_ref())
+        .collect();
+    let ticks: u64 = ledgers.iter().map(|ledger| ledger.ticks.due).sum();
+    let unaccounted: u64 = ledgers.iter().map(|ledger| ledger.unaccounted).sum();
+    let not_recorded: u64 = ledgers.iter().map(|ledger| ledger.not_recorded).sum();
+    writeln!(
+        text,
+        "Ledger of {} controlled runs: {ticks} ticks due, {unaccounted} ticks or samples unaccounted, {not_recorded} \
+         ticks not recorded",
+        ledgers.len()
+    )
+}
