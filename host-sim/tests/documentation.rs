@@ -6,6 +6,9 @@ use std::process::Command;
 
 const HOST_SIM: &str = env!("CARGO_BIN_EXE_host-sim");
 
+/// What `timing` says where no round is worth anything.
+const VOID: &str = "are void: ";
+
 fn pages() -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut pages = vec![root.join("README.md")];
@@ -64,12 +67,10 @@ fn every_command_shown_works() {
             };
             let shell = format!("exec {} {rest}", program.display());
             let output = Command::new("sh").args(["-c", &shell]).current_dir(folder.path()).output().unwrap();
-            assert!(
-                output.status.success(),
-                "{}: `{command}`\n{}",
-                page.display(),
-                String::from_utf8_lossy(&output.stderr)
-            );
+            let said = String::from_utf8_lossy(&output.stderr);
+            // A machine whose host takes its processor away gives no timing to report, and `timing` has to say so.
+            let void = rest.starts_with("timing") && output.status.code() == Some(1) && said.contains(VOID);
+            assert!(output.status.success() || void, "{}: `{command}`\n{said}", page.display());
         }
     }
 }

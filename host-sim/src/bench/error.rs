@@ -176,6 +176,7 @@ impl SimError {
             | Self::Table { .. }
             | Self::TableUnits { .. }
             | Self::NotARun { .. } => true,
+            Self::Model(error) => error.is_usage(),
             Self::File(error) => is_unreadable(error),
             Self::Record(RecordError::File(error)) => is_unreadable(error),
             Self::Record(RecordError::Recording { .. } | RecordError::Table { .. }) => true,

@@ -4,6 +4,7 @@
 use model_offline::placement::study::StaticFailure;
 use model_offline::solver::equilibrium::FailureReason;
 use serde::{Deserialize, Serialize};
+use strum::VariantArray as _;
 
 /// Why a study ended before the full depth.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,15 +15,6 @@ pub struct StudyFailure {
     /// Numbers behind the reason.
     pub detail: String,
 }
-
-/// Every reason.
-const REASONS: [FailureReason; 5] = [
-    FailureReason::ElementInverted,
-    FailureReason::LawOverflow,
-    FailureReason::LostStability,
-    FailureReason::SingularTangent,
-    FailureReason::NotConverged,
-];
 
 impl From<&StaticFailure> for StudyFailure {
     fn from(failure: &StaticFailure) -> Self {
@@ -47,7 +39,7 @@ impl TryFrom<String> for StudyFailure {
 
     fn try_from(text: String) -> Result<Self, NoReason> {
         let known = |(name, detail): (&str, &str)| {
-            let reason = REASONS.into_iter().find(|reason| reason.to_string() == name)?;
+            let reason = FailureReason::VARIANTS.iter().copied().find(|reason| reason.to_string() == name)?;
             Some(Self { reason, detail: detail.to_owned() })
         };
         text.split_once(": ").and_then(known).ok_or_else(|| NoReason { text: text.clone() })
@@ -68,7 +60,7 @@ mod tests {
 
     #[test]
     fn reasons_are_read_back_and_others_refused() {
-        for reason in REASONS {
+        for &reason in FailureReason::VARIANTS {
             let failure = StudyFailure { reason, detail: "det F = -0.1: at 3".to_owned() };
             let text = serde_json::to_string(&failure).unwrap();
             assert_eq!(text, format!("\"{reason}: det F = -0.1: at 3\""));

@@ -13,10 +13,8 @@ use host_sim::runtime::plant::process::{Expected, OnDeath, Visit, serve};
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::World;
-use model_offline::model::TissueModel;
 use model_offline::output::table_text::hex;
-use model_offline::placement::{best_dynamic, discretise};
-use model_offline::scene::Scene;
+use model_offline::placement::model_with_paddle;
 
 use super::outputs::check_outputs;
 use super::world_args::{PATIENCE, WorldArgs};
@@ -66,7 +64,7 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let simulation = args.world.simulation(&scene)?;
     let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).collect();
     check_outputs(&inputs, &[("--json", args.json.as_deref())])?;
-    let (model, paddle) = signals::ends_at_once(|| model_and_paddle(&scene, args.paddle))?;
+    let (model, paddle) = signals::ends_at_once(|| model_with_paddle(&scene, args.paddle))?;
     let world = signals::ends_at_once(|| match args.mode {
         RunMode::Lockstep => World::new(&model, Some(paddle), &simulation),
         RunMode::FreeRun => World::in_time(&model, Some(paddle), &simulation),
@@ -91,14 +89,4 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
         result.ticks, result.largest_error
     );
     Ok(())
-}
-
-/// The tissue, and the paddle that was asked for or is best.
-fn model_and_paddle(scene: &Scene, asked: Option<u32>) -> Result<(TissueModel, u32), SimError> {
-    let (model, _) = discretise(scene)?;
-    let paddle = match asked {
-        Some(index) => index,
-        None => best_dynamic(&model)?,
-    };
-    Ok((model, paddle))
 }

@@ -11,12 +11,13 @@ use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_run};
 use host_sim::report::terminal::summary::summary;
 use host_sim::runtime::error::RuntimeError;
-use host_sim::runtime::executor::{Hardware, ScalarChoice};
+use host_sim::runtime::executor::Hardware;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{self, InsertionBasis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
+use model_offline::scene::TableScalar;
 
 use super::outputs::check_json_beside_report;
 use super::world_args::{WorldArgs, threads_within_reason};
@@ -47,7 +48,7 @@ pub(crate) struct RunArgs {
     pub(crate) hardware: Hardware,
     /// Number type that the controller computes in
     #[arg(long, value_enum, default_value_t)]
-    pub(crate) scalar: ScalarChoice,
+    pub(crate) scalar: TableScalar,
     /// Directory for the report, created whole
     #[arg(long, default_value = "stillpoint-report", value_name = "DIR")]
     pub(crate) out: PathBuf,

@@ -8,6 +8,7 @@ use firmware::inputs::Ledger;
 use firmware::scalar::{Scalar, ScalarKind};
 use firmware::serial::Request;
 use firmware::{Controller, Inputs, Settings, State};
+use model_offline::scene::TableScalar;
 
 use crate::exchange::board::device::scalar_of;
 use crate::exchange::board::{BoardError, Device, Image, Processor};
@@ -33,34 +34,14 @@ impl Hardware {
     }
 }
 
-/// The number type of the controller.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ScalarChoice {
-    /// Double precision.
-    #[default]
-    F64,
-    /// Single precision.
-    F32,
-}
-
-impl ScalarChoice {
-    /// As tables name it.
-    pub const fn kind(self) -> ScalarKind {
-        match self {
-            Self::F64 => ScalarKind::F64,
-            Self::F32 => ScalarKind::F32,
-        }
-    }
-
-    /// The table in this number type; `bytes` are `table` in double precision.
-    ///
-    /// # Errors
-    /// As [`encode_as`].
-    pub fn encode(self, table: &Table<f64, 2>, bytes: Vec<u8>) -> Result<Vec<u8>, TableError> {
-        match self {
-            Self::F64 => Ok(bytes),
-            Self::F32 => encode_as(table, ScalarKind::F32),
-        }
+/// The table in a number type; `bytes` are `table` in double precision.
+///
+/// # Errors
+/// As [`encode_as`].
+pub fn encode_in(scalar: TableScalar, table: &Table<f64, 2>, bytes: Vec<u8>) -> Result<Vec<u8>, TableError> {
+    match scalar {
+        TableScalar::F64 => Ok(bytes),
+        TableScalar::F32 => encode_as(table, ScalarKind::F32),
     }
 }
 

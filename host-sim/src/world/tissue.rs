@@ -8,25 +8,12 @@ use model_offline::model::{Body, TissueModel};
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, TrainingOptions, train};
 use model_offline::scene::PlantModel;
-use model_offline::solver::equilibrium::{LinearSolver, NewtonSettings};
+use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::WorldError;
-
-/// Newton's method for small steps from a converged state: the last factor nearly always does. What the plant's error
-/// is compared with is 1e-5 of the target's motion; a residual of 1e-7 is far below it.
-const STEP_SETTINGS: NewtonSettings = NewtonSettings {
-    residual_tolerance: 1e-7,
-    step_tolerance: 1e-6,
-    max_iterations: 25,
-    max_cutbacks: 8,
-    line_search: true,
-    require_stability: true,
-    reuse_tangent: true,
-    linear_solver: LinearSolver::BySize,
-};
 
 /// Which model is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -264,7 +251,10 @@ impl TissueResponse for TissuePlant<'_> {
 }
 
 fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, WorldError> {
-    model.body(paddle, STEP_SETTINGS).map(Box::new).map_err(|source| WorldError::Tissue { depth: 0.0, source })
+    model
+        .body(paddle, NewtonSettings::SMALL_STEPS)
+        .map(Box::new)
+        .map_err(|source| WorldError::Tissue { depth: 0.0, source })
 }
 
 fn drive(body: &mut Body<'_>, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {

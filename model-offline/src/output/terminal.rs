@@ -7,7 +7,7 @@ pub fn progress(steps: u64) -> indicatif::ProgressBar {
     if !std::io::stderr().is_terminal() {
         return indicatif::ProgressBar::hidden();
     }
-    let style = indicatif::ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left");
+    let style = indicatif::ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left  {msg}");
     let bar = indicatif::ProgressBar::new(steps);
     if let Ok(style) = style { bar.with_style(style) } else { bar }
 }

@@ -4,6 +4,7 @@
 use crate::choice::choice;
 use crate::discretization::{Basis, Essential, Integration};
 use crate::material::MaterialSection;
+use firmware::scalar::ScalarKind;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
@@ -231,12 +232,24 @@ choice! {
 }
 
 choice! {
-    /// Number type of a table's payload.
+    /// Number type of a table's payload, and of the controller that reads it.
+    #[derive(Default)]
     pub enum TableScalar {
         /// Single precision.
         F32,
         /// Double precision.
+        #[default]
         F64,
+    }
+}
+
+impl TableScalar {
+    /// As tables name it.
+    pub const fn kind(self) -> ScalarKind {
+        match self {
+            Self::F32 => ScalarKind::F32,
+            Self::F64 => ScalarKind::F64,
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use model_offline::output::table_text::hex;
 use model_offline::parallel;
 use model_offline::placement::study::steps;
 use model_offline::placement::{PlacementOptions, PlacementStudy};
-use model_offline::scene::Scene;
+use model_offline::scene::{Scene, TableScalar};
 use model_offline::table::{TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
 
@@ -27,7 +27,7 @@ use super::tissue_variant::{TableTissue, TissueVariant};
 use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
 use crate::record::files::Artifact;
-use crate::runtime::executor::{Hardware, ScalarChoice};
+use crate::runtime::executor::{Hardware, encode_in};
 use crate::runtime::plant::observer::Spectator;
 use crate::runtime::signals;
 use crate::runtime::time::mode::RunMode;
@@ -49,7 +49,7 @@ pub struct ComparisonOptions {
     /// What computes the controller's steps.
     pub hardware: Hardware,
     /// Number type of the controller.
-    pub scalar: ScalarChoice,
+    pub scalar: TableScalar,
     /// Files for other tools.
     pub extras: Extras,
     /// Threads for placement and for strategies without a controller.
@@ -68,7 +68,7 @@ impl ComparisonOptions {
             allow_other_scene: false,
             mode: None,
             hardware: Hardware::default(),
-            scalar: ScalarChoice::default(),
+            scalar: TableScalar::default(),
             extras: Extras::default(),
             threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
             program,
@@ -252,7 +252,7 @@ impl<'p> Comparison<'p> {
                 };
                 // Refused settings are bad input: found before anything runs.
                 Controller::new(&table, &loop_settings.settings(table.validity.depth_end))?;
-                let bytes = self.options.scalar.encode(&table, bytes);
+                let bytes = encode_in(self.options.scalar, &table, bytes);
                 let bytes = bytes.map_err(|source| SimError::Table { path: "as another scalar".into(), source })?;
                 Ok(EncodedTable { table, bytes })
             })

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::catalogue::Row;
 use super::evidence::{Evidence, RowVerdict};
 use super::random::Composed;
-use crate::record::export::csv::table;
 use crate::runtime::names;
+use model_offline::output::csv::table;
 
 /// Columns of `faults.csv`.
 const COLUMNS: [&str; 9] =

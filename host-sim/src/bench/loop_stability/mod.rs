@@ -11,8 +11,7 @@ pub mod mismatch;
 pub mod rate_limit;
 
 use model_offline::model::ModelError;
-use model_offline::placement::best_dynamic;
-use model_offline::placement::discretise;
+use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use model_offline::table::TableOptions;
@@ -65,8 +64,7 @@ pub fn simulate(
     progress: &dyn Fn(),
 ) -> Result<StabilityResult, SimError> {
     let plain = scene.without_inclusions();
-    let (model, _) = discretise(&plain)?;
-    let paddle = best_dynamic(&model)?;
+    let (model, paddle) = model_with_paddle(&plain, None)?;
     let place = model.paddle_position(paddle);
     let jacobian = model
         .body(place, NewtonSettings::default())

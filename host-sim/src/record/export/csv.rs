@@ -1,7 +1,7 @@
 //! Tables with a time column, for PlotJuggler and spreadsheets.
 
-use csv::Writer;
 use firmware::{Faults, Mode};
+use model_offline::output::csv::table;
 use nalgebra::Vector2;
 
 use crate::record::recording::{Record, Recording};
@@ -139,21 +139,6 @@ fn pair(values: Option<[f64; 2]>) -> [String; 2] {
 fn verdict(state: u32, faults: u64) -> [String; 2] {
     let state = Mode::from_wire(state).map_or("?", Mode::name);
     [state.to_owned(), Faults::from_bits(faults).to_string()]
-}
-
-/// A header and a line for each of `rows`.
-pub fn table<'r, R: 'r, const N: usize>(
-    header: [impl AsRef<[u8]>; N],
-    rows: impl IntoIterator<Item = &'r R>,
-    line: impl Fn(&'r R) -> [String; N],
-) -> Vec<u8> {
-    let mut writer = Writer::from_writer(Vec::new());
-    // Lines have the header's length by their type, and memory takes everything.
-    let _ = writer.write_record(header);
-    for row in rows {
-        let _ = writer.write_record(line(row));
-    }
-    writer.into_inner().unwrap_or_default()
 }
 
 #[cfg(test)]

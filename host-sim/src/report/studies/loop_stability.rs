@@ -10,7 +10,7 @@ use crate::bench::loop_stability::cells::{Boundary, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
 use crate::bench::loop_stability::rate_limit::{self, Cell, Integrator};
 use crate::bench::tissue_variant::TissueVariant;
-use crate::record::export::csv::table;
+use model_offline::output::csv::table;
 
 /// Columns of the three parts; those that do not belong to a part are empty.
 const COLUMNS: [&str; 22] = [

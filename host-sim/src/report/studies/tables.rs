@@ -6,7 +6,7 @@ use firmware::scalar::ScalarKind;
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Series};
 
 use crate::bench::tables::{KNOTS, TableTrial};
-use crate::record::export::csv::table;
+use model_offline::output::csv::table;
 
 /// Within this share of the least error a smaller table is as good.
 const AS_GOOD: f64 = 1.1;

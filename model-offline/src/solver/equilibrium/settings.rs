@@ -68,7 +68,7 @@ impl Default for NewtonSettings {
 }
 
 /// Why no equilibrium was found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, strum::VariantArray, thiserror::Error)]
 #[serde(rename_all = "kebab-case")]
 pub enum FailureReason {
     /// det F ≤ 0 at an integration point.
