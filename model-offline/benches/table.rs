@@ -4,7 +4,7 @@
 //! To measure the peer in the same run: `apt-get install python3-dolfinx`, then
 //! `STILLPOINT_PEER=1 cargo bench -p model-offline --bench table`; it runs `benches/peer_dolfinx.py` on one thread.
 
-use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::discretization::nodes::graded::{Grading, InterfaceFit, graded_nodes};
 use model_offline::discretization::{Integration, Method, Planar, Resolution};
 use model_offline::model::TissueModel;
 use model_offline::placement::adaptive::discretise;

@@ -1,8 +1,8 @@
 //! Nodes and cells of the bundled scenes.
 
-use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
-use model_offline::discretization::lattice::lattice_nodes;
-use model_offline::discretization::nodal_cells::clipped_voronoi;
+use model_offline::discretization::cells::nodal_cells::clipped_voronoi;
+use model_offline::discretization::nodes::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::discretization::nodes::lattice::lattice_nodes;
 use model_offline::geometry::{Point2, Polygon, distance_to_segment};
 use model_offline::scene::Scene;
 

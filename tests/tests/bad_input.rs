@@ -1,7 +1,7 @@
 //! Scenes that nobody would write, and some that somebody will: solved, or refused with a typed error. Never a panic, a
 //! hang or unbounded memory.
 
-use model_offline::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use model_offline::discretization::nodes::graded::{Grading, InterfaceFit, graded_nodes};
 use model_offline::discretization::{Integration, Resolution};
 use model_offline::model::{ModelError, TissueModel};
 use model_offline::placement::rest::rest_responses;
@@ -165,7 +165,7 @@ proptest! {
         let grading = Grading { coarsest, finest: coarsest * ratio, slope, interface: interface.min(coarsest), narrow: 0.5, fit };
         let nodes = graded_nodes(&scene.features(), &grading);
         prop_assert!(nodes.len() < 200_000);
-        let cells = model_offline::discretization::nodal_cells::clipped_voronoi(&nodes, &scene.outline).unwrap();
+        let cells = model_offline::discretization::cells::nodal_cells::clipped_voronoi(&nodes, &scene.outline).unwrap();
         let area: f64 = cells.iter().map(|c| c.area).sum();
         prop_assert!((area - scene.outline.area()).abs() < 1e-9);
         prop_assert!(cells.iter().all(|c| c.area > 0.0));

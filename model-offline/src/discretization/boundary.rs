@@ -1,6 +1,6 @@
 //! Integration points on the boundary of the body: for tractions, and for Nitsche's method.
 
-use super::nodal_cells::Across;
+use super::cells::nodal_cells::Across;
 use super::{Planar, ShapeError, Stencil};
 use crate::geometry::{Point, Point2};
 
@@ -111,7 +111,7 @@ impl Planar {
             let centre = cell.centroid();
             for (a, b, _) in cell.edges() {
                 let area = 0.5 * crate::geometry::cross(a - centre, b - centre);
-                for (l, weight) in super::integration::TRIANGLE_6 {
+                for (l, weight) in super::quadrature::integration::TRIANGLE_6 {
                     visit(centre * l[0] + a * l[1] + b * l[2], weight * area, self)?;
                 }
             }

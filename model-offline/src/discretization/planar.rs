@@ -1,11 +1,12 @@
 //! A planar body discretised: nodes, cells and an integration rule, from nodes that are given.
 
-use super::finite_element::Elements;
+use super::approximation::sight::{OutlineSight, Sight};
+use super::cells::nodal_cells::{Across, clipped_voronoi};
+use super::cells::triangulation::{TriangulationError, triangulate};
 use super::method::{Integration, Method};
-use super::nodal_cells::{Across, clipped_voronoi};
-use super::sight::{OutlineSight, Sight};
-use super::triangulation::{TriangulationError, triangulate};
-use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, Wanted, integration, subcells};
+use super::quadrature::finite_element::Elements;
+use super::quadrature::{integration, subcells};
+use super::{NodalCell, NodeCloud, Quadrature, ShapeError, ShapeFunctions, Stencil, Wanted};
 use crate::geometry::{Point, Point2, Polygon};
 use std::collections::BTreeMap;
 use std::sync::Arc;

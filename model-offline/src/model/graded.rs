@@ -1,7 +1,7 @@
 //! Models on graded nodes.
 
 use super::{ModelError, TissueModel};
-use crate::discretization::graded::{Grading, InterfaceFit, graded_nodes};
+use crate::discretization::nodes::graded::{Grading, InterfaceFit, graded_nodes};
 use crate::discretization::{Integration, Method, Planar};
 use crate::scene::Scene;
 

@@ -7,7 +7,7 @@ pub use graded::graded_model;
 
 use self::tissue::{Mixing, tissue_of};
 use crate::discretization::boundary::BoundaryPoint;
-use crate::discretization::lattice::{lattice_nodes, lattice_nodes_on_interfaces};
+use crate::discretization::nodes::lattice::{lattice_nodes, lattice_nodes_on_interfaces};
 use crate::discretization::{
     DiscretizationError, Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
 };

@@ -188,7 +188,7 @@ mod tests {
 
     fn cell() -> NodalCell {
         let boundary = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
-        let across = crate::discretization::nodal_cells::Across::Outline(u32::MAX);
+        let across = crate::discretization::cells::nodal_cells::Across::Outline(u32::MAX);
         NodalCell { boundary: boundary.map(|c| (Point2::from(c), across)).to_vec(), area: 1.0 }
     }
 

@@ -8,7 +8,7 @@
 use super::goal_oriented;
 pub use super::reference::{Reference, distance};
 use super::rest::{RestResponse, rest_responses};
-use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
+use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Integration, Resolution};
 use crate::model::{ModelError, TissueModel, graded_model};
 use crate::scene::Scene;

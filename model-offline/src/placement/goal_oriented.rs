@@ -12,7 +12,7 @@
 //! that; a whole difference is left open, half again as much as the range, because coarse meshes need not obey.
 
 use super::rest::{Fields, Loads, RestResponse, for_each_paddle, response_of};
-use crate::discretization::bisection::Triangulation;
+use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::{Integration, Method, Planar};
 use crate::geometry::Point2;
 use crate::material::Material;

@@ -1,6 +1,6 @@
 //! Numbers of a discretization that no scene is modelled with.
 
-use crate::discretization::graded::{MAX_LEVEL, MIN_LEVEL};
+use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Discretization, Resolution};
 use crate::geometry::Polygon;
 

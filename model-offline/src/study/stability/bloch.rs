@@ -171,7 +171,7 @@ fn least_ratio(row: &Row, exact: &Row) -> LeastShare {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::discretization::subcells::scni_stabilised;
+    use crate::discretization::quadrature::subcells::scni_stabilised;
     use crate::discretization::{Basis, NodeCloud, ShapeFunctions};
 
     #[test]

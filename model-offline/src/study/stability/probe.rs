@@ -1,7 +1,7 @@
 //! One run: the needle goes in until something gives.
 
 use super::plan::Experiment;
-use crate::discretization::lattice::lattice_nodes;
+use crate::discretization::nodes::lattice::lattice_nodes;
 use crate::discretization::{DiscretizationError, Planar};
 use crate::geometry::{Location, Point2, distance_to_polyline};
 use crate::material::{Law, Material as _, MaterialError};

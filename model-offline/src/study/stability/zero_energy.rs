@@ -3,8 +3,8 @@
 
 use super::plan::{self, Experiment};
 use super::{bloch, probe};
-use crate::discretization::finite_element::Elements;
-use crate::discretization::triangulation::triangulate;
+use crate::discretization::cells::triangulation::triangulate;
+use crate::discretization::quadrature::finite_element::Elements;
 use crate::discretization::{
     Basis, Consistency, DiscretizationError, Integration, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration,
 };

@@ -1,7 +1,7 @@
 //! Finite-element baselines on the same nodes, integrated by the same assembly: linear and quadratic triangles.
 
-use super::nodal_cells::{Across, NodalCell};
-use super::{Quadrature, Stencil};
+use crate::discretization::cells::nodal_cells::{Across, NodalCell};
+use crate::discretization::{Quadrature, Stencil};
 use crate::geometry::{Point, Point2, cross};
 use rstar::primitives::{GeomWithData, Rectangle};
 use rstar::{AABB, RTree};
@@ -64,7 +64,7 @@ impl Elements {
             .iter()
             .map(|t| NodalCell {
                 boundary: (0..3).map(|e| (self.positions[t[e] as usize], across(directed(t, e)))).collect(),
-                area: super::triangulation::area(&self.positions, t),
+                area: crate::discretization::cells::triangulation::area(&self.positions, t),
             })
             .collect()
     }
@@ -74,7 +74,7 @@ impl Elements {
         let mut rule = Quadrature::default();
         for (cell, t) in self.corners.iter().enumerate() {
             let slopes = self.barycentric_slopes(t);
-            let area = super::triangulation::area(&self.positions, t);
+            let area = crate::discretization::cells::triangulation::area(&self.positions, t);
             match &self.middles {
                 None => push_sorted(&mut rule, area, cell, t.iter().copied().zip(slopes)),
                 Some(middles) => {

@@ -14,9 +14,9 @@
 //!   It follows the law's own loss of stiffness, at the cost of the law evaluated in every triangle.
 
 use super::integration::GAUSS_2;
-use super::nodal_cells::{Across, NodalCell};
-use super::shape_functions::Wanted;
-use super::{Quadrature, ShapeError, ShapeFunctions, Stencil};
+use crate::discretization::approximation::shape_functions::Wanted;
+use crate::discretization::cells::nodal_cells::{Across, NodalCell};
+use crate::discretization::{Quadrature, ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2, cross};
 
 /// Weight α of the stabilisation: with 1 the least share of its energy that any lattice wave keeps is 0.37 (see the

@@ -1,10 +1,10 @@
 //! Rules that integrate the weak form. Every rule is a list of points with a weight and the gradients of the shape
 //! functions there, so that assembly knows one loop only: `∫ W(F) dΩ ≈ Σ_q w_q W(I + Σ_I d_I ⊗ g_I(q))`.
 
-use super::method::{Basis, Consistency};
-use super::nodal_cells::{Across, NodalCell};
-use super::shape_functions::Wanted;
-use super::{ShapeError, ShapeFunctions, Stencil};
+use crate::discretization::approximation::shape_functions::Wanted;
+use crate::discretization::cells::nodal_cells::{Across, NodalCell};
+use crate::discretization::method::{Basis, Consistency};
+use crate::discretization::{ShapeError, ShapeFunctions, Stencil};
 use crate::geometry::{Point, Point2};
 
 /// Integration points with the gradients of the shape functions that are not zero there (compressed rows).
@@ -271,7 +271,7 @@ const TRIANGLE_3: [([f64; 3], f64); 3] = {
 };
 
 /// Degree 4 on a triangle (Dunavant 1985).
-pub(super) const TRIANGLE_6: [([f64; 3], f64); 6] = {
+pub(in crate::discretization) const TRIANGLE_6: [([f64; 3], f64); 6] = {
     const A: f64 = 0.445_948_490_915_965;
     const WA: f64 = 0.223_381_589_678_011;
     const B: f64 = 0.091_576_213_509_771;

@@ -4,7 +4,7 @@
 
 use super::features::Features;
 use super::graded::{Grading, InterfaceFit, graded_nodes};
-use super::triangulation::{TriangulationError, triangulate_along};
+use crate::discretization::cells::triangulation::{TriangulationError, triangulate_along};
 use crate::geometry::{Point2, Polygon};
 use std::collections::{BTreeMap, BTreeSet};
 

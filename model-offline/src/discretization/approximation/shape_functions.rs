@@ -1,8 +1,8 @@
 //! Shape functions Ψ_I and their gradients from the moment matrix.
 
-use super::NodeCloud;
 use super::kernel::{NEGLIGIBLE, product_kernel};
-use super::method::Basis;
+use crate::discretization::NodeCloud;
+use crate::discretization::method::Basis;
 use crate::geometry::Point;
 use nalgebra::{SMatrix, SVector};
 
