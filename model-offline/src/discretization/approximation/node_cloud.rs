@@ -48,7 +48,7 @@ where
     }
 
     /// Whether a node is in sight of `x`.
-    pub(super) fn sees(&self, x: &Point<D>, node: u32) -> bool {
+    pub(in crate::discretization) fn sees(&self, x: &Point<D>, node: u32) -> bool {
         self.sight.as_ref().is_none_or(|sight| sight.sees(x, &self.positions[node as usize]))
     }
 

@@ -140,10 +140,11 @@ pub fn direct_nodal(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resul
 }
 
 /// Two-point Gauss rule on [0, 1]: positions and weights.
-pub(super) const GAUSS_2: [(f64, f64); 2] = [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
+pub(in crate::discretization) const GAUSS_2: [(f64, f64); 2] =
+    [(0.211_324_865_405_187_1, 0.5), (0.788_675_134_594_812_9, 0.5)];
 
 /// Three-point Gauss rule on [0, 1]: positions and weights.
-pub(super) const GAUSS_3: [(f64, f64); 3] =
+pub(in crate::discretization) const GAUSS_3: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// Stabilised conforming nodal integration: the gradient averaged over the nodal cell by the divergence theorem,

@@ -5,8 +5,9 @@ use super::plan::{self, Experiment};
 use super::{bloch, probe};
 use crate::discretization::cells::triangulation::triangulate;
 use crate::discretization::quadrature::finite_element::Elements;
+use crate::discretization::quadrature::integration;
 use crate::discretization::{
-    Basis, Consistency, DiscretizationError, Integration, NodalCell, NodeCloud, Quadrature, ShapeFunctions, integration,
+    Basis, Consistency, DiscretizationError, Integration, NodalCell, NodeCloud, Quadrature, ShapeFunctions,
 };
 use crate::geometry::Point2;
 use crate::material::{Material as _, Tensor4};
