@@ -135,30 +135,30 @@ fn stretch_panel(study: &Stability) -> Panel {
 /// Energies of the zero-energy modes, each method by its own look.
 fn energy_panel(study: &Stability) -> Panel {
     let regular: Vec<_> = study.zero_energy.iter().filter(|z| z.jitter == 0.0).collect();
-    let blind = regular.iter().filter(|z| z.interior_energy_ratio < 0.01).map(|z| z.integration.name());
-    let blind: Vec<&str> = blind.collect();
-    let title = if blind.is_empty() {
-        "Every method feels a checkerboard".to_owned()
+    let ghosts = regular.iter().filter(|z| z.bloch_share < 0.01).map(|z| z.integration.name());
+    let ghosts: Vec<&str> = ghosts.collect();
+    let title = if ghosts.is_empty() {
+        "Every method feels every wave".to_owned()
     } else {
-        format!("A checkerboard costs no energy with {}", blind.join(", "))
+        format!("Some waves cost no energy with {}: ghost modes", ghosts.join(", "))
     };
     let mut panel = Panel::new(
         &title,
         Axis::categories("method, regular nodes; colours as above", vec![String::new(); regular.len()]),
-        Axis::log("energy felt over true energy", "").range(0.5 * LEAST_SHOWN, 10.0),
+        Axis::log("energy felt over true energy; lower edge: none", "").range(0.5 * LEAST_SHOWN, 10.0),
     );
     for (i, z) in regular.iter().enumerate() {
         let (colour, marker) = look(z.integration);
         // Exactly nothing has no place on a log axis: it goes to the lower edge.
         let at = |share: f64| vec![(i as f64, share.max(LEAST_SHOWN))];
         panel.series.push(Series::scatter("", colour, marker, at(z.interior_energy_ratio)));
-        let least = Series::scatter("", colour, marker, at(z.least_energy_ratio)).open();
-        panel.series.push(Series { titles: vec![format!("{}, mode felt least", z.integration)], ..least });
+        let least = Series::scatter("", colour, marker, at(z.bloch_share)).open();
+        panel.series.push(Series { titles: vec![format!("{}, wave felt least", z.integration)], ..least });
     }
     // What filling means, for the legend alone.
     let sample = |label: &str| Series::scatter(label, Colour::Ink, Marker::Circle, Vec::new());
     panel.series.push(sample("filled: checkerboard in the interior"));
-    panel.series.push(sample("open: mode felt least").open());
+    panel.series.push(sample("open: wave felt least, unbounded lattice").open());
     panel
 }
 
