@@ -7,7 +7,7 @@ use model_offline::geometry::{Point2, Polygon, distance_to_segment};
 use model_offline::scene::Scene;
 
 #[test]
-fn the_papers_scenes_have_the_published_node_counts() {
+fn the_papers_scenes_have_the_node_counts_of_an_independent_implementation() {
     for (name, spacing, expected) in
         [("paper", 0.1, 106), ("paper-hull", 0.1, 126), ("paper", 0.05, 386), ("paper", 0.025, 1471)]
     {

@@ -37,13 +37,11 @@ pub fn rectangle(width: f64, height: f64) -> Polygon {
     .expect("a rectangle with positive sides")
 }
 
-/// Lattice nodes of a rectangle, `columns` × `rows` intervals; interior nodes are moved by up to `jitter` (fraction of
-/// the spacing) in each direction.
+/// Lattice nodes of a rectangle of this size, `columns` × `rows` intervals; interior nodes are moved by up to `jitter`
+/// (fraction of the spacing) in each direction.
 pub fn jittered_rectangle(
-    width: f64,
-    height: f64,
-    columns: usize,
-    rows: usize,
+    [width, height]: [f64; 2],
+    [columns, rows]: [usize; 2],
     jitter: f64,
     seed: u64,
 ) -> Vec<Point<2>> {

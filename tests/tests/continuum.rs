@@ -61,7 +61,10 @@ fn every_method_converges_to_the_continuum_on_graded_nodes() {
     let scene = Scene::bundled("paper").unwrap().without_inclusions();
     let limits = limits("paper", "homogeneous");
     for (integration, at_level_2) in [
+        (Integration::Dni, 0.02),
         (Integration::Scni, 0.015),
+        (Integration::ScniStabilised, 0.004),
+        (Integration::Mscni, 0.004),
         (Integration::Nsni, 0.004),
         (Integration::Gauss, 0.004),
         (Integration::FemT3, 0.015),

@@ -55,7 +55,7 @@ fn elements_follow_the_outlines_of_inclusions_on_even_nodes_too() {
 
 /// A jittered body of the paper's law, with its rule.
 fn body(integration: Integration) -> (Planar, Tissue) {
-    let nodes = jittered_rectangle(1.0, 1.0, 6, 6, 0.3, 3);
+    let nodes = jittered_rectangle([1.0, 1.0], [6, 6], 0.3, 3);
     let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes, None, Method::new(integration)).unwrap();
     let tissue = Tissue::uniform(Scene::bundled("paper").unwrap().material, planar.cells().len());
     (planar, tissue)
@@ -131,7 +131,7 @@ fn the_energy_is_the_same_after_a_rotation() {
 fn without_the_stabilisation_a_checkerboard_is_free_inside_and_with_it_it_is_not() {
     // The energy of the checkerboard in the interior of a lattice, over that of the same nodes sheared by as much.
     let share = |integration| {
-        let nodes = jittered_rectangle(1.0, 1.0, 20, 20, 0.0, 1);
+        let nodes = jittered_rectangle([1.0, 1.0], [20, 20], 0.0, 1);
         let planar =
             Planar::new(&rectangle(1.0, 1.0), &[], nodes, None, Method { support: 1.49, ..Method::new(integration) })
                 .unwrap();

@@ -2,7 +2,7 @@
 //! implementation made, good to about 0.1 %.
 
 use model_offline::model::TissueModel;
-use model_offline::placement::adaptive::Reference;
+use model_offline::placement::reference::Reference;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::schema::PlantModel;
 use model_offline::scene::{BUNDLED, Scene};

@@ -15,7 +15,7 @@ struct Imposed {
 }
 
 fn imposed() -> Imposed {
-    let nodes = jittered_rectangle(1.0, 1.0, 5, 5, 0.2, 3);
+    let nodes = jittered_rectangle([1.0, 1.0], [5, 5], 0.2, 3);
     let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes, None, Method::new(Integration::Scni)).unwrap();
     let law = Law::fung(383.0, 318.5, 40.0, 1.5, 1.0).unwrap();
     let tissue = Tissue::uniform(law, planar.cells().len());

@@ -3,9 +3,8 @@
 use super::common::{Common, no_such_paddle};
 use super::error::CliError;
 use model_offline::discretization::Resolution;
-use model_offline::model::TissueModel;
 use model_offline::output;
-use model_offline::placement::best_dynamic;
+use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
 use model_offline::study::Extent;
 use model_offline::study::stability;
@@ -40,7 +39,7 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
     let paddle = match args.paddle {
         Some(index) if scene.paddles.iter().any(|p| p.index == index) => index,
         Some(index) => return Err(no_such_paddle(scene, index)),
-        None => best_dynamic(&TissueModel::new(&scene.without_inclusions())?)?,
+        None => model_with_paddle(&scene.without_inclusions(), None)?.1,
     };
     output::make_folder(&args.out)?;
     let plan = stability::Plan::new(scene, Extent::of_flag(args.quick));

@@ -6,7 +6,7 @@
 //! tolerance. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
 
 use super::goal_oriented;
-pub use super::reference::{Reference, distance};
+use super::reference::Reference;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Integration, Resolution};

@@ -311,11 +311,13 @@ mod tests {
             let [first, second] = sampling.next(misfit);
             assert!(!first.is_empty() && !second.is_empty());
             assert!(first.iter().all(|(q, _)| second.iter().all(|(other, _)| q != other)));
-            // Both weigh the whole body, more or less.
+            // Each weighs the body within a third: weights of a sample that missed a part of it would not.
             let rule = model.rule();
             let area = |sample: &[(usize, f64)]| sample.iter().map(|&(q, w)| w * rule.point(q).weight).sum::<f64>();
             let whole: f64 = rule.points().map(|p| p.weight).sum();
-            println!("{} {} {} of {whole}", first.len(), area(&first), area(&second));
+            for share in [area(&first) / whole, area(&second) / whole] {
+                assert!((0.67..1.5).contains(&share), "{share} of the body");
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 use super::extent::Extent;
 use crate::discretization::{Basis, Discretization, Integration, Method, Resolution};
 use crate::model::{ModelError, TissueModel};
-use crate::placement::adaptive::Reference;
+use crate::placement::reference::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::scene::Scene;
 use std::time::Instant;

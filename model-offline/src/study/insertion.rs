@@ -2,11 +2,12 @@
 
 use super::candidates::base_spacing;
 use super::extent::Extent;
-use super::measurement::{Job, Linearity, ModelKind, Point};
+use super::measurement::{Job, Linearity, ModelKind, Point, PointFailure};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::material::{Law, Material};
 use crate::model::{ModelError, TissueModel};
 use crate::placement::rest::rest_responses;
+use crate::placement::study::best_dynamic;
 use crate::reduction::{Condensed, Invalid, TrainingOptions, train};
 use crate::scene::Scene;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
@@ -138,7 +139,7 @@ pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertio
                 point.wall_s = start.elapsed().as_secs_f64();
                 match outcome {
                     Ok(profile) => point.error_static = profile_distance(&profile, &reference),
-                    Err(error) => point.failure = Some(error.to_string()),
+                    Err(error) => point.failure = Some(error.into()),
                 }
                 points.push(point);
             }
@@ -158,7 +159,8 @@ pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) ->
     let mut points = Vec::new();
     for candidate in candidates {
         let model = build(scene, candidate)?;
-        let paddle = best_dynamic(&model)?;
+        let index = best_dynamic(&model)?;
+        let paddle = model.paddle_position(index).ok_or(ModelError::NoSuchPaddle(index))?;
         let reference = vec![reference[paddle].clone()];
         let ticks = extent.choose(TICKS, 200);
         let mut body = model.body(Some(paddle), NewtonSettings::SMALL_STEPS)?;
@@ -192,25 +194,20 @@ fn reduced_point(scene: &Scene, model: &TissueModel, paddle: usize, reference: &
             });
             timed(empty, reference, measured)
         }
-        Err(error) => Point { failure: Some(error.to_string()), ..empty },
+        Err(error) => Point { failure: Some(error.into()), ..empty },
     }
 }
 
 /// A point with its time and error, or with why it has none.
-fn timed<E: std::fmt::Display>(mut point: Point, reference: &Profile, measured: Result<(f64, Profile), E>) -> Point {
+fn timed<E: Into<PointFailure>>(mut point: Point, reference: &Profile, measured: Result<(f64, Profile), E>) -> Point {
     match measured {
         Ok((wall_s, profile)) => {
             point.wall_s = wall_s;
             point.error_static = profile_distance(&profile, reference);
         }
-        Err(error) => point.failure = Some(error.to_string()),
+        Err(error) => point.failure = Some(error.into()),
     }
     point
-}
-
-fn best_dynamic(model: &TissueModel) -> Result<usize, ModelError> {
-    let index = crate::placement::study::best_dynamic(model)?;
-    Ok(model.paddle_position(index).unwrap_or(0))
 }
 
 /// Mean time of a tick over the insertion, best of three, and the displacements at the increments' depths.

@@ -1,7 +1,12 @@
 //! One setting of a method, measured: time and errors of a job.
 
 use crate::discretization::{Discretization, Resolution};
+use crate::model::ModelError;
+use crate::reduction::Invalid;
+use crate::reduction::train::TrainingError;
+use crate::solver::equilibrium::Failure;
 use serde::Serialize;
+use std::convert::Infallible;
 use strum::{Display, VariantArray};
 
 /// One setting, measured.
@@ -26,9 +31,29 @@ pub struct Point {
     /// Worst error of the target displacement, over the largest.
     pub error_static: f64,
     /// Why it failed.
-    pub failure: Option<String>,
+    pub failure: Option<PointFailure>,
     /// Whether nothing is both faster and more accurate.
     pub on_front: bool,
+}
+
+/// Why a setting has no time or no error.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum PointFailure {
+    /// It cannot be built, or solved at rest.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// An equilibrium on the way was not found.
+    #[error(transparent)]
+    Solve(#[from] Failure),
+    /// It cannot be reduced.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// The reduced model has no answer somewhere.
+    #[error(transparent)]
+    Reduced(#[from] Invalid),
+    /// Never: the condensed model always answers.
+    #[error(transparent)]
+    None(#[from] Infallible),
 }
 
 /// What is charted.

@@ -14,7 +14,7 @@ use super::measurement::{Job, Linearity, Point};
 use crate::discretization::Discretization;
 use crate::model::ModelError;
 use crate::output::csv::table;
-use crate::placement::adaptive::Reference;
+use crate::placement::reference::Reference;
 use crate::scene::Scene;
 use strum::VariantArray as _;
 
@@ -84,7 +84,7 @@ fn placement_point(discretization: Discretization, scene: &Scene, reference: &Re
         }
         Err(error) => {
             point.wall_s = start.elapsed().as_secs_f64();
-            point.failure = Some(error.to_string());
+            point.failure = Some(error.into());
         }
     }
     point
@@ -154,7 +154,7 @@ impl Pareto {
                 p.failure.is_some().to_string(),
                 p.on_front.to_string(),
                 p.job.to_string(),
-                p.failure.clone().unwrap_or_default(),
+                p.failure.as_ref().map_or_else(String::new, ToString::to_string),
             ]
         })
     }
@@ -171,7 +171,7 @@ mod tests {
         let at =
             |wall_s, error_cm| Point { wall_s, error_cm, ..Point::new(Job::Placement, candidate, Linearity::Linear) };
         let mut points = vec![at(1.0, 0.1), at(2.0, 0.2), at(3.0, 0.05), at(0.5, 0.3), at(0.4, f64::NAN)];
-        points.push(Point { failure: Some("x".into()), ..at(0.1, 0.01) });
+        points.push(Point { failure: Some(ModelError::NoPaddleControls.into()), ..at(0.1, 0.01) });
         mark_front(&mut points, Job::Placement);
         assert_eq!(points.iter().map(|p| p.on_front).collect::<Vec<_>>(), [true, false, true, true, false, false]);
     }

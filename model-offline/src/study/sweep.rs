@@ -6,7 +6,7 @@ use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Series};
 use crate::output::csv;
 use crate::parallel;
-use crate::placement::adaptive::Reference;
+use crate::placement::reference::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::scene::Scene;
 use std::fmt::Write as _;
@@ -66,6 +66,14 @@ pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Res
 /// Number of times [`sweep`] calls its progress function.
 pub const STEPS: u64 = 3 * SPACINGS.len() as u64 + 6;
 
+/// A mesh, or the limit, with what its model answers.
+struct Row<'s> {
+    rule: String,
+    mesh: String,
+    nodes: usize,
+    responses: &'s [RestResponse],
+}
+
 /// Columns of the CSV.
 const COLUMNS: [&str; 8] = [
     "integration",
@@ -92,32 +100,33 @@ impl Sweep {
         (best(&|r| self.orthogonal(r).abs()), best(&|r| r.controllability_measure))
     }
 
-    fn rows(&self) -> impl Iterator<Item = (String, String, usize, &[RestResponse])> {
+    fn rows(&self) -> impl Iterator<Item = Row<'_>> {
         let meshes = self.steps.iter().filter_map(|step| {
-            let nodes = match step.discretization.resolution {
+            let mesh = match step.discretization.resolution {
                 Resolution::Spacing(h) => format!("uniform {}", (h * 1e6).round() / 1e6),
                 Resolution::Level(level) => format!("level {level}"),
                 other @ Resolution::Tolerance(_) => other.to_string(),
             };
             let rule = step.discretization.method.integration.to_string();
-            Some((rule, nodes, step.nodes, step.responses.as_deref().ok()?))
+            Some(Row { rule, mesh, nodes: step.nodes, responses: step.responses.as_deref().ok()? })
         });
-        let limit = ("limit".to_owned(), "extrapolated".to_owned(), self.reference.nodes, self.reference.responses());
-        meshes.chain([limit])
+        let (rule, mesh) = ("limit".to_owned(), "extrapolated".to_owned());
+        meshes.chain([Row { rule, mesh, nodes: self.reference.nodes, responses: self.reference.responses() }])
     }
 
     /// One line per mesh and paddle.
     pub fn csv(&self) -> Vec<u8> {
-        let lines = self.rows().flat_map(|(rule, mesh, nodes, responses)| {
-            let optima = self.optima(responses);
-            let paddles = self.scene.paddles.iter().zip(responses);
-            paddles.map(move |(paddle, response)| (rule.clone(), mesh.clone(), nodes, optima, paddle.index, response))
+        let rows: Vec<Row<'_>> = self.rows().collect();
+        let lines = rows.iter().flat_map(|row| {
+            let optima = self.optima(row.responses);
+            let paddles = self.scene.paddles.iter().zip(row.responses);
+            paddles.map(move |(paddle, response)| (row, optima, paddle.index, response))
         });
-        csv::table(COLUMNS, lines, |(rule, mesh, nodes, (best_static, best_dynamic), paddle, response)| {
+        csv::table(COLUMNS, lines, |(row, (best_static, best_dynamic), paddle, response)| {
             [
-                rule,
-                mesh,
-                nodes.to_string(),
+                row.rule.clone(),
+                row.mesh.clone(),
+                row.nodes.to_string(),
                 paddle.to_string(),
                 format!("{:.6}", response.controllability_measure),
                 format!("{:.6}", self.orthogonal(response)),
@@ -131,7 +140,7 @@ impl Sweep {
     pub fn table(&self) -> String {
         let mut out =
             format!("{:<8} {:<16} {:>7} {:>13} {:>14}\n", "method", "mesh", "nodes", "best static", "best dynamic");
-        for (rule, mesh, nodes, responses) in self.rows() {
+        for Row { rule, mesh, nodes, responses } in self.rows() {
             let (best_static, best_dynamic) = self.optima(responses);
             let _ = writeln!(out, "{rule:<8} {mesh:<16} {nodes:>7} {best_static:>13} {best_dynamic:>14}");
         }

@@ -33,6 +33,19 @@ struct Step {
     indefinite: bool,
 }
 
+/// Whether the factor at hand serves the next step.
+#[derive(Clone, Copy, PartialEq)]
+enum Factor {
+    Usable,
+    Stale,
+}
+
+impl Factor {
+    fn usable_if(condition: bool) -> Self {
+        if condition { Self::Usable } else { Self::Stale }
+    }
+}
+
 pub(super) enum Attempt {
     Converged,
     Failed(FailureReason, String),
@@ -60,7 +73,7 @@ impl<const D: usize> Equilibrium<D> {
 
     /// Newton's step at the current state and the multipliers after it; `residual` is the relative one that the last step
     /// left.
-    fn newton_step(&mut self, usable: bool, residual: f64, step: &mut Step) -> Result<(), Attempt> {
+    fn newton_step(&mut self, factor: Factor, residual: f64, step: &mut Step) -> Result<(), Attempt> {
         let Step { rhs, gap, .. } = step;
         self.solver.constrained().apply::<D>(&self.at.coefficients, gap);
         for (g, p) in gap.iter_mut().zip(&self.at.prescribed) {
@@ -71,7 +84,7 @@ impl<const D: usize> Equilibrium<D> {
         }
         step.feasible = step.gap.iter().all(|g| g.abs() <= FEASIBLE * self.spacing);
         self.effort.iterations += 1;
-        if !usable {
+        if factor == Factor::Stale {
             let iterates = self.iterates();
             self.assemble();
             if iterates && self.step_by_iteration(residual, step) {
@@ -144,11 +157,11 @@ impl<const D: usize> Equilibrium<D> {
             indefinite: false,
         };
         let may_reuse = self.settings.reuse_tangent || self.tissue.is_linear();
-        let mut factor_usable = self.factor_is_current || (may_reuse && self.factor_exists);
+        let mut factor = Factor::usable_if(self.factor_is_current || (may_reuse && self.factor_exists));
         let mut last_residual = f64::INFINITY;
         self.residuals.clear();
         for iteration in 0..self.settings.max_iterations {
-            if let Err(failed) = self.newton_step(factor_usable, last_residual, &mut step) {
+            if let Err(failed) = self.newton_step(factor, last_residual, &mut step) {
                 return failed;
             }
             let slope = dot(&step.step, &self.at.force);
@@ -187,7 +200,7 @@ impl<const D: usize> Equilibrium<D> {
                 let detail = format!("residual {residual:.1e} after {} iterations", iteration + 1);
                 return Attempt::Failed(FailureReason::NotConverged, detail);
             }
-            factor_usable = linear || (may_reuse && !step.indefinite && residual < 0.25 * last_residual);
+            factor = Factor::usable_if(linear || (may_reuse && !step.indefinite && residual < 0.25 * last_residual));
             last_residual = residual;
         }
         Attempt::Failed(FailureReason::NotConverged, "no iterations allowed".into())

@@ -5,7 +5,7 @@ use super::rejection::{Candidate, Rejected, RejectionReason};
 use super::search::{Search, Trials, Unfit, cheapest};
 use crate::discretization::Discretization;
 use crate::model::{ModelError, TissueModel};
-use crate::placement::adaptive::{Reference, distance};
+use crate::placement::reference::{Reference, distance};
 use crate::placement::rest::rest_responses;
 use crate::scene::Scene;
 use crate::study::candidates::{Assessment, assess, assess_model, families};

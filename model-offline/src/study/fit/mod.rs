@@ -27,7 +27,7 @@ use super::candidates::{Assessment, assess};
 use super::measurement::Linearity;
 use crate::discretization::{Basis, Integration, Resolution};
 use crate::model::TissueModel;
-use crate::placement::adaptive::Reference;
+use crate::placement::reference::Reference;
 use crate::scene::Scene;
 use crate::scene::schema::{PlantModel, TableScalar};
 use crate::table::TableBuildError;

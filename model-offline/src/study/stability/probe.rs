@@ -82,7 +82,7 @@ pub fn run(scene: &Scene, paddle: usize, setting: &Experiment) -> ExperimentResu
     };
     let nodes = jittered(&scene, setting);
     let count = nodes.len();
-    let model = match discretise(&scene, nodes, setting) {
+    let model = match with_nodes(&scene, nodes, setting) {
         Ok(model) => model,
         Err(error) => return stopped(count, error),
     };
@@ -190,7 +190,7 @@ fn jittered(scene: &Scene, setting: &Experiment) -> Vec<Point2> {
     nodes
 }
 
-fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Experiment) -> Result<TissueModel, ModelError> {
+fn with_nodes(scene: &Scene, nodes: Vec<Point2>, setting: &Experiment) -> Result<TissueModel, ModelError> {
     let planar =
         Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(setting.spacing), setting.method)?;
     TissueModel::on(scene, planar, setting.spacing)
@@ -203,5 +203,5 @@ fn discretise(scene: &Scene, nodes: Vec<Point2>, setting: &Experiment) -> Result
 pub(super) fn model(scene: &Scene, setting: &Experiment) -> Result<TissueModel, ModelError> {
     let scene = scene.without_inclusions();
     let nodes = jittered(&scene, setting);
-    discretise(&scene, nodes, setting)
+    with_nodes(&scene, nodes, setting)
 }
