@@ -33,7 +33,7 @@ pub(crate) struct File {
     pub(crate) module: Vec<String>,
 }
 
-/// Modules and files of a library, modules of tests left out. The first module is the root.
+/// Modules and files of a library or a program, modules of tests left out. The first module is the root.
 #[derive(Debug)]
 pub(crate) struct Crate {
     pub(crate) name: String,
@@ -43,11 +43,11 @@ pub(crate) struct Crate {
 }
 
 impl Crate {
-    /// Reads the library whose root is `lib.rs` in `src`.
-    pub(crate) fn read(src: &Path) -> Self {
+    /// Reads the library or the program whose root is this file in `src`.
+    pub(crate) fn read(src: &Path, root: &str) -> Self {
         let name = src.parent().and_then(Path::file_name).map_or(String::new(), |n| n.to_string_lossy().into_owned());
         let mut this = Self { name, src: src.to_owned(), modules: Vec::new(), files: Vec::new() };
-        this.read_file(PathBuf::from("lib.rs"), Vec::new(), None);
+        this.read_file(PathBuf::from(root), Vec::new(), None);
         this
     }
 
