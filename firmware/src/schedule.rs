@@ -234,10 +234,15 @@ mod tests {
     #[test]
     fn a_stopped_process_leaves_one_gap() {
         let mut schedule = Schedule::new(0, PERIOD);
-        tick(&mut schedule, 1000);
+        tick(&mut schedule, PERIOD);
+        assert_eq!((schedule.overruns(), schedule.deadline_misses()), (0, 0), "a whole period is in time");
         let release = schedule.begin(101 * PERIOD + 17);
         assert_eq!((release.tick, release.release_lateness_ns), (101, 17));
         assert_eq!((schedule.skipped(), schedule.overruns()), (100, 1));
+        for misses in 1..4 {
+            tick(&mut schedule, PERIOD + 1);
+            assert_eq!(schedule.deadline_misses(), misses);
+        }
     }
 
     #[test]

@@ -112,6 +112,20 @@ mod tests {
     }
 
     #[test]
+    fn jacobians_are_linear_between_knots() {
+        let mut table = table();
+        let at_start = table.knots[0].jacobian;
+        for knot in &mut table.knots {
+            knot.jacobian = at_start * (1.0 + 10.0 * knot.depth);
+        }
+        for step in 0..=100 {
+            let depth = 0.1 * f64::from(step) / 100.0;
+            let found = table.locate(depth).unwrap().jacobian();
+            assert!((found - at_start * (1.0 + 10.0 * depth)).norm() < 1e-15, "{depth}: {found}");
+        }
+    }
+
+    #[test]
     fn outside_is_clamped_and_flagged() {
         let table = table();
         for (outside, end) in [(-0.01, 0.0), (0.11, 0.1)] {

@@ -26,24 +26,29 @@
 //! free-run both processes follow the machine's steady clock with absolute deadlines. Either way every tick is recorded and
 //! every sample accounted for ([`runtime::accounting::accounts`]).
 //!
-//! The controller with a tissue that is linear about its own table, in one thread and virtual time:
+//! An insertion without a paddle, and with the best static one:
 //!
 //! ```
-//! use host_sim::bench::{faults::closed_loop::{ClosedLoop, Setup}, paper_table::paper_table};
+//! use host_sim::{Label, LoopSettings, SimulatedInsertion, Simulation};
+//! use model_offline::{Scene, PlacementOptions, PlacementStudy};
 //!
-//! # fn main() -> Result<(), host_sim::SimError> {
-//! let table = paper_table()?;
-//! let mut closed_loop = ClosedLoop::new(&table, Setup::new(&table, 1))?;
-//! closed_loop.run(5_500);
-//! assert_eq!(closed_loop.mode(), firmware::Mode::Run);
-//! assert!(closed_loop.max_error < 1e-3 * table.validity.depth_end);
-//! assert_eq!(closed_loop.unaccounted(), 0);
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let scene = Scene::bundled("paper").expect("it comes with the program");
+//! let PlacementStudy { model, placement, .. } = PlacementStudy::run(&scene, &PlacementOptions::default())?;
+//! let loop_settings = LoopSettings { rate: 50.0, ..LoopSettings::default() };
+//! let simulation = Simulation { loop_settings, ..Simulation::new(&scene).with_insertion(1.0) };
+//! let label = Label { tissue: "inclusion", table_tissue: "inclusion", strategy: "static" };
+//! let insertion = SimulatedInsertion::new(&model, &simulation, &label);
+//!
+//! let without = insertion.uncontrolled(None)?.result;
+//! let held = insertion.uncontrolled(Some(placement.optimum.static_paddle))?.result;
+//! assert!(held.max_orthogonal_error < without.max_orthogonal_error);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! A [`SimulatedInsertion`] has the full tissue and the controller in a process of its own; a [`Comparison`] is what
-//! `host-sim run` does.
+//! With a [`ControllerSetup`] the paddle moves, and the controller has a process of its own; a [`Comparison`] of all three
+//! is what `host-sim run` does.
 
 pub mod bench;
 pub mod exchange;

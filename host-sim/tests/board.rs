@@ -1,5 +1,8 @@
 //! The controller at the end of a serial line: in a thread of this process always, in QEMU where it is installed.
 
+mod emulator;
+mod missing;
+
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
@@ -12,12 +15,14 @@ use host_sim::bench::faults::shuttle::ShuttleDrive;
 use host_sim::bench::faults::tissue::LinearTissue;
 use host_sim::bench::paper_table::paper_table;
 use host_sim::exchange::board::tamper::{Damage, Tamper};
-use host_sim::exchange::board::{BoardError, Device, Image, Processor, SerialLine};
+use host_sim::exchange::board::{Device, SerialLine};
 use host_sim::runtime::executor::encode_as;
 use host_sim::world::actuator::{ActuatorModel, PaddleActuator};
 use host_sim::world::sensors::{Encoders, TargetSensor};
 use host_sim::world::{Sensors, World};
 use nalgebra::Vector2;
+
+use self::emulator::image;
 
 const MS: u64 = 1_000_000;
 /// Long against a step, even on a busy machine; short for a test that loses some.
@@ -222,20 +227,6 @@ fn a_silent_host_leads_to_hold_and_then_to_safe() {
     plant.tick = 801;
     let again = drive(&mut device, &mut plant, 100);
     assert_eq!(again.last.state, Mode::Run as u32, "{}", Faults::from_bits(again.last.faults));
-}
-
-/// The image in QEMU, or `None` and a word about what is missing. In CI nothing may be missing.
-fn image(scalar: ScalarKind) -> Option<Image> {
-    let image = Image::build(scalar, Processor::Double);
-    let missing = match image {
-        Ok(image) if host_sim::exchange::board::Qemu::is_installed() => return Some(image),
-        Ok(_) => BoardError::NoQemu { program: host_sim::exchange::board::qemu::PROGRAM },
-        Err(missing @ BoardError::NoTarget { .. }) => missing,
-        Err(other) => panic!("{other}"),
-    };
-    assert!(std::env::var_os("CI_NEEDS_QEMU").is_none(), "{missing}");
-    eprintln!("skipped: the controller on a Cortex-M7 in QEMU was not tested: {missing}");
-    None
 }
 
 fn host_sim(arguments: &[&str]) {

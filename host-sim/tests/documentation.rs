@@ -1,6 +1,8 @@
 //! Every command line of the README and of the guides is run, in the order of its page, in a folder of its own. Fenced blocks
 //! after a comment `<!-- not run by tests: WHY -->` are left out.
 
+mod missing;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -45,10 +47,8 @@ fn commands(page: &str) -> Vec<String> {
 fn every_command_shown_works() {
     let model_offline = Path::new(HOST_SIM).with_file_name("model-offline");
     if !model_offline.is_file() {
-        println!(
-            "skipped: model-offline is not built; `cargo test --workspace` does, or `cargo build --workspace` before"
-        );
-        return;
+        let missing = "model-offline is not built; `cargo test --workspace` does, or `cargo build --workspace` before";
+        return missing::skip("every command shown", missing);
     }
     for page in pages() {
         let text = std::fs::read_to_string(&page).unwrap();

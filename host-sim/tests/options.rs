@@ -2,6 +2,8 @@
 //! file that is left half made. The options come from clap's own command tree, by way of the completion script, so that
 //! new ones are tried without anybody's doing. `STILLPOINT_OPTIONS=all` tries every value on every option.
 
+mod missing;
+
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -85,7 +87,8 @@ fn programs() -> Vec<Program> {
     programs.retain(|program| {
         let is_built = program.path.is_file();
         if !is_built {
-            println!("skipped: {} is not built; `cargo test --workspace` does", program.path.display());
+            let path = program.path.display();
+            missing::skip("every option of it", format!("{path} is not built; `cargo test --workspace` does"));
         }
         is_built
     });

@@ -252,9 +252,16 @@ fn two_terminals_find_each_other_in_any_order() {
     }
 }
 
-/// A controller in free-run whose plant is stopped for a while, re-armed or not: its last mode and its recording.
-fn after_a_stopped_plant(folder: &Path, rearms: bool) -> (String, Recording) {
-    let link = format!("rearm-{}-{rearms}", std::process::id());
+/// What somebody does about a controller in SAFE.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Operator {
+    Waits,
+    Rearms,
+}
+
+/// A controller in free-run whose plant is stopped for a while: its last mode and its recording.
+fn after_a_stopped_plant(folder: &Path, operator: Operator) -> (String, Recording) {
+    let link = format!("rearm-{}-{operator:?}", std::process::id());
     let [table, record, json] = ["own.table", "controller.rec", "controller.json"].map(|name| folder.join(name));
     // The record of another run would be long enough at once.
     let _ = std::fs::remove_file(&record);
@@ -275,7 +282,7 @@ fn after_a_stopped_plant(folder: &Path, rearms: bool) -> (String, Recording) {
     std::thread::sleep(Duration::from_millis(1500));
     signal(plant.id(), "CONT");
     std::thread::sleep(Duration::from_millis(300));
-    if rearms {
+    if operator == Operator::Rearms {
         succeeded(&host_sim().arg("rearm").arg(controller.id().to_string()).output().unwrap());
     }
     assert!(plant.wait().unwrap().success() && controller.wait().unwrap().success());
@@ -293,13 +300,13 @@ fn a_controller_leaves_safe_when_somebody_rearms_it_and_not_before() {
     let options = model_offline::table::TableOptions { knots: 3, ..Default::default() };
     let table = model_offline::table::build(&model, 3, &options).unwrap();
     std::fs::write(folder.path().join("own.table"), model_offline::table::to_bytes(&table).unwrap()).unwrap();
-    for rearms in [false, true] {
-        let (last, recording) = after_a_stopped_plant(folder.path(), rearms);
+    for operator in [Operator::Waits, Operator::Rearms] {
+        let (last, recording) = after_a_stopped_plant(folder.path(), operator);
         let modes: Vec<u32> = recording.records.iter().map(|record| record.tick.command.state).collect();
         let safe = modes.iter().position(|mode| *mode == Mode::Safe as u32).expect("the ages lead to SAFE");
         assert!(modes[..safe].contains(&(Mode::Run as u32)));
         let runs_again = modes[safe..].contains(&(Mode::Run as u32));
-        assert_eq!(runs_again, rearms, "final state {last}");
+        assert_eq!(runs_again, operator == Operator::Rearms, "{operator:?}: final state {last}");
     }
 }
 

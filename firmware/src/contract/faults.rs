@@ -252,5 +252,6 @@ mod tests {
         }
         assert_eq!((Faults::TARGET_LOST | Faults::OVERRUN).to_string(), "TARGET_LOST | OVERRUN");
         assert_eq!(Faults::NONE.to_string(), "NONE");
+        assert_eq!(std::format!("{:?}", Faults::TARGET_LOST | Faults::OVERRUN), "TARGET_LOST | OVERRUN");
     }
 }

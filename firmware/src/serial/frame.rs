@@ -303,6 +303,15 @@ mod tests {
     }
 
     #[test]
+    fn messages_of_another_version_are_counted() {
+        let mut reader = FrameReader::new();
+        for count in 1..4 {
+            reader.count_unknown();
+            assert_eq!(*reader.ledger(), LineLedger { unknown: count, ..LineLedger::new() });
+        }
+    }
+
+    #[test]
     fn a_message_too_large_for_a_frame_is_not_sent() {
         let mut writer = FrameWriter::new();
         let large = [1u8; 32];

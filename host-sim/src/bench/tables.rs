@@ -10,7 +10,6 @@ use firmware::contract::{MAX_TABLE_BYTES, PaddleCommand, Table, encode};
 use firmware::scalar::{Scalar, ScalarKind};
 use firmware::{Controller, Faults, Inputs, State};
 use model_offline::model::TissueModel;
-use model_offline::placement::best_dynamic;
 use model_offline::reduction::{TrainingOptions, train};
 use model_offline::table::{TableOptions, build};
 use nalgebra::Vector2;
@@ -56,12 +55,16 @@ impl TableTrial {
     }
 }
 
-/// Tries tables of the best dynamic paddle, each in both number types; `progress` is called after each number of knots.
+/// Tries tables of a paddle, each in both number types; `progress` is called after each number of knots.
 ///
 /// # Errors
-/// [`SimError`]: there is no paddle, no table, or no reduced model to close the loop on.
-pub fn compare(model: &TissueModel, threads: usize, progress: &dyn Fn()) -> Result<Vec<TableTrial>, SimError> {
-    let paddle = best_dynamic(model)?;
+/// [`SimError`]: there is no table, or no reduced model to close the loop on.
+pub fn compare(
+    model: &TissueModel,
+    paddle: u32,
+    threads: usize,
+    progress: &dyn Fn(),
+) -> Result<Vec<TableTrial>, SimError> {
     let position = model.paddle_position(paddle);
     let options = TrainingOptions { threads, ..TrainingOptions::default() };
     let (trained, _) = train(model, position, &options).map_err(WorldError::Training)?;
@@ -163,12 +166,14 @@ fn step_ns<T: Scalar>(table: &Table<T, 2>, simulation: &Simulation, inputs: &[In
 #[cfg(test)]
 mod tests {
     use super::*;
+    use model_offline::placement::model_with_paddle;
     use model_offline::scene::Scene;
 
     #[test]
     fn every_table_holds_the_target_and_single_precision_costs_nothing() {
         let scene = Scene::bundled("paper").unwrap().without_inclusions();
-        let trials = compare(&TissueModel::new(&scene).unwrap(), 2, &|| {}).unwrap();
+        let (model, paddle) = model_with_paddle(&scene, None).unwrap();
+        let trials = compare(&model, paddle, 2, &|| {}).unwrap();
         assert_eq!(trials.len(), 2 * KNOTS.len());
         assert!(trials.iter().all(TableTrial::worked), "{trials:?}");
         let of = |knots: usize, scalar: ScalarKind| {

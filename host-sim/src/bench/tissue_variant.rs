@@ -6,8 +6,21 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which tissue.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+    clap::ValueEnum,
+    strum::Display,
+    strum::IntoStaticStr,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum TissueVariant {
     /// The scene without its inclusions.
     Homogeneous,
@@ -20,11 +33,8 @@ impl TissueVariant {
     pub const ALL: [Self; 2] = [Self::Homogeneous, Self::Inclusion];
 
     /// Name in results, tables and files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Homogeneous => "homogeneous",
-            Self::Inclusion => "inclusion",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 
     /// The scene with this tissue.
@@ -33,12 +43,6 @@ impl TissueVariant {
             Self::Homogeneous => scene.without_inclusions(),
             Self::Inclusion => scene.clone(),
         }
-    }
-}
-
-impl std::fmt::Display for TissueVariant {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use host_sim::SimError;
-use host_sim::bench::board::measure::{self, Budget, Figures, MeasureError};
+use host_sim::bench::board::measure::{self, Budget, Complaint, Figures, MeasureError};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
@@ -43,13 +43,13 @@ pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
         let name = measure::name(&image);
         let figures = measure::measure(&image, &scenarios)?;
         if args.twice && measure::measure(&image, &scenarios)? != figures {
-            complaints.push(format!("{name}: two runs gave different figures"));
+            complaints.push(Complaint::Unsteady { image: name.clone() });
         }
         print!("{}", table(&name, &figures));
         if let Some(budget) = &budget {
             match budget.get(&name) {
                 Some(allowed) => complaints.extend(measure::exceeded(&figures, allowed, &name)),
-                None => complaints.push(format!("{name}: the budget does not have it")),
+                None => complaints.push(Complaint::NotInBudget { image: name.clone() }),
             }
         }
         measured.insert(name, figures);

@@ -104,7 +104,11 @@ fn without_monitors(args: &FaultsArgs, table: &Table<f64, 2>) -> Result<(), SimE
     let monitors = signals::ends_at_once(|| monitors_off(table, args.seed))?;
     for MonitorOff { monitor, rows } in &monitors {
         let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
-        println!("{monitor:<20}  {}", if rows.is_empty() { "nobody notices".to_owned() } else { rows.join(" ") });
+        println!(
+            "{:<20}  {}",
+            monitor.to_string(),
+            if rows.is_empty() { "nobody notices".to_owned() } else { rows.join(" ") }
+        );
     }
     if let Some(path) = &args.json {
         write_json(path, &monitors)?;

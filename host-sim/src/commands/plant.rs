@@ -10,6 +10,7 @@ use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
 use host_sim::runtime::plant::PlantLoop;
 use host_sim::runtime::plant::process::{Expected, OnDeath, Visit, serve};
+use host_sim::runtime::plant::rehearsal::world_in_time;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::World;
@@ -67,7 +68,7 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let (model, paddle) = signals::ends_at_once(|| model_with_paddle(&scene, args.paddle))?;
     let world = signals::ends_at_once(|| match args.mode {
         RunMode::Lockstep => World::new(&model, Some(paddle), &simulation),
-        RunMode::FreeRun => World::in_time(&model, Some(paddle), &simulation),
+        RunMode::FreeRun => world_in_time(&model, Some(paddle), &simulation),
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let visit = Visit {

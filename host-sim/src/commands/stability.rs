@@ -5,14 +5,15 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::Progress as _;
-use host_sim::bench::loop_stability::behaviour::Detail;
 use host_sim::bench::loop_stability::simulate;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::studies::loop_stability::{csv, summary};
 use host_sim::report::studies::loop_stability_chart::figure;
 use host_sim::runtime::signals;
+use model_offline::parallel;
 use model_offline::scene::Scene;
+use model_offline::study::Extent;
 
 use super::world_args::threads_within_reason;
 
@@ -49,10 +50,9 @@ pub(crate) fn stability(args: &StabilityArgs) -> Result<(), SimError> {
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
     let bar = super::progress_bar(args.quiet);
     bar.begin(PARTS);
-    let all = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = threads_within_reason(args.threads.unwrap_or_else(all));
-    let detail = if args.quick { Detail::Quick } else { Detail::Fine };
-    let result = signals::ends_at_once(|| simulate(&scene, detail, threads, &|| bar.step()))?;
+    let threads = threads_within_reason(args.threads.unwrap_or_else(parallel::available));
+    let extent = Extent::of_flag(args.quick);
+    let result = signals::ends_at_once(|| simulate(&scene, extent, threads, &|| bar.step()))?;
     bar.finish_and_clear();
     write_bytes(&args.out.join("closed_loop.csv"), &csv(&result))?;
     write_bytes(&args.out.join("closed_loop.svg"), figure(&result).svg().as_bytes())?;

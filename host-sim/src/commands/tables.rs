@@ -10,7 +10,8 @@ use host_sim::bench::tissue_variant::TissueVariant;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::studies::tables::{csv, figure, summary};
-use model_offline::placement::discretise;
+use model_offline::parallel;
+use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
 
 use super::world_args::threads_within_reason;
@@ -42,12 +43,11 @@ pub(crate) struct TablesArgs {
 pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
     let scene = args.tissue.of(&Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?);
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
-    let all = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = threads_within_reason(args.threads.unwrap_or_else(all));
+    let threads = threads_within_reason(args.threads.unwrap_or_else(parallel::available));
     let bar = super::progress_bar(args.quiet);
     bar.begin(KNOTS.len() as u64);
-    let (model, _) = discretise(&scene)?;
-    let trials = compare(&model, threads, &|| bar.step())?;
+    let (model, paddle) = model_with_paddle(&scene, None)?;
+    let trials = compare(&model, paddle, threads, &|| bar.step())?;
     bar.finish_and_clear();
     write_bytes(&args.out.join("tables.csv"), &csv(&trials))?;
     let svg = figure(&trials, &scene.name, &scene.length_unit).svg();

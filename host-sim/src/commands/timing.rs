@@ -55,7 +55,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     super::sweep();
     RATE.check(args.rate)?;
     SECONDS.check(args.seconds)?;
-    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let processors = model_offline::parallel::available();
     if let Some(cpu) = args.cpu
         && cpu >= processors
     {

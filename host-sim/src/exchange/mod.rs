@@ -1,4 +1,5 @@
-//! The shared memory between plant and controller: five publish–subscribe services of iceoryx2, and nothing else.
+//! What goes between plant and controller: in shared memory five publish–subscribe services of iceoryx2 and nothing else,
+//! and the serial line to a controller on a [`board`].
 //!
 //! | service | from | to | when |
 //! |---|---|---|---|

@@ -15,7 +15,8 @@ use crate::exchange::board::{BoardError, Device, Image, Processor};
 use crate::runtime::error::RuntimeError;
 
 /// What computes the controller's steps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Hardware {
     /// The controller's process itself.
     #[default]
@@ -26,11 +27,8 @@ pub enum Hardware {
 
 impl Hardware {
     /// As on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Native => "native",
-            Self::Qemu => "qemu",
-        }
+    pub fn name(self) -> &'static str {
+        self.into()
     }
 }
 

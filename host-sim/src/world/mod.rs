@@ -10,7 +10,6 @@ pub mod actuator;
 pub mod error;
 pub mod loop_settings;
 pub mod needle;
-pub mod rehearsal;
 pub mod sensors;
 pub mod simulation;
 pub mod tissue;
@@ -24,10 +23,9 @@ use nalgebra::Vector2;
 use self::actuator::PaddleActuator;
 use self::error::WorldError;
 use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
-use self::rehearsal::rehearse;
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{PlantAccount, TissuePlant, TissueResponse, WantedPlant};
+use self::tissue::{PlantAccount, TissuePlant, TissueResponse};
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
@@ -77,34 +75,6 @@ impl<'m> World<TissuePlant<'m>> {
             encoders: Encoders::new(paddle_index.unwrap_or(0)),
         };
         Ok(Self::of(tissue, drive, PaddleActuator::new(simulation.actuator), sensors))
-    }
-
-    /// As [`World::new`], for a loop that the machine's clock drives: the tissue's step is timed before the run. A full
-    /// model that takes too long makes room for the reduced one, unless the full one was asked for.
-    ///
-    /// # Errors
-    /// [`WorldError`]; [`WorldError::TooSlow`] when no model keeps the period.
-    pub fn in_time(
-        model: &'m TissueModel,
-        paddle_index: Option<u32>,
-        simulation: &Simulation,
-    ) -> Result<Self, WorldError> {
-        let mut world = Self::new(model, paddle_index, simulation)?;
-        let full = rehearse(&mut world.tissue, simulation)?;
-        if full.keeps_the_period() {
-            return Ok(world);
-        }
-        if simulation.plant.is_some() {
-            return Err(full.too_slow());
-        }
-        let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..*simulation };
-        let Ok(mut world) = Self::new(model, paddle_index, &reduced) else { return Err(full.too_slow()) };
-        let rehearsed = rehearse(&mut world.tissue, simulation)?;
-        if !rehearsed.keeps_the_period() {
-            return Err(rehearsed.too_slow());
-        }
-        world.tissue.stands_in_for_full(full.step_us);
-        Ok(world)
     }
 
     /// Which model answered for the tissue, and how well.

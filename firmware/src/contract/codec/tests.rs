@@ -153,7 +153,9 @@ fn invariants_are_checked_by_writer_and_reader() {
     assert_eq!(invariant(|t| t.paddle.max_displacement = 1e-5), PathBeyondLimit { knot: 1 });
     assert_eq!(invariant(|t| t.paddle.max_displacement = 1.0), DisplacementRange);
     assert_eq!(invariant(|t| t.paddle.max_rate = 0.0), NotPositive { field: Field::PaddleRateLimit });
-    assert_eq!(invariant(|t| t.gains.loop_gain = 1.5), Gains);
+    for gain in [-0.25, 0.0, 1.0, 1.5] {
+        assert_eq!(invariant(|t| t.gains.loop_gain = gain), Gains, "{gain}");
+    }
     assert_eq!(invariant(|t| t.gains.lambda_max = 0.5), Gains);
     let nan = invariant(|t| t.knots[5].jacobian.m12 = f64::NAN);
     assert_eq!(nan, NotFinite { field: Field::KnotJacobian });

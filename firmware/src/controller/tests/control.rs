@@ -128,6 +128,29 @@ fn a_sign_error_is_found_before_saturation() {
     assert!(closed.state.faults().contains(Faults::DIVERGENCE) && !limited);
 }
 
+/// The ways of the paddle that the gate for jumps of the target allows for.
+#[test]
+fn the_way_of_the_paddle_is_summed_along_both_axes() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.plant.push = 0.035;
+    let mut way = [0.0; 2];
+    let mut before: Option<[f64; 2]> = None;
+    for _ in 0..3000 {
+        let command = closed.tick(|_| {});
+        if !command.is_valid() {
+            continue;
+        }
+        if let Some(before) = before {
+            way = core::array::from_fn(|axis| way[axis] + (command.displacement[axis] - before[axis]).abs());
+        }
+        before = Some(command.displacement);
+    }
+    assert!(way.iter().all(|along| *along > 1e-4), "{way:?}");
+    let summed = closed.state.gate.travel.paddle;
+    assert!((0..2).all(|axis| (summed[axis] - way[axis]).abs() < 1e-12), "{summed:?} instead of {way:?}");
+}
+
 #[test]
 fn the_delay_and_the_gain_in_use_are_told() {
     let table = table();

@@ -24,6 +24,17 @@ fn a_start_moves_nothing_and_restarts_where_the_paddle_is() {
 }
 
 #[test]
+fn the_ends_of_the_table_are_still_inside_of_it() {
+    let table = table();
+    for (depth, clamped) in [(-1e-6, true), (0.0, false), (0.1, false), (0.1 + 1e-6, true)] {
+        let mut closed = Loop::new(&table, &settings());
+        (closed.plant.depth, closed.plant.speed) = (depth, 0.0);
+        closed.tick(|_| {});
+        assert_eq!(closed.state.faults().contains(Faults::DEPTH_CLAMPED), clamped, "{depth}");
+    }
+}
+
+#[test]
 fn ages_lead_to_hold_and_safe_and_safe_needs_rearming() {
     let table = table();
     for stream in 0..3 {

@@ -200,6 +200,8 @@ fn divergence_needs_growth_and_corrections() {
     assert_eq!(trips(&[1.1 * floor, 1.6 * floor, 1.9 * floor, 2.3 * floor], 0.0), Some(3));
     assert_eq!(trips(&[1.1 * floor, -1.6 * floor, 1.9 * floor, -2.3 * floor], 0.0), Some(3), "of either sign");
     assert_eq!(trips(&[1.1 * floor, 1.6 * floor, 1.9 * floor, 2.1 * floor], 0.0), None, "less than twice its start");
+    let start = 1.1 * floor;
+    assert_eq!(trips(&[start, 1.6 * floor, 1.9 * floor, 2.0 * start], 0.0), None, "exactly twice its start");
     assert_eq!(trips(&[0.5 * floor, 0.9 * floor, 1.2 * floor, 1.9 * floor], 0.0), None, "less than twice the floor");
     assert_eq!(trips(&[1.1 * floor, 1.0 * floor, 2.3 * floor], 0.0), None, "a smaller one begins a new window");
     assert_eq!(trips(&[1.1 * floor, 2.3 * floor], 0.0), None, "the corrections have not removed the floor yet");

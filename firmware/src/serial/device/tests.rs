@@ -178,6 +178,18 @@ fn requests_out_of_place_are_refused() {
 }
 
 #[test]
+fn of_two_samples_the_newer_one_is_kept() {
+    let last = u32::MAX;
+    for (first, second, newer) in [(3, 4, 4), (4, 3, 4), (last, 0, 0), (0, last, 0)] {
+        let mut kept = None;
+        keep_newest(&mut kept, first, |sequence| *sequence);
+        assert_eq!(kept, Some(first));
+        keep_newest(&mut kept, second, |sequence| *sequence);
+        assert_eq!(kept, Some(newer), "{first}, then {second}");
+    }
+}
+
+#[test]
 fn the_board_releases_its_own_steps_without_drift() {
     // 100 µs per look: about ten looks per period, and the counter wraps.
     let mut bench = Bench { speed: 100, counter: COUNTER_MASK - 5_000, ..Bench::default() };

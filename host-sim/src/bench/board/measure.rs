@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use firmware::contract::{MAX_TABLE_BYTES, Table, TableError, encode};
+use firmware::contract::{MAX_TABLE_BYTES, PaddleCommand, Table, TableError, encode};
 use firmware::scalar::{Scalar, ScalarKind};
 use firmware::{Controller, Faults, Inputs, Mode, Settings, SettingsError, State};
 use serde::{Deserialize, Serialize};
@@ -71,11 +71,78 @@ pub enum MeasureError {
         scenario: &'static str,
     },
     /// Figures have grown past their budget, or differ from run to run.
-    #[error("{}", complaints.join("\n"))]
+    #[error("{}", lines(complaints))]
     Budget {
-        /// A line for each.
-        complaints: Vec<String>,
+        /// All of them.
+        complaints: Vec<Complaint>,
     },
+}
+
+/// A line for each.
+fn lines(complaints: &[Complaint]) -> String {
+    complaints.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// What is wrong with the figures of an image.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Complaint {
+    /// A figure is above its budget.
+    #[error("{image}: {figure} is {is}, the budget {allowed}")]
+    Above {
+        /// Name of the image.
+        image: String,
+        /// Which figure.
+        figure: Figure,
+        /// The figure.
+        is: u32,
+        /// Its budget.
+        allowed: u32,
+    },
+    /// The budget has a branch that no step took.
+    #[error("{image}: no step took the branch {branch}: the corpus does not reach it")]
+    Unreached {
+        /// Name of the image.
+        image: String,
+        /// The branch.
+        branch: Branch,
+    },
+    /// Measuring again gave something else.
+    #[error("{image}: two runs gave different figures")]
+    Unsteady {
+        /// Name of the image.
+        image: String,
+    },
+    /// There is no budget for the image.
+    #[error("{image}: the budget does not have it")]
+    NotInBudget {
+        /// Name of the image.
+        image: String,
+    },
+}
+
+/// A figure that has a budget.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Figure {
+    /// Flash without a table, bytes.
+    Flash,
+    /// Statics, bytes.
+    #[strum(to_string = "RAM")]
+    Ram,
+    /// Deepest stack, bytes.
+    Stack,
+    /// Fewest instructions of a step of this branch.
+    #[strum(to_string = "{0} min")]
+    Min(Branch),
+    /// Median of them.
+    #[strum(to_string = "{0} median")]
+    Median(Branch),
+    /// Most of them.
+    #[strum(to_string = "{0} max")]
+    Max(Branch),
+    /// Most of them, for a branch that the budget does not know.
+    #[strum(to_string = "{0}, which the budget lacks,")]
+    Unbudgeted(Branch),
 }
 
 /// Inputs for the controller, with the table and settings that it runs with.
@@ -133,15 +200,35 @@ pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, MeasureError> {
     ])
 }
 
-/// Branch of a step, by what its command says.
-fn branch(state: u32, faults: Faults) -> &'static str {
-    let has = |codes: Faults| !faults.intersection(codes).is_empty();
-    match Mode::from_wire(state) {
-        Some(Mode::Safe) => "safe",
-        Some(Mode::Run) if has(Faults::DEPTH_CLAMPED) => "table-edge",
-        Some(Mode::Run) if has(Faults::POSITION_LIMITED | Faults::RATE_LIMITED) => "saturated",
-        Some(Mode::Run) => "run",
-        _ => "hold",
+/// Branch of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, strum::Display)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Branch {
+    /// In HOLD.
+    Hold,
+    /// In RUN, and nothing special.
+    Run,
+    /// In SAFE.
+    Safe,
+    /// In RUN, at a limit of the paddle.
+    Saturated,
+    /// In RUN, beyond an end of the table.
+    TableEdge,
+}
+
+impl Branch {
+    /// By what the step's command says.
+    fn of(command: &PaddleCommand) -> Self {
+        let faults = Faults::from_bits(command.faults);
+        let has = |codes: Faults| !faults.intersection(codes).is_empty();
+        match Mode::from_wire(command.state) {
+            Some(Mode::Safe) => Self::Safe,
+            Some(Mode::Run) if has(Faults::DEPTH_CLAMPED) => Self::TableEdge,
+            Some(Mode::Run) if has(Faults::POSITION_LIMITED | Faults::RATE_LIMITED) => Self::Saturated,
+            Some(Mode::Run) => Self::Run,
+            _ => Self::Hold,
+        }
     }
 }
 
@@ -170,7 +257,7 @@ pub struct Figures {
     /// Steps counted.
     pub steps: u32,
     /// Instructions per step, by branch.
-    pub instructions: BTreeMap<String, Instructions>,
+    pub instructions: BTreeMap<Branch, Instructions>,
 }
 
 /// Figures of all images, by [`name`].
@@ -198,7 +285,7 @@ pub fn images() -> Result<Vec<Image>, BoardError> {
 /// [`MeasureError`]; [`MeasureError::Differs`] for a command that is not the host's.
 pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, MeasureError> {
     let mut device = Device::emulate(image)?;
-    let mut counted: BTreeMap<&'static str, Vec<u32>> = BTreeMap::new();
+    let mut counted: BTreeMap<Branch, Vec<u32>> = BTreeMap::new();
     let mut stack = 0;
     for scenario in scenarios {
         match image.scalar {
@@ -218,7 +305,7 @@ pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, Measure
         .map(|(branch, mut counts)| {
             counts.sort_unstable();
             let (min, max) = (counts[0], counts[counts.len() - 1]);
-            (branch.to_owned(), Instructions { min, median: counts[counts.len() / 2], max })
+            (branch, Instructions { min, median: counts[counts.len() / 2], max })
         })
         .collect();
     Ok(Figures { flash, ram, stack, steps, instructions })
@@ -228,7 +315,7 @@ fn run<T: Scalar>(
     device: &mut Device,
     table: &Table<T, 2>,
     scenario: &Scenario,
-    counted: &mut BTreeMap<&'static str, Vec<u32>>,
+    counted: &mut BTreeMap<Branch, Vec<u32>>,
 ) -> Result<(), MeasureError> {
     let name = scenario.name;
     let mut bytes = vec![0; MAX_TABLE_BYTES];
@@ -246,9 +333,7 @@ fn run<T: Scalar>(
         if let Some(difference) = difference(&expected, &answer.command) {
             return Err(MeasureError::Differs { scenario: name, tick: inputs.tick, difference });
         }
-        let command = &answer.command;
-        let branch = branch(command.state, Faults::from_bits(command.faults));
-        counted.entry(branch).or_default().push(instructions(answer.counts, counter_hz));
+        counted.entry(Branch::of(&answer.command)).or_default().push(instructions(answer.counts, counter_hz));
     }
     Ok(())
 }
@@ -263,30 +348,29 @@ fn instructions(counts: u32, counter_hz: u32) -> u32 {
 /// How far a figure may be above its budget.
 pub const TOLERANCE: f64 = 0.02;
 
-/// Figures above their budget, in words.
-pub fn exceeded(measured: &Figures, budget: &Figures, image: &str) -> Vec<String> {
+/// Figures above their budget.
+pub fn exceeded(measured: &Figures, budget: &Figures, image: &str) -> Vec<Complaint> {
     let mut found = Vec::new();
-    let mut hold = |what: &str, is: u32, allowed: u32| {
+    let mut hold = |figure: Figure, is: u32, allowed: u32| {
         if f64::from(is) > f64::from(allowed) * (1.0 + TOLERANCE) {
-            found.push(format!("{image}: {what} is {is}, the budget {allowed}"));
+            found.push(Complaint::Above { image: image.to_owned(), figure, is, allowed });
         }
     };
-    hold("flash", measured.flash, budget.flash);
-    hold("RAM", measured.ram, budget.ram);
-    hold("stack", measured.stack, budget.stack);
+    hold(Figure::Flash, measured.flash, budget.flash);
+    hold(Figure::Ram, measured.ram, budget.ram);
+    hold(Figure::Stack, measured.stack, budget.stack);
     for (branch, is) in &measured.instructions {
         match budget.instructions.get(branch) {
             Some(allowed) => {
-                hold(&format!("{branch} min"), is.min, allowed.min);
-                hold(&format!("{branch} median"), is.median, allowed.median);
-                hold(&format!("{branch} max"), is.max, allowed.max);
+                hold(Figure::Min(*branch), is.min, allowed.min);
+                hold(Figure::Median(*branch), is.median, allowed.median);
+                hold(Figure::Max(*branch), is.max, allowed.max);
             }
-            None => hold(&format!("{branch}, which the budget lacks,"), is.max, 0),
+            None => hold(Figure::Unbudgeted(*branch), is.max, 0),
         }
     }
-    for branch in budget.instructions.keys().filter(|branch| !measured.instructions.contains_key(*branch)) {
-        found.push(format!("{image}: no step took the branch {branch}: the corpus does not reach it"));
-    }
+    let unreached = budget.instructions.keys().filter(|branch| !measured.instructions.contains_key(branch));
+    found.extend(unreached.map(|branch| Complaint::Unreached { image: image.to_owned(), branch: *branch }));
     found
 }
 
@@ -296,14 +380,14 @@ mod tests {
 
     fn figures() -> Figures {
         let run = Instructions { min: 100, median: 200, max: 300 };
-        Figures { flash: 1000, ram: 2000, stack: 500, steps: 9, instructions: [("run".to_owned(), run)].into() }
+        Figures { flash: 1000, ram: 2000, stack: 500, steps: 9, instructions: [(Branch::Run, run)].into() }
     }
 
     /// The complaints about figures that differ from the budget in this.
     fn complaints(change: impl FnOnce(&mut Figures)) -> Vec<String> {
         let mut measured = figures();
         change(&mut measured);
-        exceeded(&measured, &figures(), "image")
+        exceeded(&measured, &figures(), "image").iter().map(ToString::to_string).collect()
     }
 
     #[test]
@@ -319,7 +403,7 @@ mod tests {
         assert_eq!(complaints(|f| f.ram = 2041), ["image: RAM is 2041, the budget 2000"]);
         assert_eq!(complaints(|f| f.stack = 511), ["image: stack is 511, the budget 500"]);
         let all = complaints(|f| {
-            f.instructions.insert("run".to_owned(), Instructions { min: 103, median: 205, max: 307 });
+            f.instructions.insert(Branch::Run, Instructions { min: 103, median: 205, max: 307 });
         });
         let expected =
             ["run min is 103, the budget 100", "run median is 205, the budget 200", "run max is 307, the budget 300"];
@@ -327,9 +411,16 @@ mod tests {
     }
 
     #[test]
+    fn branches_have_one_name_in_budgets_and_complaints() {
+        for branch in [Branch::Hold, Branch::Run, Branch::Safe, Branch::Saturated, Branch::TableEdge] {
+            assert_eq!(serde_json::to_value(branch).unwrap(), branch.to_string());
+        }
+    }
+
+    #[test]
     fn both_know_the_same_branches() {
         let more = complaints(|f| {
-            f.instructions.insert("safe".to_owned(), Instructions { min: 1, median: 1, max: 1 });
+            f.instructions.insert(Branch::Safe, Instructions { min: 1, median: 1, max: 1 });
         });
         assert_eq!(more, ["image: safe, which the budget lacks, is 1, the budget 0"]);
         let fewer = complaints(|f| f.instructions.clear());

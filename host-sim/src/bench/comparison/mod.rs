@@ -70,7 +70,7 @@ impl ComparisonOptions {
             hardware: Hardware::default(),
             scalar: TableScalar::default(),
             extras: Extras::default(),
-            threads: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            threads: parallel::available(),
             program,
         }
     }

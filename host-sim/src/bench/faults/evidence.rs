@@ -10,27 +10,38 @@ use super::closed_loop::ClosedLoop;
 const KEPT: usize = 5;
 
 /// Whether a row holds.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    strum::Display,
+    strum::EnumString,
+    strum::IntoStaticStr,
+)]
+#[serde(into = "&'static str", try_from = "String")]
 pub enum RowVerdict {
     /// Everything that it demands was seen.
-    #[serde(rename = "passed")]
+    #[strum(serialize = "passed")]
     Passed,
     /// Something was not.
-    #[serde(rename = "FAILED")]
+    #[strum(serialize = "FAILED")]
     Failed,
     /// It could not be tried here. Never the same as passed.
     #[default]
-    #[serde(rename = "not run")]
+    #[strum(serialize = "not run")]
     NotRun,
 }
 
-impl std::fmt::Display for RowVerdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Passed => "passed",
-            Self::Failed => "FAILED",
-            Self::NotRun => "not run",
-        })
+impl TryFrom<String> for RowVerdict {
+    type Error = strum::ParseError;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        text.parse()
     }
 }
 
@@ -139,4 +150,20 @@ pub fn carries(codes: Faults) -> impl Fn(&PaddleCommand) -> bool {
 /// Whether a command was given in this mode.
 pub fn is_in(mode: Mode) -> impl Fn(&PaddleCommand) -> bool {
     move |command| command.state == mode as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn verdicts_are_written_and_read_by_name() {
+        for (verdict, name) in
+            [(RowVerdict::Passed, "passed"), (RowVerdict::Failed, "FAILED"), (RowVerdict::NotRun, "not run")]
+        {
+            assert_eq!((verdict.to_string(), serde_json::to_value(verdict).unwrap()), (name.to_owned(), name.into()));
+            assert_eq!(serde_json::from_value::<RowVerdict>(name.into()).unwrap(), verdict);
+        }
+        assert!(serde_json::from_str::<RowVerdict>("\"failed\"").is_err());
+    }
 }

@@ -22,7 +22,8 @@ pub const NO_MONITORS: Faults = Faults::from_bits(
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MonitorOff {
     /// Its fault code.
-    pub monitor: String,
+    #[serde(with = "crate::runtime::names::faults")]
+    pub monitor: Faults,
     /// Rows of the catalogue that fail without it.
     pub rows: Vec<u32>,
 }
@@ -44,11 +45,11 @@ pub fn monitors_off(table: &Table<f64, 2>, seed: u64) -> Result<Vec<MonitorOff>,
         .collect::<Result<_, SimError>>()?;
     let monitors = Faults::NAMES.iter().filter(|(code, _)| NO_MONITORS.intersection(*code).is_empty());
     monitors
-        .map(|(code, name)| {
+        .map(|(code, _)| {
             crate::runtime::signals::check()?;
             let tried = sound.par_iter().map(|row| Ok((!holds(row, *code)?).then_some(row.id)));
             let rows: Vec<Option<u32>> = tried.collect::<Result<_, SimError>>()?;
-            Ok(MonitorOff { monitor: (*name).to_owned(), rows: rows.into_iter().flatten().collect() })
+            Ok(MonitorOff { monitor: *code, rows: rows.into_iter().flatten().collect() })
         })
         .collect()
 }

@@ -1,4 +1,4 @@
-//! What simulated loops do, and how closely one looks.
+//! What simulated loops do.
 
 /// What a simulated loop does in the long run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,13 +20,4 @@ impl Behaviour {
             Self::Diverges => "diverges",
         }
     }
-}
-
-/// How wide the cells are that are simulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Detail {
-    /// For a look.
-    Quick,
-    /// For numbers.
-    Fine,
 }

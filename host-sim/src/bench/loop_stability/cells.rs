@@ -2,9 +2,10 @@
 
 use firmware::law::Direction;
 use firmware::loop_stability::gain_limit;
+use model_offline::study::Extent;
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
-use super::behaviour::{Behaviour, Detail};
+use super::behaviour::Behaviour;
 
 /// Delays, target samples.
 pub const DELAYS: [u32; 6] = [0, 1, 2, 3, 5, 10];
@@ -40,10 +41,10 @@ pub struct Boundary {
 }
 
 /// The gains of the cells: evenly spaced in the logarithm.
-pub fn gains(detail: Detail) -> Vec<f64> {
-    let per_decade = match detail {
-        Detail::Quick => 15,
-        Detail::Fine => 40,
+pub fn gains(extent: Extent) -> Vec<f64> {
+    let per_decade = match extent {
+        Extent::Quick => 15,
+        Extent::Full => 40,
     };
     // From 0.002, below the least limit of all cells but those that no gain makes stable (0.0042 at 85°, |λ| = 2 and a
     // delay of 10), to 5, above the largest.
@@ -80,8 +81,8 @@ pub fn simulate(truth: &Matrix2<f64>, table: &Matrix2<f64>, gain: f64, delay: u3
 
 /// Simulates every cell around a table's Jacobian; the tissue's is |λ|·R(arg λ)·Ĵ, so that J·Ĵ⁻¹ has exactly the
 /// eigenvalues |λ|·e^(±i·arg λ).
-pub fn boundaries(table: &Matrix2<f64>, detail: Detail) -> Vec<Boundary> {
-    let gains = gains(detail);
+pub fn boundaries(table: &Matrix2<f64>, extent: Extent) -> Vec<Boundary> {
+    let gains = gains(extent);
     let mut all = Vec::new();
     for delay in DELAYS {
         for size in SIZES {
@@ -117,7 +118,7 @@ mod tests {
     #[test]
     fn simulated_cells_agree_with_theory_within_one() {
         let table = Matrix2::new(0.30, 0.05, -0.04, 0.25);
-        let all = boundaries(&table, Detail::Quick);
+        let all = boundaries(&table, Extent::Quick);
         assert_eq!(all.len(), DELAYS.len() * ANGLES.len() * SIZES.len());
         for boundary in &all {
             assert!(boundary.theory_cells.abs_diff(boundary.simulated_cells) <= 1, "{boundary:?}");

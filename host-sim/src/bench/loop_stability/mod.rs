@@ -14,10 +14,10 @@ use model_offline::model::ModelError;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::study::Extent;
 use model_offline::table::TableOptions;
 use nalgebra::Matrix2;
 
-use self::behaviour::Detail;
 use self::cells::{Boundary, boundaries};
 use self::mismatch::{Mismatch, Refused, mismatches};
 use self::rate_limit::Cell;
@@ -32,8 +32,8 @@ pub struct StabilityResult {
     pub paddle: u32,
     /// Its Jacobian at rest.
     pub jacobian: Matrix2<f64>,
-    /// How wide cells are.
-    pub detail: Detail,
+    /// Narrow cells, or wide ones for a first look.
+    pub extent: Extent,
     /// Gain × delay × Jacobian error.
     pub boundaries: Vec<Boundary>,
     /// Table and tissue swapped, by paddle and depth; empty without inclusions.
@@ -49,7 +49,7 @@ pub struct StabilityResult {
 impl StabilityResult {
     /// Gains of the cells along every boundary.
     pub fn gains(&self) -> Vec<f64> {
-        cells::gains(self.detail)
+        cells::gains(self.extent)
     }
 }
 
@@ -59,7 +59,7 @@ impl StabilityResult {
 /// [`SimError`]: tissue that cannot be modelled.
 pub fn simulate(
     scene: &Scene,
-    detail: Detail,
+    extent: Extent,
     threads: usize,
     progress: &dyn Fn(),
 ) -> Result<StabilityResult, SimError> {
@@ -70,25 +70,25 @@ pub fn simulate(
         .body(place, NewtonSettings::default())
         .and_then(|mut body| body.actuation_jacobian())
         .map_err(ModelError::from)?;
-    let boundaries = boundaries(&jacobian, detail);
+    let boundaries = boundaries(&jacobian, extent);
     progress();
     let (mut rows, mut refused) = (Vec::new(), Vec::new());
     if !scene.inclusions.is_empty() {
-        let knots = match detail {
-            Detail::Quick => 6,
-            Detail::Fine => 11,
+        let knots = match extent {
+            Extent::Quick => 6,
+            Extent::Full => 11,
         };
         (rows, refused) = mismatches(scene, knots, threads)?;
     }
     progress();
-    let cells = rate_limit::map(detail);
+    let cells = rate_limit::map(extent);
     progress();
     let lambda_max = TableOptions::default().lambda_max;
     Ok(StabilityResult {
         scene: scene.name.clone(),
         paddle,
         jacobian,
-        detail,
+        extent,
         boundaries,
         mismatches: rows,
         refused,

@@ -4,9 +4,10 @@
 use std::collections::VecDeque;
 
 use firmware::limits::{Limits, PositionLimit};
+use model_offline::study::Extent;
 use nalgebra::Vector1;
 
-use super::behaviour::{Behaviour, Detail};
+use super::behaviour::Behaviour;
 
 /// Loop ticks per target sample.
 const TICKS_PER_SAMPLE: usize = 20;
@@ -92,10 +93,10 @@ pub fn simulate(integrator: Integrator, delay: u32, gain: f64, amplitude: f64) -
 }
 
 /// The whole map.
-pub fn map(detail: Detail) -> Vec<Cell> {
-    let (gains, amplitudes) = match detail {
-        Detail::Quick => (9, 9),
-        Detail::Fine => (17, 17),
+pub fn map(extent: Extent) -> Vec<Cell> {
+    let (gains, amplitudes) = match extent {
+        Extent::Quick => (9, 9),
+        Extent::Full => (17, 17),
     };
     let log = |from: f64, to: f64, count: u32, i: u32| from * (to / from).powf(f64::from(i) / f64::from(count - 1));
     let mut cells = Vec::new();

@@ -28,6 +28,7 @@ use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::plant::free_run::FreeRun;
 use crate::runtime::plant::lockstep::{self, Pace};
 use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
+use crate::runtime::plant::rehearsal::world_in_time;
 use crate::runtime::plant::{PlantLoop, published, waiting_command};
 use crate::runtime::signals;
 use crate::runtime::time::durations::LoopTiming;
@@ -271,7 +272,7 @@ impl<'a> SimulatedInsertion<'a> {
         let paddle = Some(controller.table.paddle.index);
         let world = match controller.mode {
             RunMode::Lockstep => World::new(model, paddle, simulation)?,
-            RunMode::FreeRun => World::in_time(model, paddle, simulation)?,
+            RunMode::FreeRun => world_in_time(model, paddle, simulation)?,
         };
         Ok(PlantLoop::new(world, simulation))
     }

@@ -6,10 +6,19 @@ use model_offline::output::chart::{Axis, Bars, Colour, Dash, Panel, Place, Refer
 
 use super::embed::panels;
 use crate::bench::result::RunResult;
+use crate::runtime::error::Role;
 use crate::runtime::time::durations::{Distribution, LoopTiming};
 
-/// A loop on the machine's clock: whose it is, and its figures.
-fn loops(run: &RunResult) -> Vec<(String, &LoopTiming)> {
+/// A loop on the machine's clock.
+struct Loop<'r> {
+    /// Tissue and side.
+    name: String,
+    side: Role,
+    timing: &'r LoopTiming,
+}
+
+/// Both sides of every case that ran on the machine's clock.
+fn loops(run: &RunResult) -> Vec<Loop<'_>> {
     let free_runs = run.cases.iter().filter_map(|case| case.strategies.dynamic_free_run.as_ref().map(|s| (case, s)));
     free_runs
         .flat_map(|(case, strategy)| {
@@ -18,9 +27,9 @@ fn loops(run: &RunResult) -> Vec<(String, &LoopTiming)> {
             } else {
                 format!("{} with the table of {}", case.tissue, case.table_tissue)
             };
-            let controller = strategy.timing.as_ref().map(|timing| (format!("{tissue}: controller"), timing));
-            let plant = strategy.plant_timing.as_ref().map(|timing| (format!("{tissue}: plant"), timing));
-            [controller, plant].into_iter().flatten()
+            let sides = [(Role::Controller, &strategy.timing), (Role::Plant, &strategy.plant_timing)];
+            let measured = sides.into_iter().filter_map(|(side, timing)| Some((side, timing.as_ref()?)));
+            measured.map(move |(side, timing)| Loop { name: format!("{tissue}: {side}"), side, timing })
         })
         .collect()
 }
@@ -91,8 +100,8 @@ pub(super) fn histograms(loops: &[(&str, &LoopTiming)]) -> Vec<Panel> {
 /// Three histograms per controller.
 pub(super) fn charts(run: &RunResult) -> Vec<Panel> {
     let loops = loops(run);
-    let controllers = loops.iter().filter(|(name, _)| name.ends_with("controller"));
-    histograms(&controllers.map(|(name, timing)| (name.as_str(), *timing)).collect::<Vec<_>>())
+    let controllers = loops.iter().filter(|of| of.side == Role::Controller);
+    histograms(&controllers.map(|of| (of.name.as_str(), of.timing)).collect::<Vec<_>>())
 }
 
 fn percentiles(run: &RunResult) -> Markup {
@@ -103,7 +112,7 @@ fn percentiles(run: &RunResult) -> Markup {
                 th { "loop" } th.left { "duration" } th { "ticks" } th { "min" } th { "mean" } th { "p50" } th { "p99" }
                 th { "p99.9" } th { "p99.99" } th { "max" }
             } }
-            tbody { @for (name, timing) in loops(run) { @for (what, of) in all_distributions(timing) {
+            tbody { @for Loop { name, timing, .. } in loops(run) { @for (what, of) in all_distributions(timing) {
                 tr {
                     td { (name) } td.left { (what) } td { (count(of.count)) } td { (number(us(of.min_ns), 3)) }
                     td { (number(of.mean_ns * 1e-3, 3)) }
@@ -124,7 +133,7 @@ fn counts(run: &RunResult) -> Markup {
                 th { "loop" } th { "rate [Hz]" } th { "ticks run" } th { "deadline misses" } th { "overruns" }
                 th { "periods skipped" } th.left { "scheduling obtained" } th.left { "memory locked" }
             } }
-            tbody { @for (name, timing) in loops(run) {
+            tbody { @for Loop { name, timing, .. } in loops(run) {
                 tr {
                     td { (name) } td { (number(timing.rate_hz, 4)) } td { (count(timing.ticks)) }
                     td { (count(timing.deadline_misses)) } td { (count(timing.overruns)) } td { (count(timing.skipped)) }

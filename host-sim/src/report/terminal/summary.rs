@@ -89,14 +89,6 @@ fn share(factor: f64) -> String {
     if factor < 10.0 { format!("1/{factor:.1}") } else { format!("1/{factor:.0}") }
 }
 
-const fn plant_name(model: PlantModel) -> &'static str {
-    match model {
-        PlantModel::Full => "full",
-        PlantModel::Reduced => "reduced",
-        PlantModel::Condensed => "condensed",
-    }
-}
-
 /// What answered for the tissue, where it was not the full model: how far off it was, and how often it could not.
 fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
     for case in &run.cases {
@@ -106,7 +98,7 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
             if plant.fallbacks == 0 && plant.first_fallback.is_none() && plant.model == PlantModel::Full {
                 continue;
             }
-            write!(text, "  {}, {}: tissue {}", case.tissue, strategy.mode, plant_name(plant.model))?;
+            write!(text, "  {}, {}: tissue {}", case.tissue, strategy.mode, plant.model)?;
             if let (Some(modes), Some([points, all])) = (plant.modes, plant.points) {
                 write!(text, " ({modes} modes, {points} of {all} points)")?;
             }

@@ -5,6 +5,7 @@ pub mod free_run;
 pub mod lockstep;
 pub mod observer;
 pub mod process;
+pub mod rehearsal;
 
 use std::time::{Duration, Instant};
 

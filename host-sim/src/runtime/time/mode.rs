@@ -4,20 +4,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Whether messages or the machine's clock drive time. Never mixed; every output says which it was.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema, clap::ValueEnum, strum::Display)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum RunMode {
     /// Time comes from the messages: deterministic, as fast as it goes.
     Lockstep,
     /// Steady clock, absolute deadlines.
     FreeRun,
-}
-
-impl std::fmt::Display for RunMode {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Lockstep => "lockstep",
-            Self::FreeRun => "free-run",
-        })
-    }
 }

@@ -2,12 +2,14 @@
 
 use std::time::Instant;
 
+use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
-use super::error::WorldError;
-use super::needle::NeedleTrajectory;
-use super::simulation::Simulation;
-use super::tissue::{TissuePlant, TissueResponse as _};
+use crate::world::World;
+use crate::world::error::WorldError;
+use crate::world::needle::NeedleTrajectory;
+use crate::world::simulation::Simulation;
+use crate::world::tissue::{TissuePlant, TissueResponse as _, WantedPlant};
 
 /// Steps that are timed.
 const STEPS: usize = 101;
@@ -38,6 +40,34 @@ impl Rehearsal {
     }
 }
 
+/// As [`World::new`], for a loop that the machine's clock drives: the tissue's step is timed before the run. A full model
+/// that takes too long makes room for the reduced one, unless the full one was asked for.
+///
+/// # Errors
+/// [`WorldError`]; [`WorldError::TooSlow`] when no model keeps the period.
+pub fn world_in_time<'m>(
+    model: &'m TissueModel,
+    paddle_index: Option<u32>,
+    simulation: &Simulation,
+) -> Result<World<TissuePlant<'m>>, WorldError> {
+    let mut world = World::new(model, paddle_index, simulation)?;
+    let full = rehearse(&mut world.tissue, simulation)?;
+    if full.keeps_the_period() {
+        return Ok(world);
+    }
+    if simulation.plant.is_some() {
+        return Err(full.too_slow());
+    }
+    let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..*simulation };
+    let Ok(mut world) = World::new(model, paddle_index, &reduced) else { return Err(full.too_slow()) };
+    let rehearsed = rehearse(&mut world.tissue, simulation)?;
+    if !rehearsed.keeps_the_period() {
+        return Err(rehearsed.too_slow());
+    }
+    world.tissue.stands_in_for_full(full.step_us);
+    Ok(world)
+}
+
 /// Takes the tissue through some steps from the middle of the insertion, and back to rest.
 ///
 /// # Errors
@@ -65,13 +95,10 @@ pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result
 
 #[cfg(test)]
 mod tests {
-    use model_offline::model::TissueModel;
     use model_offline::scene::Scene;
 
     use super::*;
-    use crate::world::World;
     use crate::world::loop_settings::LoopSettings;
-    use crate::world::tissue::WantedPlant;
 
     #[test]
     fn the_rule_of_the_period() {
@@ -92,10 +119,10 @@ mod tests {
             Simulation { loop_settings, plant, ..Simulation::new(&scene) }
         };
         for plant in [None, Some(WantedPlant::Full)] {
-            let refused = World::in_time(&model, Some(2), &at(5e5, plant));
+            let refused = world_in_time(&model, Some(2), &at(5e5, plant));
             assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
         }
-        let mut world = World::in_time(&model, Some(2), &at(0.02, None)).unwrap();
+        let mut world = world_in_time(&model, Some(2), &at(0.02, None)).unwrap();
         let fresh = World::new(&model, Some(2), &at(0.02, None)).unwrap().plant_account();
         assert_eq!(world.plant_account(), fresh, "a rehearsal leaves no trace");
         assert!(world.advance(0, 0).unwrap().target.iter().all(|x| x.abs() < 1e-9), "at rest again");
