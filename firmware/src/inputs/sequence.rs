@@ -5,6 +5,9 @@ use super::ledger::{Discard, StreamLedger};
 /// How far back a late sample is still told from a duplicate.
 const WINDOW: u32 = u64::BITS;
 
+/// So many numbers within the window of the newest one are no damage to it: they are where the sender is.
+const NO_ACCIDENT: u32 = 8;
+
 /// What a sequence number says about a delivery.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
@@ -103,6 +106,11 @@ impl SequenceTracker {
             // Before the first number of all.
             ledger.published += u64::from(arrival == Arrival::Stray);
             return arrival != Arrival::Duplicate;
+        }
+        if self.arrived.count_ones() >= NO_ACCIDENT {
+            // Those that were refused meanwhile have numbers that agree: this sample is late, and in no account any more.
+            ledger.published += 1;
+            return true;
         }
         // A refused sample with a number from nowhere: what it made seem lost never was.
         let never = u64::from(behind.cast_unsigned()).min(ledger.lost);

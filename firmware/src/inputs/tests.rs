@@ -95,6 +95,23 @@ fn what_a_number_from_nowhere_made_seem_lost_is_taken_back() {
 }
 
 #[test]
+fn a_good_sample_that_is_far_too_late_takes_nothing_back_from_those_refused_meanwhile() {
+    // Found by random schedule 3123: two samples are late by more than the window, all after them are refused.
+    let mut account = AccountedStream::default();
+    account.accept([0, 1]);
+    for sequence in 4..124 {
+        assert!(!account.offer(sequence, BAD).0);
+    }
+    assert_eq!(account.counts(), [124, 2, 2, 0, 0, 0, 120]);
+    account.accept([2]);
+    // Whether it is one of the two that seemed lost cannot be told any more: it is in the account once more.
+    assert_eq!(account.counts(), [125, 3, 2, 0, 0, 0, 120]);
+    assert_eq!(account.offer(124, BAD), (false, Faults::NOT_FINITE), "no gap");
+    assert_eq!(account.counts(), [126, 3, 2, 0, 0, 0, 121]);
+    account.accept([125, 126]);
+}
+
+#[test]
 fn a_refused_first_sample_is_no_beginning() {
     let mut account = AccountedStream::default();
     account.offer(1000, BAD);
