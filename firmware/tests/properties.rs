@@ -11,7 +11,7 @@ fn bytes(longest: usize) -> impl Strategy<Value = Vec<u8>> {
 /// A good table with some bytes changed.
 fn damaged() -> impl Strategy<Value = (Vec<u8>, usize)> {
     let mut good = vec![0; firmware::contract::MAX_TABLE_BYTES];
-    let length = firmware::contract::encode(&entries::table(), &mut good).unwrap();
+    let length = firmware::contract::encode(&entries::step::table(), &mut good).unwrap();
     good.truncate(length);
     let changes = prop::collection::vec((0..length, any::<u8>()), 0..8);
     (changes, 0..=length).prop_map(move |(changes, cut)| {
@@ -26,27 +26,27 @@ proptest! {
 
     #[test]
     fn any_bytes_are_refused_or_a_valid_table(bytes in bytes(4096)) {
-        entries::table_decode(&bytes);
-        entries::table_decode_sealed(&bytes);
+        entries::table_decode::table_decode(&bytes);
+        entries::table_decode_sealed::table_decode_sealed(&bytes);
     }
 
     #[test]
     fn a_damaged_table_is_refused_or_valid((bytes, cut) in damaged()) {
-        entries::table_decode(&bytes);
-        entries::table_decode(&bytes[..cut]);
+        entries::table_decode::table_decode(&bytes);
+        entries::table_decode::table_decode(&bytes[..cut]);
         // Only the payload, sealed again.
         if bytes.len() > 56 {
-            entries::table_decode_sealed(&bytes[52..bytes.len() - 4]);
+            entries::table_decode_sealed::table_decode_sealed(&bytes[52..bytes.len() - 4]);
         }
     }
 
     #[test]
     fn any_bytes_are_a_frame_or_not(bytes in bytes(256)) {
-        entries::sample_decode(&bytes);
+        entries::sample_decode::sample_decode(&bytes);
     }
 
     #[test]
     fn any_inputs_keep_the_invariants(bytes in bytes(16_000)) {
-        entries::step(&bytes);
+        entries::step::step(&bytes);
     }
 }

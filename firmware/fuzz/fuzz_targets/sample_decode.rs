@@ -1,9 +1,7 @@
-//! See `firmware/tests/entries/mod.rs`, which proptest calls with the same bytes.
+//! Proptest calls the same entry with the same kinds of bytes, see `firmware/tests/entries/mod.rs`.
 #![no_main]
 
-// A target calls one entry of several.
-#[allow(dead_code)]
-#[path = "../../tests/entries/mod.rs"]
-mod entries;
+#[path = "../../tests/entries/sample_decode.rs"]
+mod sample_decode;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| entries::sample_decode(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| sample_decode::sample_decode(bytes));

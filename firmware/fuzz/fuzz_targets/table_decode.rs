@@ -1,9 +1,7 @@
-//! See `firmware/tests/entries/mod.rs`, which proptest calls with the same bytes.
+//! Proptest calls the same entry with the same kinds of bytes, see `firmware/tests/entries/mod.rs`.
 #![no_main]
 
-// A target calls one entry of several.
-#[allow(dead_code)]
-#[path = "../../tests/entries/mod.rs"]
-mod entries;
+#[path = "../../tests/entries/table_decode.rs"]
+mod table_decode;
 
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| entries::table_decode(bytes));
+libfuzzer_sys::fuzz_target!(|bytes: &[u8]| table_decode::table_decode(bytes));

@@ -1,18 +1,17 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
+mod error;
 mod graded;
 mod tissue;
 
+pub use error::{BoundaryPart, ModelError};
 pub use graded::graded_model;
 
 use self::tissue::{Mixing, tissue_of};
 use crate::discretization::boundary::BoundaryPoint;
 use crate::discretization::nodes::lattice::{lattice_nodes, lattice_nodes_on_interfaces};
-use crate::discretization::{
-    DiscretizationError, Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil,
-};
+use crate::discretization::{Essential, NodalCell, Planar, Quadrature, Resolution, ShapeError, Stencil};
 use crate::geometry::{Point2, distance_to_polyline};
-use crate::material::MaterialError;
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
 use crate::scene::Scene;
@@ -20,105 +19,6 @@ use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use std::sync::{Arc, OnceLock};
-
-/// Why a scene cannot be modelled.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ModelError {
-    /// Shape functions do not exist somewhere.
-    #[error(transparent)]
-    Shape(#[from] ShapeError),
-    /// The body cannot be discretised.
-    #[error(transparent)]
-    Discretization(#[from] DiscretizationError),
-    /// The tangent at rest cannot be solved with, or a Jacobian cannot be computed.
-    #[error("{0}")]
-    Solve(#[from] Failure),
-    /// A constrained feature has no node on it.
-    #[error("no node lies on the {0}; refine the discretization")]
-    NothingConstrained(BoundaryPart),
-    /// The paddle cannot move the target orthogonally to the needle.
-    #[error(
-        "paddle {paddle}: the actuation Jacobian is singular (condition number {condition:.1e}): this paddle cannot control the target"
-    )]
-    Uncontrollable {
-        /// Paddle index.
-        paddle: u32,
-        /// Condition number of the Jacobian.
-        condition: f64,
-    },
-    /// None of the scene's paddles can move the target orthogonally to the needle.
-    #[error("no paddle of this scene can control the target: move a paddle, turn the needle, or use one static")]
-    NoPaddleControls,
-    /// A model of more nodes than are tried.
-    #[error("{nodes} nodes are needed, at most {limit} are tried")]
-    TooManyNodes {
-        /// Nodes it would take.
-        nodes: usize,
-        /// Nodes that are accepted.
-        limit: usize,
-    },
-    /// Refinement ended before the tolerance.
-    #[error(
-        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; ask for less, or use a method that converges faster (fem-t6)"
-    )]
-    ToleranceNotReached {
-        /// Asked for.
-        tolerance: f64,
-        /// Best estimate.
-        reached: f64,
-    },
-    /// The scene's resolution is a tolerance where nodes are needed.
-    #[error("the resolution is a tolerance: refine to it with `placement::discretise`")]
-    ToleranceIsNoResolution,
-    /// A study that varies the spacing of a scene that has none.
-    #[error("the study varies a spacing: give one instead of a tolerance")]
-    NoSpacing,
-    /// No such paddle in the scene.
-    #[error("the scene has no paddle {0}")]
-    NoSuchPaddle(u32),
-    /// Nitsche's method for a needle that does not touch the boundary.
-    #[error(
-        "Nitsche's method holds boundary, and this needle contact is inside the body: use essential = \"transformation\""
-    )]
-    NitscheInside,
-    /// Boundary values are imposed weakly where they have to be exact.
-    #[error(
-        "this needs nodal values that are imposed exactly, and the scene imposes them weakly: use essential = \"transformation\""
-    )]
-    ImposedWeakly,
-    /// A law that was changed on the way is none.
-    #[error(transparent)]
-    Material(#[from] MaterialError),
-}
-
-impl ModelError {
-    /// Whether it is the question that was wrong, and not a computation that failed.
-    pub fn is_usage(&self) -> bool {
-        matches!(
-            self,
-            Self::ToleranceIsNoResolution
-                | Self::NoSpacing
-                | Self::NoSuchPaddle(_)
-                | Self::NitscheInside
-                | Self::ImposedWeakly
-                | Self::Material(_)
-        )
-    }
-}
-
-/// A part of the boundary on which displacements are prescribed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, strum::Display)]
-pub enum BoundaryPart {
-    /// What does not move.
-    #[strum(to_string = "immobile part")]
-    Immobile,
-    /// Where the needle pushes.
-    #[strum(to_string = "needle contact")]
-    Needle,
-    /// Where the paddle of this index is attached.
-    #[strum(to_string = "paddle {0}")]
-    Paddle(u32),
-}
 
 /// The discrete model of a scene: everything that all paddles share.
 ///
