@@ -230,6 +230,17 @@ pub(super) fn is_empty(root: &Path, _locked: &Locked) -> bool {
     presence_file(root).is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
 }
 
+/// Removes the link's files in shared memory that have no bytes yet. Whoever makes one holds the lock from before it is
+/// there until it has its size, so that under the lock an empty one is a dead process's; iceoryx2 0.10 would wait for it to
+/// grow, without end.
+pub(super) fn remove_half_made(name: &str, _locked: &Locked) {
+    for file in in_shared_memory(name) {
+        if file.symlink_metadata().is_ok_and(|metadata| metadata.is_file() && metadata.len() == 0) {
+            let _ = std::fs::remove_file(file);
+        }
+    }
+}
+
 /// Removes a link's directory and its files in shared memory. Whether there were any of the latter.
 pub(super) fn remove(name: &str, _locked: &Locked) -> bool {
     let files = in_shared_memory(name);

@@ -75,6 +75,8 @@ impl Space {
         let root = files::root(name);
         let mut config = Config::default();
         config.global.prefix = files::prefix(name, &key).as_str().try_into().map_err(|_| invalid())?;
+        // The dead are cleared under the lock alone, and going needs none: see `files::remove_half_made`.
+        config.global.node.cleanup_dead_nodes_on_destruction = false;
         let path = root.to_str().ok_or_else(invalid)?;
         config.global.set_root_path(&path.try_into().map_err(|_| invalid())?);
         Ok(Self { name: name.to_owned(), key, root, config })
@@ -122,7 +124,7 @@ impl Space {
         let started = Instant::now();
         loop {
             let Ok(locked) = files::lock_root(&self.root) else { return };
-            let nodes = self.clear_dead_nodes::<S>();
+            let nodes = self.clear_dead_nodes::<S>(&locked);
             let is_empty = files::is_empty(&self.root, &locked);
             // A listing that failed says nothing of this process's own nodes; no other process is in here then.
             if is_empty && !nodes.is_some_and(|nodes| nodes.alive) {
@@ -139,7 +141,8 @@ impl Space {
     }
 
     /// Clears what the dead hold, and says who is in here; none when that cannot be found out.
-    fn clear_dead_nodes<S: Service>(&self) -> Option<Nodes> {
+    fn clear_dead_nodes<S: Service>(&self, locked: &Locked) -> Option<Nodes> {
+        files::remove_half_made(&self.name, locked);
         let mut nodes = Nodes::default();
         let listed = Node::<S>::list(&self.config, |node| {
             match node {
@@ -157,8 +160,10 @@ impl Space {
     }
 
     /// Removes what processes that have died left behind, so that others can take their places. Whether there was any.
+    /// Waits for nobody: whoever opens this space at the moment clears it as well.
     pub fn clear_dead<S: Service>(&self) -> bool {
-        self.clear_dead_nodes::<S>().is_some_and(|nodes| nodes.dead)
+        let Ok(locked) = files::lock_root_within(&self.root, Duration::ZERO) else { return false };
+        self.clear_dead_nodes::<S>(&locked).is_some_and(|nodes| nodes.dead)
     }
 
     /// Waits until nobody else opens this space, and keeps others from it until dropped. A process that dies lets go.
@@ -173,11 +178,12 @@ impl Space {
         }
     }
 
-    /// Notes that this process is in the space, for as long as the value lives.
+    /// Notes that this process is in the space, for as long as the value lives; what others left half made goes first.
     ///
     /// # Errors
     /// [`LinkError::Directory`].
-    pub(super) fn enter(&self, _locked: &Locked) -> Result<Presence, LinkError> {
+    pub(super) fn enter(&self, locked: &Locked) -> Result<Presence, LinkError> {
+        files::remove_half_made(&self.name, locked);
         files::enter(&self.root)
     }
 
@@ -192,7 +198,7 @@ impl Space {
     /// # Errors
     /// [`LinkError::Directory`].
     pub(super) fn clear_if_dead<S: Service>(&self, locked: &Locked) -> Result<bool, LinkError> {
-        let nodes = self.clear_dead_nodes::<S>();
+        let nodes = self.clear_dead_nodes::<S>(locked);
         let may_be_alive = nodes.is_some_and(|nodes| nodes.alive) || !files::is_empty(&self.root, locked);
         if may_be_alive {
             return Ok(nodes.is_some_and(|nodes| nodes.dead));

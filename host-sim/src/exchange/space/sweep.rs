@@ -39,7 +39,8 @@ fn is_left(name: &str) -> bool {
     let Ok(locked) = files::lock_root_within(&root, Duration::ZERO) else { return false };
     // Who works with the transport alone has not entered, but has a node.
     let space = key.and_then(|key| Space::of(name, key).ok());
-    let has_nodes = space.and_then(|space| space.clear_dead_nodes::<ipc::Service>()).is_some_and(|nodes| nodes.alive);
+    let has_nodes =
+        space.and_then(|space| space.clear_dead_nodes::<ipc::Service>(&locked)).is_some_and(|nodes| nodes.alive);
     let is_left = !has_nodes && files::is_empty(&root, &locked);
     if is_left {
         files::remove(name, &locked);

@@ -137,3 +137,35 @@ fn what_the_dead_have_left_is_swept_and_what_the_living_have_is_not() {
     living.leave::<ipc::Service>(Departure::First);
     assert!(!kept.exists());
 }
+
+/// A process that is killed after it has made a file and before that has its size leaves it empty.
+#[test]
+fn no_file_that_was_left_half_made_holds_anybody_up() {
+    iceoryx2::prelude::set_log_level(iceoryx2::prelude::LogLevel::Error);
+    let all = {
+        let space = space("whole");
+        let _ports = PlantPorts::<ipc::Service>::open(&space).unwrap();
+        let all = files::in_shared_memory(&space.name).len();
+        space.leave::<ipc::Service>(Departure::First);
+        all
+    };
+    assert!(all > 5, "{all} files");
+    for half_made in 0..all {
+        let space = space(&format!("half-{half_made}"));
+        let ports = PlantPorts::<ipc::Service>::open(&space).unwrap();
+        let mut files = files::in_shared_memory(&space.name);
+        files.sort();
+        std::fs::remove_file(&files[half_made]).unwrap();
+        std::fs::write(&files[half_made], []).unwrap();
+        std::fs::set_permissions(&files[half_made], std::fs::Permissions::from_mode(0o200)).unwrap();
+        let (finished, finish) = std::sync::mpsc::channel();
+        let visitor = space.clone();
+        // Whether it gets in beside such ruins is another matter; that it comes back is this one's.
+        std::thread::spawn(move || finished.send(ControllerPorts::<ipc::Service>::open(&visitor).is_ok()));
+        let name = files[half_made].display();
+        finish.recv_timeout(Duration::from_secs(30)).unwrap_or_else(|_| panic!("{name}: waits without end"));
+        drop(ports);
+        space.leave::<ipc::Service>(Departure::Last);
+        assert!(space.traces().is_empty(), "{name}: {:?}", space.traces());
+    }
+}
