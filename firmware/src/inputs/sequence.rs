@@ -48,9 +48,8 @@ impl SequenceTracker {
             self.restart(sequence, ledger);
             return Arrival::New;
         };
-        let ahead = sequence.wrapping_sub(newest);
-        // Half of the number range lies ahead, half behind: ages stay right when the counter wraps.
-        if ahead != 0 && ahead <= u32::MAX / 2 {
+        if self.behind(sequence).is_none() {
+            let ahead = sequence.wrapping_sub(newest);
             self.newest = Some(sequence);
             self.arrived = self.arrived.checked_shl(ahead).unwrap_or(0) | 1;
             self.known = self.known.saturating_add(ahead).min(WINDOW);
@@ -87,21 +86,27 @@ impl SequenceTracker {
         Arrival::Late
     }
 
+    /// How far a number lies behind the newest; none ahead of it. Half of the range lies ahead, half behind, so that ages stay
+    /// right when the counter wraps; the number right across is behind.
+    fn behind(&self, sequence: u32) -> Option<u32> {
+        let behind = self.newest?.wrapping_sub(sequence);
+        (behind <= u32::MAX / 2 + 1).then_some(behind)
+    }
+
     /// Whether a number lies behind everything that is remembered.
     pub(crate) fn is_forgotten(&self, sequence: u32) -> bool {
-        self.newest.is_some_and(|newest| newest.wrapping_sub(sequence).cast_signed() >= WINDOW.cast_signed())
+        self.behind(sequence).is_some_and(|behind| behind >= WINDOW)
     }
 
     /// Enters the number of a sample that follows the accepted ones, which it may do in a gap that a refused one has
     /// left; `false` for one that has arrived before.
     pub(crate) fn enter(&mut self, sequence: u32, ledger: &mut StreamLedger) -> bool {
-        let behind = self.newest.map_or(-1, |newest| newest.wrapping_sub(sequence).cast_signed());
-        if behind < 0 {
+        let Some(behind) = self.behind(sequence) else {
             self.register(sequence, ledger);
             return true;
-        }
-        if behind.cast_unsigned() < WINDOW {
-            let arrival = self.fill(behind.cast_unsigned(), ledger);
+        };
+        if behind < WINDOW {
+            let arrival = self.fill(behind, ledger);
             ledger.duplicates += u64::from(arrival == Arrival::Duplicate);
             // Before the first number of all.
             ledger.published += u64::from(arrival == Arrival::Stray);
@@ -113,7 +118,7 @@ impl SequenceTracker {
             return true;
         }
         // A refused sample with a number from nowhere: what it made seem lost never was.
-        let never = u64::from(behind.cast_unsigned()).min(ledger.lost);
+        let never = u64::from(behind).min(ledger.lost);
         ledger.lost -= never;
         ledger.published -= never.min(ledger.published);
         self.restart(sequence, ledger);
@@ -189,6 +194,31 @@ mod tests {
         let sequences: std::vec::Vec<u32> = (0..20).map(|i| start.wrapping_add(i)).collect();
         let ledger = deliver(&sequences);
         assert_eq!((ledger.consumed, ledger.lost), (20, 0));
+    }
+
+    /// Found by the fuzz target `step`: one half of the code had the number right across ahead, the other behind.
+    #[test]
+    fn the_number_right_across_the_range_is_behind() {
+        const HALF: u32 = 1 << 31;
+        for start in [0, 5, HALF, u32::MAX - 3] {
+            let mut tracker = SequenceTracker::default();
+            let mut ledger = StreamLedger::default();
+            tracker.restart(start, &mut ledger);
+            let expected = [(HALF - 1, None), (HALF, Some(HALF)), (HALF + 1, Some(HALF - 1))];
+            for (ahead, behind) in expected {
+                let across = start.wrapping_add(ahead);
+                assert_eq!(tracker.behind(across), behind);
+                assert_eq!(tracker.is_forgotten(across), behind.is_some());
+            }
+            // Good samples with such numbers are consumed, and each is one publication.
+            (ledger.delivered, ledger.consumed) = (1, 1);
+            for (step, (ahead, _)) in expected.into_iter().enumerate() {
+                let entered = tracker.enter(start.wrapping_add(ahead), &mut ledger);
+                ledger.delivered += 1;
+                ledger.consumed += u64::from(entered);
+                assert_eq!(ledger.unaccounted(), 0, "{step}: {ledger:?}");
+            }
+        }
     }
 
     #[test]
