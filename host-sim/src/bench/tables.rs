@@ -66,7 +66,7 @@ pub fn compare(
     progress: &dyn Fn(),
 ) -> Result<Vec<TableTrial>, SimError> {
     let position = model.paddle_position(paddle);
-    let options = TrainingOptions { threads, ..TrainingOptions::default() };
+    let options = TrainingOptions { threads, ..TrainingOptions::of(model.scene()) };
     let (trained, _) = train(model, position, &options).map_err(WorldError::Training)?;
     let simulation = Simulation::new(model.scene());
     let plant = || TissuePlant::reduced(model, position, &trained);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use clap::ValueEnum;
 use model_offline::model::{Body, TissueModel};
+use model_offline::parallel;
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, TrainingOptions, train};
 use model_offline::scene::PlantModel;
@@ -112,6 +113,27 @@ impl<'m> TissuePlant<'m> {
     /// [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
     /// the reduced model that was asked for cannot be made (with [`WantedPlant::Auto`] the full one answers, and the account says why).
     pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: WantedPlant) -> Result<Self, WorldError> {
+        Self::trained(model, paddle, choice, &training(model))
+    }
+
+    /// The same for a paddle that is held where it rests: a reduced model needs to know nothing else.
+    ///
+    /// # Errors
+    /// As [`TissuePlant::new`].
+    pub fn with_paddle_held(
+        model: &'m TissueModel,
+        paddle: Option<usize>,
+        choice: WantedPlant,
+    ) -> Result<Self, WorldError> {
+        Self::trained(model, paddle, choice, &TrainingOptions { paddle: Some(0.0), ..training(model) })
+    }
+
+    fn trained(
+        model: &'m TissueModel,
+        paddle: Option<usize>,
+        choice: WantedPlant,
+        options: &TrainingOptions,
+    ) -> Result<Self, WorldError> {
         let mut account = PlantAccount::default();
         let wanted = match (choice, model.scene().fit) {
             (WantedPlant::Full, _) => PlantModel::Full,
@@ -126,7 +148,7 @@ impl<'m> TissuePlant<'m> {
                 let condensed = Condensed::new(model, paddle).map_err(WorldError::Condensation)?;
                 Kind::Condensed(condensed)
             }
-            PlantModel::Reduced => match train(model, paddle, &TrainingOptions::default()) {
+            PlantModel::Reduced => match train(model, paddle, options) {
                 Ok((reduced, report)) => {
                     account.model = PlantModel::Reduced;
                     account.modes = Some(report.modes);
@@ -250,6 +272,11 @@ impl TissueResponse for TissuePlant<'_> {
     }
 }
 
+/// To the scene's own accuracy, on all threads: the result does not depend on how many there are.
+fn training(model: &TissueModel) -> TrainingOptions {
+    TrainingOptions { threads: parallel::available(), ..TrainingOptions::of(model.scene()) }
+}
+
 fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, WorldError> {
     model
         .body(paddle, NewtonSettings::SMALL_STEPS)
@@ -285,6 +312,18 @@ mod tests {
         assert!(account.first_fallback.unwrap().contains("outside the trained range"));
         assert!(account.error_at_end.unwrap() < 0.01 * exact.step(inside.0, inside.1).unwrap().norm());
         assert_eq!(reduced.deformed_nodes().len(), model.nodes());
+    }
+
+    #[test]
+    fn a_held_paddle_asks_for_less_and_is_answered_by_the_full_model_once_it_moves() {
+        let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+        let mut held = TissuePlant::with_paddle_held(&model, Some(2), WantedPlant::Reduced).unwrap();
+        let mut exact = TissuePlant::new(&model, Some(2), WantedPlant::Full).unwrap();
+        for (paddle, fallbacks) in [(Vector2::zeros(), 0), (Vector2::new(1e-4, 0.0), 1)] {
+            let (h, e) = (held.step(0.05, paddle).unwrap(), exact.step(0.05, paddle).unwrap());
+            assert!((h - e).norm() < 0.01 * e.norm(), "{h} {e}");
+            assert_eq!(held.account.fallbacks, fallbacks);
+        }
     }
 
     #[test]

@@ -20,8 +20,10 @@ use std::sync::Arc;
 const MAX_ITERATIONS: u32 = 20;
 /// Last step over the largest mode amplitude seen in training at convergence: the step after it would be its square.
 const STEP_TOLERANCE: f64 = 1e-7;
-/// Pieces of the way from rest where neither the last state nor rest is a start near enough.
-const PIECES: u32 = 8;
+/// A piece of the way from rest, over the way, where neither the last state nor rest is a start near enough; and the
+/// shortest that is tried.
+const PIECE: f64 = 0.125;
+const SHORTEST_PIECE: f64 = PIECE / 64.0;
 /// A kept tangent is renewed when an iteration gains less than this.
 const CONTRACTION: f64 = 0.1;
 
@@ -30,7 +32,7 @@ const CONTRACTION: f64 = 0.1;
 pub enum Invalid {
     /// Needle or paddle are where it was not trained.
     #[error(
-        "depth {depth:.4} with the paddle displaced by ({x:.4}, {y:.4}) is outside the trained range (depth up to {max_depth:.4}, displacement up to {max_paddle:.4})"
+        "depth {depth:.4} with the paddle displaced by ({x:.4}, {y:.4}) is outside the trained range (depth up to {max_depth:.4}, displacement up to {max_x:.4} and {max_y:.4} along the axes)"
     )]
     OutsideDomain {
         /// Needle depth asked for.
@@ -41,8 +43,10 @@ pub enum Invalid {
         y: f64,
         /// Largest depth trained.
         max_depth: f64,
-        /// Largest paddle displacement trained.
-        max_paddle: f64,
+        /// Largest paddle displacement trained along x.
+        max_x: f64,
+        /// Largest paddle displacement trained along y.
+        max_y: f64,
     },
     /// The error estimate is too large.
     #[error("the estimated error of the target displacement, {estimate:.2e}, is above {tolerance:.2e}")]
@@ -65,15 +69,15 @@ pub enum Invalid {
 pub struct Domain {
     /// Largest needle depth, length units.
     pub depth: f64,
-    /// Largest paddle displacement along either axis, length units.
-    pub paddle: f64,
+    /// Largest paddle displacement along each axis, length units.
+    pub paddle: Vector2<f64>,
 }
 
 impl Domain {
     fn contains(&self, depth: f64, paddle: Vector2<f64>) -> bool {
         // A rounding error beyond the last trained state is still that state.
         let slack = 1.0 + 1e-9;
-        (0.0..=self.depth * slack).contains(&depth) && paddle.amax() <= self.paddle * slack
+        (0.0..=self.depth * slack).contains(&depth) && (0..2).all(|k| paddle[k].abs() <= self.paddle[k] * slack)
     }
 }
 
@@ -242,8 +246,9 @@ impl ReducedBody {
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Invalid> {
         let model = Arc::clone(&self.model);
         if !model.domain.contains(depth, paddle) {
-            let Domain { depth: max_depth, paddle: max_paddle } = model.domain;
-            return Err(Invalid::OutsideDomain { depth, x: paddle.x, y: paddle.y, max_depth, max_paddle });
+            let Domain { depth: max_depth, paddle: most } = model.domain;
+            let (max_x, max_y) = (most.x, most.y);
+            return Err(Invalid::OutsideDomain { depth, x: paddle.x, y: paddle.y, max_depth, max_x, max_y });
         }
         let before = self.amplitudes.clone();
         self.set_controls(depth, paddle);
@@ -311,11 +316,22 @@ impl ReducedBody {
             return true;
         }
         restart(self);
-        (1..=PIECES).all(|piece| {
-            let share = f64::from(piece) / f64::from(PIECES);
+        let (mut done, mut piece) = (0.0, PIECE);
+        while done < 1.0 {
+            let (before, share) = (self.amplitudes.clone(), f64::min(done + piece, 1.0));
             self.set_controls(share * depth, paddle * share);
-            self.converge()
-        })
+            if self.converge() {
+                done = share;
+                continue;
+            }
+            self.amplitudes = before;
+            self.factor = None;
+            piece *= 0.5;
+            if piece < SHORTEST_PIECE {
+                return false;
+            }
+        }
+        true
     }
 
     fn check(&mut self, depth: f64) -> Result<(), Invalid> {

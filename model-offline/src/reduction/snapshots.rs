@@ -18,8 +18,11 @@ const DEPTHS_ALONE: [f64; 12] = [0.08, 0.17, 0.25, 0.33, 0.42, 0.5, 0.58, 0.67, 
 const SHALLOWEST: f64 = 0.02;
 /// Part of the range that the tissue was found to reach that is trained: the very end is singular.
 const KEPT: f64 = 0.9;
+/// What the paddle's range is shrunk by where only its ends lose stability, and down to which part of it.
+const NARROWER: f64 = 0.7;
+const NARROWEST: f64 = 0.5;
 /// How often the range is shrunk because a state in it has no stable equilibrium.
-const SHRINKS: u32 = 3;
+const SHRINKS: u32 = 5;
 /// Where the tissue loses stability on the way, finding that depth to an eighth of a step is enough.
 pub(super) const SNAPSHOT_SETTINGS: NewtonSettings = NewtonSettings {
     residual_tolerance: 1e-9,
@@ -81,35 +84,55 @@ pub(super) fn states(
     drawn: u32,
     threads: usize,
 ) -> Result<States, TrainingError> {
+    let wanted = asked;
     let mut failed = None;
     for _ in 0..=SHRINKS {
-        let (mut snapshots, mut domain) = take_snapshots(at_rest, grid, asked, threads)?;
-        if domain.depth < asked.depth {
-            // The tissue does not reach the depth with the paddle everywhere: again, as far as it does.
-            asked = domain;
-            (snapshots, domain) = take_snapshots(at_rest, grid, asked, threads)?;
+        let taken = take_snapshots(at_rest, grid, asked, threads);
+        if taken.reached < asked.depth {
+            let deepest = if taken.reached_alone < asked.depth { taken.reached_alone } else { taken.reached };
+            // Every insertion goes deep and few paddles go far: room for the paddle is given up first, where that helps.
+            if taken.reached_alone == asked.depth && asked.paddle.amax() > NARROWEST * wanted.paddle.amax() {
+                asked.paddle *= NARROWER;
+            } else {
+                asked.depth = KEPT * deepest;
+            }
+            failed = Some(TrainingError::TooShallow { reached: deepest, asked: wanted.depth });
+            if asked.depth < SHALLOWEST * wanted.depth {
+                break;
+            }
+            continue;
         }
-        match draw(at_rest, domain, 0..drawn, threads) {
-            Ok(drawn) => return Ok(States { snapshots, drawn, domain }),
+        match draw(at_rest, asked, 0..drawn, threads) {
+            Ok(drawn) => return Ok(States { snapshots: taken.snapshots, drawn, domain: asked }),
             Err(error) => failed = Some(error),
         }
-        asked = Domain { depth: KEPT * domain.depth, paddle: KEPT * domain.paddle };
+        asked = Domain { depth: KEPT * asked.depth, paddle: asked.paddle * KEPT };
     }
-    Err(failed.unwrap_or(TrainingError::TooShallow { reached: 0.0, asked: asked.depth }))
+    Err(failed.unwrap_or(TrainingError::TooShallow { reached: 0.0, asked: wanted.depth }))
 }
 
-/// Full solutions on a grid of paddle positions and depths, and the domain that all of them reached.
-fn take_snapshots(
-    at_rest: &Body<'_>,
-    grid: &Grid,
-    asked: Domain,
-    threads: usize,
-) -> Result<(Vec<Snapshot>, Domain), TrainingError> {
+/// Full solutions on a grid of paddle positions and depths.
+struct Taken {
+    snapshots: Vec<Snapshot>,
+    /// Depth that was reached with the paddle everywhere.
+    reached: f64,
+    /// Depth that was reached with the paddle where it rests.
+    reached_alone: f64,
+}
+
+fn take_snapshots(at_rest: &Body<'_>, grid: &Grid, asked: Domain, threads: usize) -> Taken {
     let runs = parallel::map(grid.places.len(), threads, |k| {
         let mut body = at_rest.clone();
+        let place = grid.places[k].component_mul(&asked.paddle);
+        // The paddle's way is not what is looked for, and long: as carefully as it takes.
+        body.equilibrium_mut().set_settings(NewtonSettings::default());
+        if body.drive(0.0, place).is_err() {
+            return (Vec::new(), 0.0);
+        }
+        body.equilibrium_mut().set_settings(SNAPSHOT_SETTINGS);
         let mut taken = Vec::new();
         for depth in grid.depths.iter().map(|share| share * asked.depth) {
-            if body.drive(depth, grid.places[k] * asked.paddle).is_err() {
+            if body.drive(depth, place).is_err() {
                 break;
             }
             taken.push(snapshot(&body));
@@ -117,15 +140,11 @@ fn take_snapshots(
         (taken, body.depth())
     });
     let reached = runs.iter().map(|run| run.1).fold(asked.depth, f64::min);
-    if reached < SHALLOWEST * asked.depth {
-        return Err(TrainingError::TooShallow { reached, asked: asked.depth });
-    }
-    let complete = runs.iter().map(|run| run.0.len()).min().unwrap_or(0);
-    let depth = if complete == grid.depths.len() { asked.depth } else { KEPT * reached };
-    let kept = runs.into_iter().flat_map(|run| run.0.into_iter().take(complete));
+    let alone = grid.places.iter().position(|place| *place == Vector2::zeros());
+    let reached_alone = alone.map_or(reached, |k| runs[k].1);
     // The state at rest teaches nothing.
-    let kept = kept.filter(|s| s.controls.iter().any(|c| *c != 0.0)).collect();
-    Ok((kept, Domain { depth, ..asked }))
+    let snapshots = runs.into_iter().flat_map(|run| run.0).filter(|s| s.controls.iter().any(|c| *c != 0.0)).collect();
+    Taken { snapshots, reached, reached_alone }
 }
 
 fn snapshot(body: &Body<'_>) -> Snapshot {
@@ -142,7 +161,7 @@ fn draw(at_rest: &Body<'_>, domain: Domain, which: Range<u32>, threads: usize) -
     let states = parallel::map(which.len(), threads, |k| {
         let mut random = SplitMix64(u64::from(first) + k as u64);
         let depth = random.unit() * domain.depth;
-        let place = Vector2::new(random.symmetric(), random.symmetric()) * domain.paddle;
+        let place = Vector2::new(random.symmetric(), random.symmetric()).component_mul(&domain.paddle);
         let mut body = at_rest.clone();
         body.equilibrium_mut().set_settings(NewtonSettings::default());
         body.drive(depth, place).map_err(|failure| unstable(depth, place, failure))?;

@@ -24,6 +24,12 @@ const CONTROL_SHARE: f64 = 0.4;
 /// Numbers in the matrix that the sample is chosen by, at most.
 const LARGEST_FIT: usize = 8_000_000;
 
+/// Where on the way from the response at rest to equilibrium forces are looked at, over the way: the first that does not
+/// squeeze any point to less than this part of its volume at the most squeezed one in equilibrium. Beyond, a few points near
+/// the ends of the paddle would have forces next to which those of all others are rounding.
+const WAY: [f64; 4] = [0.0, 0.5, 0.75, 0.9];
+const SQUEEZE: f64 = 0.5;
+
 /// How large a reduced model is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Size {
@@ -222,8 +228,11 @@ impl Space {
         let stride = (all * rule.len()).div_ceil(LARGEST_FIT).max(1);
         let mut rows: Vec<DVector<f64>> = Vec::new();
         for (controls, amplitudes) in self.states.iter().step_by(stride) {
-            for share in [0.0, 1.0] {
-                let forces = self.point_forces(model, controls, &(amplitudes.rows(0, modes) * share), seen);
+            let at = |share: f64| amplitudes.rows(0, modes) * share;
+            let squeezed = self.smallest_volume_ratio(controls, &at(1.0));
+            let usable = |share: &f64| self.smallest_volume_ratio(controls, &at(*share)) >= SQUEEZE * squeezed;
+            for share in WAY.into_iter().find(usable).into_iter().chain([1.0]) {
+                let forces = self.point_forces(model, controls, &at(share), seen);
                 rows.extend(forces.into_iter().filter(|row| row.iter().all(|x| x.is_finite())));
             }
         }
@@ -242,6 +251,14 @@ impl Space {
         let sums = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.sum()));
         let forces = DMatrix::from_fn(rows.len(), rule.len(), |i, q| rows[i][q]);
         Sampling { forces, sums, taken: Vec::new() }
+    }
+
+    /// The smallest det F of all points.
+    fn smallest_volume_ratio(&self, controls: &[f64], amplitudes: &DVector<f64>) -> f64 {
+        let values: Vec<f64> = controls.iter().chain(amplitudes.iter()).copied().collect();
+        let gradient = |q: usize| self.gradients.iter().zip(&values).map(|(g, a)| g[q] * *a).sum::<Matrix2<f64>>();
+        let points = 0..self.gradients.first().map_or(0, Vec::len);
+        points.map(|q| (Matrix2::identity() + gradient(q)).determinant()).fold(f64::INFINITY, f64::min)
     }
 
     /// Every point's part of the force on each of the first `seen` modes.

@@ -6,8 +6,10 @@ use super::lifting::lifting;
 use super::online::{Domain, Invalid, ReducedModel};
 use super::snapshots::{Grid, SNAPSHOT_SETTINGS, Snapshot, States, states};
 use super::space::{GUARDS, MODES, Size, Space};
+use crate::discretization::Resolution;
 use crate::model::{ModelError, TissueModel};
 use crate::placement::controllability::best_direction;
+use crate::scene::Scene;
 use nalgebra::Vector2;
 use serde::Serialize;
 use std::sync::Arc;
@@ -26,8 +28,12 @@ const FLOOR: f64 = 0.25;
 /// Modes onto which the states cannot be projected within this multiple of the tolerance are not tried: the equilibrium
 /// on them may be nearer than the projection, but not by more.
 const HOPELESS: f64 = 2.0;
-/// The paddle's range over what it takes to hold the target.
-const WORKSPACE_MARGIN: f64 = 2.0;
+/// The paddle's range over what it takes to hold the target: along both axes what the longer takes, or, where that is not to
+/// be had, little more than the way and little across it.
+const WIDE: f64 = 2.0;
+const NARROW: f64 = 1.25;
+/// The shorter side of the narrow range over the longer, at least.
+const ASPECT: f64 = 0.5;
 
 /// What the model is trained for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,16 +42,31 @@ pub struct TrainingOptions {
     pub tolerance: f64,
     /// Largest needle depth, length units (default: the scene's).
     pub depth: Option<f64>,
-    /// Largest paddle displacement along either axis, length units (default: twice what holding the target takes, and
-    /// no more than the actuator has).
+    /// Largest paddle displacement along either axis, length units (default: twice what holding the target takes along
+    /// each, and no more than the actuator has); 0 for one that is held where it rests.
     pub paddle: Option<f64>,
     /// Threads that solve snapshots.
     pub threads: usize,
 }
 
+/// Tolerance for scenes that name none.
+const USUAL_TOLERANCE: f64 = 0.01;
+
+impl TrainingOptions {
+    /// To the accuracy that the scene itself asks for: what its fit has left to the plant, else that of its nodes.
+    pub fn of(scene: &Scene) -> Self {
+        let fitted = scene.fit.and_then(|fit| fit.plant_tolerance);
+        let tolerance = fitted.unwrap_or(match scene.discretization.resolution {
+            Resolution::Tolerance(tolerance) => tolerance,
+            Resolution::Spacing(_) | Resolution::Level(_) => USUAL_TOLERANCE,
+        });
+        Self { tolerance, ..Self::default() }
+    }
+}
+
 impl Default for TrainingOptions {
     fn default() -> Self {
-        Self { tolerance: 0.01, depth: None, paddle: None, threads: 1 }
+        Self { tolerance: USUAL_TOLERANCE, depth: None, paddle: None, threads: 1 }
     }
 }
 
@@ -97,19 +118,25 @@ pub fn train(
 ) -> Result<(Arc<ReducedModel>, TrainingReport), TrainingError> {
     let at_rest = model.body(paddle, SNAPSHOT_SETTINGS).map_err(ModelError::from)?;
     let lifts = lifting(model, paddle, at_rest.clone())?;
-    let asked = Domain {
-        depth: options.depth.unwrap_or(model.scene().needle.depth),
-        paddle: match options.paddle {
-            _ if paddle.is_none() => 0.0,
-            Some(range) => range,
-            None => workspace(model, paddle)?,
-        },
+    let depth = options.depth.unwrap_or(model.scene().needle.depth);
+    let ranges = match options.paddle {
+        _ if paddle.is_none() => vec![Vector2::zeros()],
+        Some(range) => vec![Vector2::repeat(range)],
+        None => workspaces(model, paddle)?,
     };
-    let grid = if paddle.is_some() { Grid::with_paddle() } else { Grid::of_depths() };
-    let states = states(&at_rest, &grid, asked, (CALIBRATION + FRESH) as u32, options.threads)?;
-    drop(at_rest);
-    let space = Space::new(model, &lifts, &states.snapshots);
-    smallest(model, &space, &states, options.tolerance)
+    let mut outcome = Err(TrainingError::NoEquilibrium { depth });
+    for range in ranges {
+        let grid = if range.amax() > 0.0 { Grid::with_paddle() } else { Grid::of_depths() };
+        let asked = Domain { depth, paddle: range };
+        outcome = states(&at_rest, &grid, asked, (CALIBRATION + FRESH) as u32, options.threads).and_then(|states| {
+            let space = Space::new(model, &lifts, &states.snapshots);
+            smallest(model, &space, &states, options.tolerance)
+        });
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome
 }
 
 /// The smallest model that passes its trial.
@@ -168,14 +195,20 @@ fn smallest(
     }
 }
 
-/// Displacements that a paddle holding the target needs, with a margin.
-fn workspace(model: &TissueModel, paddle: Option<usize>) -> Result<f64, ModelError> {
+/// Displacements that a paddle holding the target needs, with a margin: the wider first.
+fn workspaces(model: &TissueModel, paddle: Option<usize>) -> Result<Vec<Vector2<f64>>, ModelError> {
     let scene = model.scene();
     let condensed = Condensed::new(model, paddle)?;
     let normal = scene.needle.orthogonal();
     let to_hold = condensed.target_displacement(scene.needle.depth, Vector2::zeros()).dot(&normal);
-    let needed = best_direction(&condensed.actuation_jacobian(), normal).map_or(0.0, |d| d.amax() * to_hold.abs());
-    Ok((WORKSPACE_MARGIN * needed).max(0.02 * scene.needle.depth).min(scene.actuator.max_displacement))
+    let direction = best_direction(&condensed.actuation_jacobian(), normal).unwrap_or_default();
+    let way = (direction * to_hold).abs();
+    let both = Vector2::repeat(way.amax());
+    let least = 0.02 * scene.needle.depth;
+    let within = |side: f64| f64::min(side.max(least), scene.actuator.max_displacement);
+    let mut ranges = vec![(both * WIDE).map(within), (way.sup(&(both * ASPECT)) * NARROW).map(within)];
+    ranges.dedup();
+    Ok(ranges)
 }
 
 /// What a trial found.
@@ -219,7 +252,7 @@ fn conformal_scale(outcomes: &[(f64, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
+    use crate::scene::starter::{Labels, starter};
     use crate::solver::equilibrium::NewtonSettings;
 
     #[test]
@@ -239,7 +272,7 @@ mod tests {
             let mut worst = 0.0_f64;
             for k in 1..=20 {
                 let t = f64::from(k) / 20.0;
-                let place = Vector2::new((7.0 * t).sin(), (5.0 * t).cos() - 1.0) * (0.5 * range);
+                let place = Vector2::new((7.0 * t).sin(), (5.0 * t).cos() - 1.0).component_mul(&range) * 0.5;
                 full.drive(report.domain.depth * t, place).unwrap();
                 body.drive(report.domain.depth * t, place).unwrap();
                 let error = (full.target_displacement() - body.target_displacement()).norm();
@@ -256,9 +289,63 @@ mod tests {
             let before = body.target_displacement();
             let outside = body.drive(report.domain.depth * 1.2, Vector2::zeros()).unwrap_err();
             assert!(matches!(outside, Invalid::OutsideDomain { .. }));
-            assert!(matches!(body.drive(0.0, Vector2::new(3.0 * range, 0.0)), Err(Invalid::OutsideDomain { .. })));
+            assert!(matches!(body.drive(0.0, Vector2::new(3.0 * range.x, 0.0)), Err(Invalid::OutsideDomain { .. })));
             assert_eq!(body.target_displacement(), before);
         }
+    }
+
+    /// A block with nodes gathered at the ends of its paddles.
+    fn block() -> TissueModel {
+        let labels = Labels { name: "block".into(), length: "mm".into(), stress: "kPa".into() };
+        let scene = Scene::parse(&starter(&labels, None), "block").unwrap();
+        crate::placement::adaptive::discretise(&scene).unwrap().0
+    }
+
+    /// On the way to equilibrium the response at rest squeezes a few points there so much that their forces were all that
+    /// the sample saw: one point.
+    #[test]
+    fn points_at_the_ends_of_the_paddle_do_not_stand_for_the_body() {
+        let model = block();
+        let paddle = model.paddle_position(2);
+        let at_rest = model.body(paddle, SNAPSHOT_SETTINGS).unwrap();
+        let lifts = lifting(&model, paddle, at_rest.clone()).unwrap();
+        let domain = Domain { depth: model.scene().needle.depth, paddle: workspaces(&model, paddle).unwrap()[0] };
+        let states = states(&at_rest, &Grid::with_paddle(), domain, 1, 2).unwrap();
+        let space = Space::new(&model, &lifts, &states.snapshots);
+        for modes in [4, 8, 12] {
+            let [first, _] = space.sampling(&model, Size { modes, guards: 4 }).next(1e-2);
+            assert!(first.len() > 3 * modes, "{modes} modes: {} points", first.len());
+        }
+    }
+
+    /// Where the corners of the wide range, which no insertion goes to, cannot be had, the way to the target can.
+    #[test]
+    fn a_paddle_that_cannot_go_everywhere_can_hold_the_target() {
+        let scene = Scene::bundled("tethered").unwrap();
+        let (model, _) = crate::placement::adaptive::discretise(&scene).unwrap();
+        let paddle = model.paddle_position(2);
+        let [wide, narrow] = workspaces(&model, paddle).unwrap()[..] else { panic!("two ranges") };
+        assert!(wide.x == wide.y && narrow.amax() < wide.amax() && narrow.amin() < narrow.amax());
+        let (_, report) = train(&model, paddle, &TrainingOptions::of(&scene)).unwrap();
+        assert_eq!((report.domain.depth, report.domain.paddle), (scene.needle.depth, narrow));
+        assert!(report.worst_error <= 0.01);
+    }
+
+    #[test]
+    fn training_aims_at_what_the_scene_asks_for() {
+        let tolerance = |resolution: &str, fit: &str| {
+            let text = crate::scene::BUNDLED[0].1.replace("spacing = 0.1", resolution);
+            let scene = Scene::parse(&format!("{text}\n{fit}"), "asked.toml").unwrap();
+            TrainingOptions::of(&scene).tolerance
+        };
+        let fitted = "[fit]\nplant = \"reduced\"\nplant_tolerance = 0.0006\ntable_knots = 9\ntable_scalar = \"f32\"\n";
+        assert_eq!(tolerance("spacing = 0.1", ""), 0.01);
+        assert_eq!(tolerance("tolerance = 0.02", ""), 0.02);
+        assert_eq!(tolerance("level = 1", fitted), 0.0006);
+        let negative = fitted.replace("0.0006", "-1.0");
+        let text = format!("{}\n{negative}", crate::scene::BUNDLED[0].1);
+        let refused = Scene::parse(&text, "asked.toml").unwrap_err();
+        assert!(format!("{refused:?}").contains("relative error"), "{refused:?}");
     }
 
     #[test]
@@ -303,7 +390,7 @@ mod tests {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
         let at_rest = model.body(Some(2), SNAPSHOT_SETTINGS).unwrap();
         let lifts = lifting(&model, Some(2), at_rest.clone()).unwrap();
-        let domain = Domain { depth: 0.1, paddle: 0.02 };
+        let domain = Domain { depth: 0.1, paddle: Vector2::repeat(0.02) };
         let states = states(&at_rest, &Grid::with_paddle(), domain, 4, 1).unwrap();
         let space = Space::new(&model, &lifts, &states.snapshots);
         let mut sampling = space.sampling(&model, Size { modes: 4, guards: 4 });

@@ -259,10 +259,23 @@ impl TableScalar {
 pub struct FitSection {
     /// What the simulator solves.
     pub plant: PlantModel,
+    /// Largest error of the target displacement that a reduced plant may have, over its largest value (default: as without
+    /// a fit).
+    #[serde(default, deserialize_with = "relative_error", skip_serializing_if = "Option::is_none")]
+    pub plant_tolerance: Option<f64>,
     /// Depth knots of the controller's table.
     pub table_knots: u32,
     /// Number type that the controller needs.
     pub table_scalar: TableScalar,
+}
+
+fn relative_error<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {
+    let value = f64::deserialize(deserializer)?;
+    if value > 0.0 && value < 1.0 {
+        Ok(Some(value))
+    } else {
+        Err(serde::de::Error::custom(format!("{value} is no relative error: give a number between 0 and 1")))
+    }
 }
 
 /// The JSON Schema of the scene file.

@@ -148,7 +148,7 @@ impl Layout {
             out,
             "\n# [actuator]                        # limits of the paddle; defaults follow from the depth\n\
              # max_displacement = {d}\n# max_rate = {d}                     # per second\n# max_needle_speed = {}\n\n\
-             [discretization]\nspacing = {}                       # between nodes; or: tolerance = 0.02, of the controllability measures\n",
+             [discretization]\ntolerance = 0.02                    # largest relative error of the controllability measures; or: spacing = {}, between nodes\n",
             number(2.0 * self.depth),
             number(self.spacing),
             d = number(self.depth),

@@ -170,7 +170,7 @@ impl<'a> SimulatedInsertion<'a> {
     /// [`SimError`].
     pub fn uncontrolled(&self, paddle: Option<u32>) -> Result<MeasuredInsertion, SimError> {
         let Self { model, simulation, label, extras, progress } = *self;
-        let mut plant = PlantLoop::new(World::new(model, paddle, simulation)?, simulation);
+        let mut plant = PlantLoop::new(World::with_paddle_held(model, paddle, simulation)?, simulation);
         plant.world().start_needle(0);
         let period_ns = simulation.loop_settings.period_ns();
         for tick in 0.. {

@@ -66,6 +66,8 @@ pub struct Chosen {
     pub law: Linearity,
     /// What a simulator should solve.
     pub plant: PlantModel,
+    /// The plant's part of the tolerance: what a reduced one is trained to.
+    pub plant_tolerance: f64,
     /// Depth up to which that plant holds, length units.
     pub plant_depth: f64,
     /// Depth knots of the controller's table.
@@ -114,7 +116,8 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, TableBu
     let method = found.discretization.method;
     let wall_s = assess(found.discretization, scene, &reference, REPEATS)?.wall_s;
     let model = TissueModel::new(&scene.with_discretization(found.discretization))?;
-    let (plant, plants_rejected) = plant::plant(&model, PLANT_SHARE * tolerance, threads)?;
+    let plant_tolerance = PLANT_SHARE * tolerance;
+    let (plant, plants_rejected) = plant::plant(&model, plant_tolerance, threads)?;
     let end_to_end = plant::end_to_end(scene, &found.discretization, &plant)?;
     let table = table::table(&model, TABLE_SHARE * tolerance)?;
     let Assessment { nodes, spacing, .. } = found.assessment;
@@ -128,6 +131,7 @@ pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, TableBu
         nodes,
         law: plant.law,
         plant: plant.plant,
+        plant_tolerance,
         plant_depth: plant.depth,
         table_knots: table.knots,
         table_scalar: table.scalar,

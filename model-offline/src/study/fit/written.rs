@@ -26,9 +26,12 @@ impl Fit {
             section["support"] = toml_edit::value(support);
             section["basis"] = toml_edit::value(self.chosen.basis.name());
         }
-        let FitSection { plant, table_knots, table_scalar } = self.section();
+        let FitSection { plant, plant_tolerance, table_knots, table_scalar } = self.section();
         let mut fit = toml_edit::Table::new();
         fit["plant"] = toml_edit::value(plant.to_string());
+        if let Some(tolerance) = plant_tolerance {
+            fit["plant_tolerance"] = toml_edit::value(tolerance);
+        }
         fit["table_knots"] = toml_edit::value(i64::from(table_knots));
         fit["table_scalar"] = toml_edit::value(table_scalar.to_string());
         document["fit"] = toml_edit::Item::Table(fit);
@@ -39,6 +42,7 @@ impl Fit {
     pub fn section(&self) -> FitSection {
         FitSection {
             plant: self.chosen.plant,
+            plant_tolerance: Some(self.chosen.plant_tolerance),
             table_knots: self.chosen.table_knots,
             table_scalar: self.chosen.table_scalar,
         }
