@@ -79,6 +79,29 @@ mod tests {
         assert!(shortest.norm() < Direction::Inverse.solve(&jacobian(), &n).norm());
     }
 
+    /// μ = 0 up to the condition number κ_d, by the formula in the documentation of `damped_inverse` past it.
+    #[test]
+    fn damping_begins_where_it_is_said_to() {
+        let n = Vector2::new(0.6, 0.8);
+        for condition in [20.0, 50.0, 99.0, 101.0, 1e3] {
+            // Its condition number in the Frobenius norm is x + 1/x.
+            let x: f64 = 0.5 * (condition + (condition * condition - 4.0_f64).sqrt());
+            let jacobian = Matrix2::new(3.0, 0.0, 0.0, 3.0 / x);
+            let ratio = DAMPING_CONDITION / condition;
+            let damping = if ratio >= 1.0 {
+                0.0
+            } else {
+                jacobian.norm_squared() / (DAMPING_CONDITION * DAMPING_CONDITION) * (1.0 - ratio * ratio)
+            };
+            let expected = Vector2::from_fn(|k, _| {
+                let entry = jacobian[(k, k)];
+                entry * n[k] / (entry * entry + damping)
+            });
+            let found = Direction::Inverse.solve(&jacobian, &n);
+            assert!((found - expected).norm() < 1e-9 * expected.norm(), "{condition}: {found} {expected}");
+        }
+    }
+
     #[test]
     fn near_singular_directions_stay_bounded() {
         for exponent in 1..=12 {

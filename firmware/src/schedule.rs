@@ -246,6 +246,16 @@ mod tests {
     }
 
     #[test]
+    fn the_smallest_of_durations_is_that_of_all_not_of_the_last() {
+        let mut statistics = DurationStatistics::default();
+        let seen: [(u64, [u64; 3]); 4] = [(5, [5, 5, 5]), (9, [5, 9, 7]), (3, [3, 9, 5]), (4, [3, 9, 5])];
+        for (duration_ns, expected) in seen {
+            statistics.record(duration_ns);
+            assert_eq!([statistics.min_ns, statistics.max_ns, statistics.mean_ns()], expected, "after {duration_ns}");
+        }
+    }
+
+    #[test]
     fn lateness_does_not_drift() {
         let mut schedule = Schedule::new(0, PERIOD);
         for _ in 0..1000 {

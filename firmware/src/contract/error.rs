@@ -229,3 +229,37 @@ impl fmt::Display for TableError {
 }
 
 impl core::error::Error for TableError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// They are part of the contract: a board has no room for words.
+    #[test]
+    fn numbers_of_checks_stay() {
+        use TableError as E;
+        let field = Field::Gains;
+        let numbered = [
+            (E::TooShort { bytes: 1 }, 1),
+            (E::NotATable, 2),
+            (E::FormatVersion { found: 9 }, 3),
+            (E::Reserved, 4),
+            (E::UnknownScalar { found: 9 }, 5),
+            (E::Truncated { missing: 1 }, 6),
+            (E::TrailingBytes { extra: 1 }, 7),
+            (E::Checksum { written: 1, computed: 2 }, 8),
+            (E::ScalarKind { found: ScalarKind::F32, expected: ScalarKind::F64 }, 9),
+            (E::Dimension { found: 3, expected: 2 }, 10),
+            (E::Payload, 12),
+            (E::NotFinite { field }, 14),
+            (E::NotPositive { field }, 15),
+            (E::NotUnit { field }, 16),
+            (E::NotOrthogonal, 17),
+            (E::Gains, 24),
+            (E::BufferTooSmall { bytes: 1 }, 25),
+        ];
+        for (error, number) in numbered {
+            assert_eq!(error.code(), number, "{error:?}");
+        }
+    }
+}

@@ -87,3 +87,48 @@ impl fmt::Display for Field {
         f.write_str(self.name())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::string::ToString;
+
+    use super::Field;
+
+    #[test]
+    fn every_field_has_a_name_of_its_own() {
+        use Field as F;
+        let all = [
+            F::TargetPosition,
+            F::PaddleSegment,
+            F::NeedleAxis,
+            F::OrthogonalDirection,
+            F::PaddleDisplacementLimit,
+            F::PaddleRateLimit,
+            F::ValidPaddleDisplacement,
+            F::NeedleSpeedLimit,
+            F::Gains,
+            F::ValidityDepthRange,
+            F::KnotDepth,
+            F::KnotJacobian,
+            F::KnotPaddlePath,
+            F::KnotPaddlePathSlope,
+            F::KnotTargetDisplacement,
+            F::KnotTargetDisplacementSlope,
+            F::KnotStaticTargetDisplacement,
+            F::DepthRange,
+            F::DistanceFromPaddleToTarget,
+            F::TargetDisplacement,
+            F::TargetDisplacementSlope,
+            F::PaddlePathSlope,
+        ];
+        let names: BTreeSet<&str> = all.iter().map(|field| field.name()).collect();
+        assert_eq!(names.len(), all.len());
+        for field in all {
+            // The variant's name in words: `KnotJacobian` is the knot Jacobian.
+            let letters = std::format!("{field:?}").to_lowercase();
+            assert_eq!(field.name().replace(' ', "").to_lowercase(), letters);
+            assert_eq!(field.to_string(), field.name());
+        }
+    }
+}

@@ -9,7 +9,7 @@ use super::sample::Measurement;
 use super::stream::StreamGate;
 use crate::contract::Faults;
 use crate::contract::example::table;
-use crate::detection::{RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
+use crate::detection::{NEEDLE_WINDOW_NS, RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
 use crate::settings::{Runtime, Settings};
 
 const MS: u64 = 1_000_000;
@@ -222,4 +222,21 @@ fn a_depth_jumps_by_what_speed_and_resolution_explain() {
             assert!(!refused(before, velocity, ticks, sign * jump * 0.999), "{before} {velocity} {ticks}");
         }
     }
+}
+
+/// The window of depth against velocity begins with the sample that opens it.
+#[test]
+fn the_window_of_the_needle_begins_with_its_first_sample() {
+    let table = table();
+    let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+    let resting = |time_ns: u64| at(time_ns, [0.02, 0.0]);
+    let begun = NeedleMonitor::beginning_with(&resting(NEEDLE_WINDOW_NS));
+    assert_ne!(begun, NeedleMonitor::default());
+    let still = |monitor: &NeedleMonitor, before: u64, time_ns: u64| {
+        monitor.next(&runtime, &resting(time_ns), &resting(before)).unwrap()
+    };
+    // A period before its end it is still the same window; a period past it a new one.
+    let last = 2 * NEEDLE_WINDOW_NS;
+    assert_eq!(still(&begun, last - MS, last), begun);
+    assert_eq!(still(&begun, last, last + MS), NeedleMonitor::beginning_with(&resting(last + MS)));
 }

@@ -341,3 +341,34 @@ fn an_account_with_every_counter_full_fits_into_a_frame() {
     writer.encode(&HELLO).unwrap();
     assert!(writer.encode(&Reply::Account(account)).is_some());
 }
+
+#[test]
+fn the_newer_of_two_samples_is_kept_up_to_half_the_range_ahead() {
+    const HALF: u32 = u32::MAX / 2;
+    for start in [0, 7, u32::MAX - 2] {
+        for (ahead, kept) in [(1, true), (HALF, true), (HALF + 1, false), (u32::MAX, false), (0, true)] {
+            let (first, second) = ((start, 'a'), (start.wrapping_add(ahead), 'b'));
+            let mut newest = Some(first);
+            keep_newest(&mut newest, second, |sample| sample.0);
+            assert_eq!(newest == Some(second), kept, "{ahead} ahead of {start}");
+        }
+    }
+}
+
+/// The offset is the largest that a message was not too late to show, and is forgotten at the rate that crystals drift.
+#[test]
+fn a_message_that_is_late_does_not_set_the_clock_back_and_drift_does() {
+    let mut bench = Bench::default();
+    let mut now = Now::new(0);
+    let told = 5_000_000_000;
+    now.set(&mut bench, told);
+    // 0.5 s later by the board's counter of 1 MHz; the message was 0.1 s on its way.
+    bench.counter = 500_000;
+    now.set(&mut bench, told + 400_000_000);
+    let forgotten = 500_000_000 / DRIFT;
+    assert_eq!(now.read(&mut bench), Some(told + 500_000_000 - forgotten));
+    // One that was faster than the first counts as it is.
+    bench.counter = 600_000;
+    now.set(&mut bench, told + 600_500_000);
+    assert_eq!(now.read(&mut bench), Some(told + 600_500_000));
+}
