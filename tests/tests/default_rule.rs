@@ -146,8 +146,8 @@ fn without_the_stabilisation_a_checkerboard_is_free_inside_and_with_it_it_is_not
         field(&checkerboard) / field(&|_| 1e-3)
     };
     let (plain, stabilised) = (share(Integration::Scni), share(Integration::ScniStabilised));
-    println!("checkerboard over a block moved as far: {plain:.3} without, {stabilised:.3} with");
-    assert!(stabilised > 5.0 * plain);
+    // As much as a block that is moved: alternating displacements strain every cell, and cost more than its edge does.
+    assert!(plain < 0.3 && stabilised > 1.0, "{plain} without, {stabilised} with");
 }
 
 #[test]

@@ -193,7 +193,7 @@ fn man(directory: &Path) -> Result<(), SimError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 8] = ["place", "solve", "table", "inspect", "new", "fit", "pareto", "stability"];
+const ELSEWHERE: [&str; 8] = ["place", "solve", "table", "inspect", "new", "fit", "pareto", "sweep"];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
 pub(crate) fn parse() -> Cli {

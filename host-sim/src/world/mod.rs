@@ -25,7 +25,7 @@ use self::error::WorldError;
 use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{PlantAccount, TissuePlant, TissueResponse, WantedPlant};
+use self::tissue::{Attachment, PlantAccount, Reductions, TissuePlant, TissueResponse};
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
@@ -59,32 +59,27 @@ impl<'m> World<TissuePlant<'m>> {
     /// # Errors
     /// [`WorldError`].
     pub fn new(model: &'m TissueModel, paddle_index: Option<u32>, simulation: &Simulation) -> Result<Self, WorldError> {
-        Self::with_plant(model, paddle_index, simulation, TissuePlant::new)
+        let reductions = Reductions::default();
+        Self::sharing(model, paddle_index, Attachment::moved, simulation, &reductions)
     }
 
-    /// The same with a paddle that nobody moves.
+    /// The same with a paddle that is moved or held, and reduced models that others of this tissue have asked for, or will.
     ///
     /// # Errors
     /// [`WorldError`].
-    pub fn with_paddle_held(
+    pub fn sharing(
         model: &'m TissueModel,
         paddle_index: Option<u32>,
+        attachment: fn(Option<usize>) -> Attachment,
         simulation: &Simulation,
-    ) -> Result<Self, WorldError> {
-        Self::with_plant(model, paddle_index, simulation, TissuePlant::with_paddle_held)
-    }
-
-    fn with_plant(
-        model: &'m TissueModel,
-        paddle_index: Option<u32>,
-        simulation: &Simulation,
-        plant: impl Fn(&'m TissueModel, Option<usize>, WantedPlant) -> Result<TissuePlant<'m>, WorldError>,
+        reductions: &Reductions,
     ) -> Result<Self, WorldError> {
         let position =
             paddle_index.map(|index| model.paddle_position(index).ok_or(WorldError::NoPaddle { index })).transpose()?;
         let depth = simulation.depth;
         let settings = simulation.loop_settings.settings(depth);
-        let tissue = plant(model, position, simulation.plant.unwrap_or_default())?;
+        let choice = simulation.plant.unwrap_or_default();
+        let tissue = TissuePlant::sharing(model, attachment(position), choice, reductions)?;
         let drive = NeedleTrajectory::new(depth, simulation.insertion_s);
         let sensors = Sensors {
             target: TargetSensor::new(

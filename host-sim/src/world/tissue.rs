@@ -1,13 +1,13 @@
 //! What answers for the tissue at every tick: the full model, a reduced one with the full one behind it, or the
 //! condensed linear one.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ValueEnum;
 use model_offline::model::{Body, TissueModel};
 use model_offline::parallel;
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
-use model_offline::reduction::{Condensed, TrainingOptions, train};
+use model_offline::reduction::{Condensed, TrainingError, TrainingOptions, TrainingReport, train};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
@@ -74,6 +74,56 @@ impl Default for PlantAccount {
     }
 }
 
+/// What is attached to a body, and what becomes of it: all that a reduced model of the body depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Attachment {
+    /// Place of the paddle in the scene's list; none without one.
+    pub paddle: Option<usize>,
+    /// Whether it stays where it rests. A reduced model needs to know nothing else then.
+    pub held: bool,
+}
+
+impl Attachment {
+    /// A paddle that moves.
+    pub const fn moved(paddle: Option<usize>) -> Self {
+        Self { paddle, held: false }
+    }
+
+    /// A paddle that does not.
+    pub const fn held(paddle: Option<usize>) -> Self {
+        Self { paddle, held: true }
+    }
+
+    /// To the scene's own accuracy, on all threads: the result does not depend on how many there are.
+    fn training(self, model: &TissueModel) -> TrainingOptions {
+        let options = TrainingOptions { threads: parallel::available(), ..TrainingOptions::of(model.scene()) };
+        if self.held { TrainingOptions { paddle: Some(0.0), ..options } } else { options }
+    }
+}
+
+/// What training found.
+type Trained = Result<(Arc<ReducedModel>, TrainingReport), TrainingError>;
+
+/// Reduced models of one tissue, each trained when it is first asked for: insertions that differ in table, mode or loop
+/// alone share theirs. Refusals are remembered too.
+#[derive(Debug, Default)]
+pub struct Reductions(Mutex<Vec<(Attachment, Trained)>>);
+
+impl Reductions {
+    /// The one for this attachment; `model` is the same at every call.
+    fn of(&self, model: &TissueModel, attachment: Attachment) -> Trained {
+        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known().iter().find(|(of, _)| *of == attachment).map(|(_, trained)| trained.clone());
+        found.unwrap_or_else(|| {
+            // Without the lock: a thread that waits for others to train may be given another insertion meanwhile, which
+            // asks here as well.
+            let trained = train(model, attachment.paddle, &attachment.training(model));
+            known().push((attachment, trained.clone()));
+            trained
+        })
+    }
+}
+
 /// What answers for the tissue.
 pub trait TissueResponse {
     /// Takes needle and paddle to where they are now; returns the target displacement, length.
@@ -113,27 +163,20 @@ impl<'m> TissuePlant<'m> {
     /// [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
     /// the reduced model that was asked for cannot be made (with [`WantedPlant::Auto`] the full one answers, and the account says why).
     pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: WantedPlant) -> Result<Self, WorldError> {
-        Self::trained(model, paddle, choice, &training(model))
+        Self::sharing(model, Attachment::moved(paddle), choice, &Reductions::default())
     }
 
-    /// The same for a paddle that is held where it rests: a reduced model needs to know nothing else.
+    /// The same with reduced models that others of this tissue have asked for, or will.
     ///
     /// # Errors
     /// As [`TissuePlant::new`].
-    pub fn with_paddle_held(
+    pub fn sharing(
         model: &'m TissueModel,
-        paddle: Option<usize>,
+        attachment: Attachment,
         choice: WantedPlant,
+        reductions: &Reductions,
     ) -> Result<Self, WorldError> {
-        Self::trained(model, paddle, choice, &TrainingOptions { paddle: Some(0.0), ..training(model) })
-    }
-
-    fn trained(
-        model: &'m TissueModel,
-        paddle: Option<usize>,
-        choice: WantedPlant,
-        options: &TrainingOptions,
-    ) -> Result<Self, WorldError> {
+        let paddle = attachment.paddle;
         let mut account = PlantAccount::default();
         let wanted = match (choice, model.scene().fit) {
             (WantedPlant::Full, _) => PlantModel::Full,
@@ -148,7 +191,7 @@ impl<'m> TissuePlant<'m> {
                 let condensed = Condensed::new(model, paddle).map_err(WorldError::Condensation)?;
                 Kind::Condensed(condensed)
             }
-            PlantModel::Reduced => match train(model, paddle, options) {
+            PlantModel::Reduced => match reductions.of(model, attachment) {
                 Ok((reduced, report)) => {
                     account.model = PlantModel::Reduced;
                     account.modes = Some(report.modes);
@@ -272,11 +315,6 @@ impl TissueResponse for TissuePlant<'_> {
     }
 }
 
-/// To the scene's own accuracy, on all threads: the result does not depend on how many there are.
-fn training(model: &TissueModel) -> TrainingOptions {
-    TrainingOptions { threads: parallel::available(), ..TrainingOptions::of(model.scene()) }
-}
-
 fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, WorldError> {
     model
         .body(paddle, NewtonSettings::SMALL_STEPS)
@@ -317,13 +355,39 @@ mod tests {
     #[test]
     fn a_held_paddle_asks_for_less_and_is_answered_by_the_full_model_once_it_moves() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
-        let mut held = TissuePlant::with_paddle_held(&model, Some(2), WantedPlant::Reduced).unwrap();
+        let reductions = Reductions::default();
+        let of = |attachment| TissuePlant::sharing(&model, attachment, WantedPlant::Reduced, &reductions).unwrap();
+        let mut held = of(Attachment::held(Some(2)));
+        let mut moved = of(Attachment::moved(Some(2)));
         let mut exact = TissuePlant::new(&model, Some(2), WantedPlant::Full).unwrap();
         for (paddle, fallbacks) in [(Vector2::zeros(), 0), (Vector2::new(1e-4, 0.0), 1)] {
             let (h, e) = (held.step(0.05, paddle).unwrap(), exact.step(0.05, paddle).unwrap());
             assert!((h - e).norm() < 0.01 * e.norm(), "{h} {e}");
-            assert_eq!(held.account.fallbacks, fallbacks);
+            assert_eq!((held.account.fallbacks, moved.account.fallbacks), (fallbacks, 0));
+            moved.step(0.05, paddle).unwrap();
         }
+        // Each was trained once, whoever asks again.
+        let again = of(Attachment::held(Some(2)));
+        let reduced = |plant: &TissuePlant<'_>| plant.account.modes.zip(plant.account.points);
+        assert_eq!(reduced(&again), reduced(&held));
+        assert_eq!(reductions.0.lock().unwrap().len(), 2);
+    }
+
+    /// Whoever trains waits for other threads, and may be given another insertion meanwhile, which trains as well.
+    #[test]
+    fn insertions_side_by_side_do_not_wait_for_each_other() {
+        let (finished, finish) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+            let reductions = Reductions::default();
+            let trained = parallel::map(12, 2, |k| {
+                let attachment = Attachment::held((k % 4 > 0).then_some(k % 4));
+                TissuePlant::sharing(&model, attachment, WantedPlant::Reduced, &reductions).is_ok()
+            });
+            finished.send(trained)
+        });
+        let trained = finish.recv_timeout(std::time::Duration::from_secs(60)).expect("they wait for each other");
+        assert_eq!(trained, [true; 12]);
     }
 
     #[test]

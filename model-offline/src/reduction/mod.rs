@@ -18,4 +18,4 @@ pub mod train;
 
 pub use condensed::Condensed;
 pub use online::{Invalid, ReducedModel};
-pub use train::{TrainingOptions, TrainingReport, train};
+pub use train::{TrainingError, TrainingOptions, TrainingReport, train};

@@ -42,8 +42,8 @@ pub struct TrainingOptions {
     pub tolerance: f64,
     /// Largest needle depth, length units (default: the scene's).
     pub depth: Option<f64>,
-    /// Largest paddle displacement along either axis, length units (default: twice what holding the target takes along
-    /// each, and no more than the actuator has); 0 for one that is held where it rests.
+    /// Largest paddle displacement along either axis, length units; 0 for one that is held where it rests (default: twice what
+    /// holding the target takes, or a little more than that where no more can be had; never more than the actuator has).
     pub paddle: Option<f64>,
     /// Threads that solve snapshots.
     pub threads: usize,

@@ -32,6 +32,7 @@ use crate::runtime::plant::observer::Spectator;
 use crate::runtime::signals;
 use crate::runtime::time::mode::RunMode;
 use crate::world::simulation::Simulation;
+use crate::world::tissue::Reductions;
 
 /// What is compared, and how.
 #[derive(Clone, Debug)]
@@ -81,6 +82,7 @@ impl ComparisonOptions {
 struct Studied {
     tissue: TissueVariant,
     study: PlacementStudy,
+    reductions: Reductions,
 }
 
 /// `none` and `static` of a case.
@@ -201,7 +203,7 @@ impl<'p> Comparison<'p> {
     /// The last case's scene and table, for who wants to go on.
     pub fn last_case(&self) -> Option<(&Scene, &EncodedTable)> {
         let (case, table) = self.cases.iter().zip(&self.tables).next_back()?;
-        Some((self.studied(case.tissue).model.scene(), table))
+        Some((self.studied(case.tissue).study.model.scene(), table))
     }
 
     /// Its options.
@@ -230,14 +232,14 @@ impl<'p> Comparison<'p> {
             let options = PlacementOptions { threads: self.options.threads, progress: &step, newton: None };
             let study = PlacementStudy::run(&tissue.of(&self.scene), &options)?;
             signals::check()?;
-            self.studied.push(Studied { tissue, study });
+            self.studied.push(Studied { tissue, study, reductions: Reductions::default() });
         }
         Ok(())
     }
 
-    fn studied(&self, tissue: TissueVariant) -> &PlacementStudy {
+    fn studied(&self, tissue: TissueVariant) -> &Studied {
         let found = self.studied.iter().find(|studied| studied.tissue == tissue);
-        &found.expect("the tissues of all cases are studied").study
+        found.expect("the tissues of all cases are studied")
     }
 
     /// A table for every case.
@@ -261,7 +263,7 @@ impl<'p> Comparison<'p> {
 
     fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
         self.progress.say(&format!("{tissue}: controller table"));
-        let studied = self.studied(tissue);
+        let studied = &self.studied(tissue).study;
         let paddle = studied.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
         let table = build(&studied.model, paddle, &TableOptions::default())?;
         let bytes = to_bytes(&table)?;
@@ -277,7 +279,7 @@ impl<'p> Comparison<'p> {
             .enumerate()
             .flat_map(|(i, case)| {
                 let none = (!case.is_mismatch).then_some((i, None, "none"));
-                let paddle = self.studied(case.table_tissue).placement.optimum.static_paddle;
+                let paddle = self.studied(case.table_tissue).study.placement.optimum.static_paddle;
                 none.into_iter().chain([(i, Some(paddle), "static")])
             })
             .collect();
@@ -298,8 +300,10 @@ impl<'p> Comparison<'p> {
     }
 
     fn insertion<'a>(&'a self, case: &Case, label: &'a Label<'a>, progress: &'a dyn Fn()) -> SimulatedInsertion<'a> {
+        let studied = self.studied(case.tissue);
         SimulatedInsertion {
-            model: &self.studied(case.tissue).model,
+            model: &studied.study.model,
+            reductions: Some(&studied.reductions),
             simulation: &self.simulation,
             label,
             extras: self.options.extras,

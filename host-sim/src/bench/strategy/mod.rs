@@ -35,6 +35,7 @@ use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::World;
 use crate::world::simulation::Simulation;
+use crate::world::tissue::{Attachment, Reductions};
 use crate::world::truth::Truth;
 use model_offline::output::table_text::hex;
 
@@ -137,6 +138,8 @@ pub struct SimulatedInsertion<'a> {
     pub simulation: &'a Simulation,
     /// Names of its files.
     pub label: &'a Label<'a>,
+    /// Reduced models that insertions into this tissue share; none for one of its own.
+    pub reductions: Option<&'a Reductions>,
     /// Files besides recording and time series.
     pub extras: Extras,
     /// Called at every tick.
@@ -161,7 +164,7 @@ struct FinishedInsertion<'m> {
 impl<'a> SimulatedInsertion<'a> {
     /// An insertion without files for other tools, whose progress nobody follows.
     pub fn new(model: &'a TissueModel, simulation: &'a Simulation, label: &'a Label<'a>) -> Self {
-        Self { model, simulation, label, extras: Extras::default(), progress: &|| {} }
+        Self { model, simulation, label, reductions: None, extras: Extras::default(), progress: &|| {} }
     }
 
     /// Without a paddle, or with one that does not move: nothing to control, time in ticks all the same.
@@ -169,8 +172,11 @@ impl<'a> SimulatedInsertion<'a> {
     /// # Errors
     /// [`SimError`].
     pub fn uncontrolled(&self, paddle: Option<u32>) -> Result<MeasuredInsertion, SimError> {
-        let Self { model, simulation, label, extras, progress } = *self;
-        let mut plant = PlantLoop::new(World::with_paddle_held(model, paddle, simulation)?, simulation);
+        let Self { model, simulation, label, reductions, extras, progress } = *self;
+        let own = Reductions::default();
+        let reductions = reductions.unwrap_or(&own);
+        let world = World::sharing(model, paddle, Attachment::held, simulation, reductions)?;
+        let mut plant = PlantLoop::new(world, simulation);
         plant.world().start_needle(0);
         let period_ns = simulation.loop_settings.period_ns();
         for tick in 0.. {
@@ -268,11 +274,13 @@ impl<'a> SimulatedInsertion<'a> {
 
     /// The simulated world before its first tick.
     fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<'a>, SimError> {
-        let Self { model, simulation, .. } = *self;
+        let Self { model, simulation, reductions, .. } = *self;
         let paddle = Some(controller.table.paddle.index);
+        let own = Reductions::default();
+        let reductions = reductions.unwrap_or(&own);
         let world = match controller.mode {
-            RunMode::Lockstep => World::new(model, paddle, simulation)?,
-            RunMode::FreeRun => world_in_time(model, paddle, simulation)?,
+            RunMode::Lockstep => World::sharing(model, paddle, Attachment::moved, simulation, reductions)?,
+            RunMode::FreeRun => world_in_time(model, paddle, simulation, reductions)?,
         };
         Ok(PlantLoop::new(world, simulation))
     }

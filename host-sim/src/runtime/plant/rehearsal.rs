@@ -9,7 +9,7 @@ use crate::world::World;
 use crate::world::error::WorldError;
 use crate::world::needle::NeedleTrajectory;
 use crate::world::simulation::Simulation;
-use crate::world::tissue::{TissuePlant, TissueResponse as _, WantedPlant};
+use crate::world::tissue::{Attachment, Reductions, TissuePlant, TissueResponse as _, WantedPlant};
 
 /// Steps that are timed.
 const STEPS: usize = 101;
@@ -49,8 +49,11 @@ pub fn world_in_time<'m>(
     model: &'m TissueModel,
     paddle_index: Option<u32>,
     simulation: &Simulation,
+    reductions: &Reductions,
 ) -> Result<World<TissuePlant<'m>>, WorldError> {
-    let mut world = World::new(model, paddle_index, simulation)?;
+    let at_rest =
+        |simulation: &Simulation| World::sharing(model, paddle_index, Attachment::moved, simulation, reductions);
+    let mut world = at_rest(simulation)?;
     let full = rehearse(&mut world.tissue, simulation)?;
     if full.keeps_the_period() {
         return Ok(world);
@@ -59,7 +62,7 @@ pub fn world_in_time<'m>(
         return Err(full.too_slow());
     }
     let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..*simulation };
-    let Ok(mut world) = World::new(model, paddle_index, &reduced) else { return Err(full.too_slow()) };
+    let Ok(mut world) = at_rest(&reduced) else { return Err(full.too_slow()) };
     let rehearsed = rehearse(&mut world.tissue, simulation)?;
     if !rehearsed.keeps_the_period() {
         return Err(rehearsed.too_slow());
@@ -119,10 +122,10 @@ mod tests {
             Simulation { loop_settings, plant, ..Simulation::new(&scene) }
         };
         for plant in [None, Some(WantedPlant::Full)] {
-            let refused = world_in_time(&model, Some(2), &at(5e5, plant));
+            let refused = world_in_time(&model, Some(2), &at(5e5, plant), &Reductions::default());
             assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
         }
-        let mut world = world_in_time(&model, Some(2), &at(0.02, None)).unwrap();
+        let mut world = world_in_time(&model, Some(2), &at(0.02, None), &Reductions::default()).unwrap();
         let fresh = World::new(&model, Some(2), &at(0.02, None)).unwrap().plant_account();
         assert_eq!(world.plant_account(), fresh, "a rehearsal leaves no trace");
         assert!(world.advance(0, 0).unwrap().target.iter().all(|x| x.abs() < 1e-9), "at rest again");
