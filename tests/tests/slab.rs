@@ -81,7 +81,9 @@ fn rules_with_stable_modes_are_right_on_even_nodes() {
     let reference = reference(0.005);
     let found = |integration| {
         let model = TissueModel::new(&slab(integration, Resolution::Spacing(1.0))).unwrap();
-        error(&model, &reference)
+        let error = error(&model, &reference);
+        println!("{integration:?}: {} nodes, {error:.4}", model.nodes());
+        error
     };
     // At most what the guide on trust says.
     let default = found(Integration::default());
