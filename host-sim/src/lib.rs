@@ -29,7 +29,7 @@
 //! An insertion without a paddle, and with the best static one:
 //!
 //! ```
-//! use host_sim::{Label, LoopSettings, SimulatedInsertion, Simulation};
+//! use host_sim::{Label, LoopSettings, SimulatedInsertion, Simulation, Strategy, TissueVariant};
 //! use model_offline::{Scene, PlacementOptions, PlacementStudy};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -37,8 +37,8 @@
 //! let PlacementStudy { model, placement, .. } = PlacementStudy::run(&scene, &PlacementOptions::default())?;
 //! let loop_settings = LoopSettings { rate: 50.0, ..LoopSettings::default() };
 //! let simulation = Simulation { loop_settings, ..Simulation::new(&scene).with_insertion(1.0) };
-//! let label = Label { tissue: "inclusion", table_tissue: "inclusion", strategy: "static" };
-//! let insertion = SimulatedInsertion::new(&model, &simulation, &label);
+//! let label = Label::new(TissueVariant::Inclusion, Strategy::Static);
+//! let insertion = SimulatedInsertion::new(&model, &simulation, label);
 //!
 //! let without = insertion.uncontrolled(None)?.result;
 //! let held = insertion.uncontrolled(Some(placement.optimum.static_paddle))?.result;
@@ -63,8 +63,8 @@ pub mod world;
 pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
 pub use bench::error::SimError;
 pub use bench::result::RunResult;
-pub use bench::strategy::{ControllerSetup, Extras, Label, SimulatedInsertion};
-pub use bench::tissue_variant::TissueVariant;
+pub use bench::insertion::{ControllerSetup, Extras, Label, SimulatedInsertion};
+pub use bench::strategy::Strategy;
 pub use exchange::Space;
 pub use record::recording::Recording;
 pub use record::replay::replay_file;
@@ -72,4 +72,5 @@ pub use runtime::time::mode::RunMode;
 pub use world::World;
 pub use world::loop_settings::LoopSettings;
 pub use world::simulation::Simulation;
+pub use model_offline::scene::TissueVariant;
 pub use world::tissue::WantedPlant;

@@ -63,6 +63,6 @@ pub use geometry::{Point2, Polygon};
 pub use material::{Law, Material};
 pub use model::{Body, ModelError, TissueModel};
 pub use placement::{Placement, PlacementOptions, PlacementStudy, discretise, place};
-pub use scene::{Scene, SceneError};
+pub use scene::{Scene, SceneError, TissueVariant};
 pub use solver::equilibrium::{Failure, FailureReason, NewtonSettings};
 pub use table::{TableBuildError, TableOptions};

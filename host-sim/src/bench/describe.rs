@@ -9,7 +9,7 @@ use super::result::{
     Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings,
 };
 use super::study_failure::StudyFailure;
-use super::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 use crate::world::simulation::Simulation;
 
 fn point(point: &Point2) -> [f64; 2] {

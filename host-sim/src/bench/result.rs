@@ -7,8 +7,10 @@ use model_offline::discretization::Integration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::strategy::Strategy;
 use super::study_failure::StudyFailure;
-use super::tissue_variant::{TableTissue, TissueVariant};
+use super::table_tissue::TableTissue;
+use model_offline::scene::TissueVariant;
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
@@ -49,6 +51,13 @@ pub struct RunResult {
     /// Architecture and operating system.
     #[serde(default)]
     pub platform: String,
+}
+
+impl RunResult {
+    /// Every insertion, case after case.
+    pub fn results(&self) -> impl Iterator<Item = &StrategyResult> {
+        self.cases.iter().flat_map(|case| case.strategies.iter()).map(|(_, result)| result)
+    }
 }
 
 /// Settings of the simulation.
@@ -229,6 +238,28 @@ pub struct Strategies {
     pub dynamic: Option<StrategyResult>,
     /// The same on the machine's clock.
     pub dynamic_free_run: Option<StrategyResult>,
+}
+
+impl Strategies {
+    /// One of them.
+    pub fn get(&self, strategy: Strategy) -> Option<&StrategyResult> {
+        match strategy {
+            Strategy::None => self.none.as_ref(),
+            Strategy::Static => self.static_paddle.as_ref(),
+            Strategy::Dynamic => self.dynamic.as_ref(),
+            Strategy::DynamicFreeRun => self.dynamic_free_run.as_ref(),
+        }
+    }
+
+    /// All that were asked for, in the order in which they are shown.
+    pub fn iter(&self) -> impl Iterator<Item = (Strategy, &StrategyResult)> {
+        Strategy::ALL.into_iter().filter_map(|strategy| Some((strategy, self.get(strategy)?)))
+    }
+
+    /// The dynamic one: in lockstep, or in free-run where that is all.
+    pub fn controlled(&self) -> Option<&StrategyResult> {
+        self.dynamic.as_ref().or(self.dynamic_free_run.as_ref())
+    }
 }
 
 /// One simulated insertion.

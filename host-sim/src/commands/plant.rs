@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
 use host_sim::runtime::plant::PlantLoop;

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::{Comparison, ComparisonOptions, EncodedTable};
-use host_sim::bench::strategy::Extras;
-use host_sim::bench::tissue_variant::TissueVariant;
+use host_sim::bench::insertion::Extras;
+use model_offline::scene::TissueVariant;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_run};
 use host_sim::report::terminal::summary::summary;
@@ -132,11 +132,12 @@ fn live_view(args: &RunArgs, loop_settings: &LoopSettings) -> Result<View, SimEr
 
 /// Goes on inserting under the page's knobs.
 fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(), SimError> {
-    let Some((scene, EncodedTable { table, bytes })) = comparison.last_case() else { return Ok(()) };
+    let Some((scene, table_tissue, EncodedTable { table, bytes })) = comparison.last_case() else { return Ok(()) };
     let options = comparison.options();
     let basis = InsertionBasis {
         program: &options.program,
         scene,
+        table_tissue,
         table,
         table_bytes: bytes,
         simulation: *comparison.simulation(),

@@ -6,7 +6,7 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::Progress as _;
 use host_sim::bench::tables::{KNOTS, compare};
-use host_sim::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::studies::tables::{csv, figure, summary};

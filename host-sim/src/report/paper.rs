@@ -1,7 +1,7 @@
 //! What the paper reports, for comparison: "Model Based Stabilization of Soft Tissue Targets in Needle Insertion
 //! Procedures", section III.
 
-use crate::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 
 /// Scenes that reproduce the paper.
 const PAPER_SCENES: [&str; 2] = ["paper", "paper-hull"];

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use firmware::contract::Table;
 use model_offline::placement::discretise;
-use model_offline::scene::Scene;
+use model_offline::scene::{Scene, TissueVariant};
 
 use super::server::View;
 use super::shared::Knobs;
 use crate::bench::error::SimError;
 use crate::bench::result::StrategyResult;
-use crate::bench::strategy::{ControllerSetup, Label, SimulatedInsertion};
+use crate::bench::strategy::Strategy;
+use crate::bench::insertion::{ControllerSetup, Label, SimulatedInsertion};
 use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
 use crate::runtime::names;
@@ -25,6 +26,8 @@ pub struct InsertionBasis<'a> {
     pub program: &'a Path,
     /// The scene of the simulation, as the knobs find it.
     pub scene: &'a Scene,
+    /// The tissue that the table was made for.
+    pub table_tissue: TissueVariant,
     /// What the controller believes; the knobs do not change it.
     pub table: &'a Table<f64, 2>,
     /// The same as encoded.
@@ -57,8 +60,9 @@ pub fn insertions(view: &View, basis: &InsertionBasis<'_>, say: &dyn Fn(&str)) -
             hardware: basis.hardware,
             spectator: Some(view),
         };
-        let label = Label { tissue: scene.tissue(), table_tissue: basis.table.tissue.as_str(), strategy: "live" };
-        match SimulatedInsertion::new(&model, &simulation, &label).controlled(&controller) {
+        let strategy = Strategy::dynamic(basis.mode);
+        let label = Label { tissue: scene.tissue(), table_tissue: basis.table_tissue, strategy };
+        match SimulatedInsertion::new(&model, &simulation, label).controlled(&controller) {
             Ok(measured) => say(&line(number, &knobs, &measured.result)),
             Err(SimError::Runtime(RuntimeError::Interrupted { .. })) => return Ok(()),
             // A tissue that has no equilibrium any more is something to see, not the end of the view.

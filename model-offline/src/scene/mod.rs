@@ -5,11 +5,13 @@ pub mod import;
 pub mod limits;
 pub mod schema;
 pub mod starter;
+mod tissue;
 mod validate;
 
 pub use error::SceneError;
 pub use limits::LimitError;
 pub use schema::{FitSection, PlantModel, TableScalar};
+pub use tissue::TissueVariant;
 
 use crate::discretization::{Discretization, Features};
 use crate::geometry::{Point2, Polygon};
@@ -210,9 +212,9 @@ impl Scene {
         self.inclusions.iter().map(|i| i.outline.clone()).collect()
     }
 
-    /// The label of the tissue, as reports and tables carry it.
-    pub fn tissue(&self) -> &'static str {
-        if self.inclusions.is_empty() { "homogeneous" } else { "inclusion" }
+    /// Its tissue: whether it has inclusions.
+    pub fn tissue(&self) -> TissueVariant {
+        if self.inclusions.is_empty() { TissueVariant::Homogeneous } else { TissueVariant::Inclusion }
     }
 
     /// SHA-256 over everything that the model's numbers depend on, with the discretization.

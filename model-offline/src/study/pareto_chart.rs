@@ -4,6 +4,7 @@ use super::looks::look;
 use super::measurement::{Job, Linearity, ModelKind, Point};
 use super::pareto::Pareto;
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Note, Panel, Series};
+use crate::scene::TissueVariant;
 use std::fmt::Write as _;
 
 /// What a panel shows: one error of one job.
@@ -189,7 +190,7 @@ impl View {
 
 impl Pareto {
     /// The comparison as one SVG.
-    pub fn svg(&self, scene: &str, tissue: &str) -> String {
+    pub fn svg(&self, scene: &str, tissue: TissueVariant) -> String {
         let barrier = self.barrier.map_or(String::new(), |b| format!(", barrier {b:.0} added for finite depth"));
         let conclusion = VIEWS[0].conclusion(&VIEWS[0].front(self));
         let title = conclusion.unwrap_or_else(|| "No method has a point on the front".to_owned());

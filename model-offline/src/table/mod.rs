@@ -127,7 +127,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
     let table = Table {
         scene_hash: scene.hash(),
         units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
-        tissue: label(scene.tissue())?,
+        tissue: label(scene.tissue().name())?,
         paddle: Paddle {
             index: paddle_index,
             segment: scene.paddles[position].segment,

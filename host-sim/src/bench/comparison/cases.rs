@@ -4,8 +4,9 @@ use firmware::contract::Table;
 use model_offline::scene::Scene;
 
 use crate::bench::error::SimError;
-use crate::bench::strategy::Label;
-use crate::bench::tissue_variant::TissueVariant;
+use crate::bench::insertion::Label;
+use crate::bench::strategy::Strategy;
+use model_offline::scene::TissueVariant;
 use crate::runtime::time::mode::RunMode;
 
 /// A plant, and what its controller believes.
@@ -18,8 +19,8 @@ pub(super) struct Case {
 }
 
 impl Case {
-    pub(super) fn label<'a>(&self, strategy: &'a str) -> Label<'a> {
-        Label { tissue: self.tissue.name(), table_tissue: self.table_tissue.name(), strategy }
+    pub(super) fn label(&self, strategy: Strategy) -> Label {
+        Label { tissue: self.tissue, table_tissue: self.table_tissue, strategy }
     }
 
     /// Insertions of this case.

@@ -6,7 +6,7 @@ use firmware::contract::{Table, decode};
 use model_offline::scene::Scene;
 
 use crate::bench::error::SimError;
-use crate::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 use crate::record::files::read_bytes;
 
 /// Reads and validates a table file.

@@ -22,8 +22,10 @@ pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
 pub use self::progress::{Progress, Silent};
 use super::describe;
 use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
-use super::strategy::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
-use super::tissue_variant::{TableTissue, TissueVariant};
+use super::insertion::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
+use super::strategy::Strategy;
+use super::table_tissue::TableTissue;
+use model_offline::scene::TissueVariant;
 use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
 use crate::record::files::Artifact;
@@ -96,7 +98,7 @@ fn against_none_of_the_same_tissue(cases: &mut [CaseResult]) {
         .collect();
     for case in cases.iter_mut().filter(|case| case.improvement_over_none.is_none()) {
         let strategies = &case.strategies;
-        let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+        let dynamic = strategies.controlled();
         let error = none.iter().find(|(tissue, _)| *tissue == case.tissue);
         case.improvement_over_none = error.zip(dynamic).map(|((_, none), dynamic)| none / dynamic.max_orthogonal_error);
     }
@@ -200,10 +202,10 @@ impl<'p> Comparison<'p> {
         Ok(Compared { result: self.result(results), artifacts })
     }
 
-    /// The last case's scene and table, for who wants to go on.
-    pub fn last_case(&self) -> Option<(&Scene, &EncodedTable)> {
+    /// The last case's scene, and the table with its tissue, for who wants to go on.
+    pub fn last_case(&self) -> Option<(&Scene, TissueVariant, &EncodedTable)> {
         let (case, table) = self.cases.iter().zip(&self.tables).next_back()?;
-        Some((self.studied(case.tissue).study.model.scene(), table))
+        Some((self.studied(case.tissue).study.model.scene(), case.table_tissue, table))
     }
 
     /// Its options.
@@ -273,20 +275,20 @@ impl<'p> Comparison<'p> {
     /// `none` and `static` of all cases, on all threads: nothing in them runs in real time.
     fn uncontrolled(&self) -> Result<Vec<Uncontrolled>, SimError> {
         self.progress.say("strategies without a controller");
-        let jobs: Vec<(usize, Option<u32>, &str)> = self
+        let jobs: Vec<(usize, Option<u32>, Strategy)> = self
             .cases
             .iter()
             .enumerate()
             .flat_map(|(i, case)| {
-                let none = (!case.is_mismatch).then_some((i, None, "none"));
+                let none = (!case.is_mismatch).then_some((i, None, Strategy::None));
                 let paddle = self.studied(case.table_tissue).study.placement.optimum.static_paddle;
-                none.into_iter().chain([(i, Some(paddle), "static")])
+                none.into_iter().chain([(i, Some(paddle), Strategy::Static)])
             })
             .collect();
         let outcomes = parallel::map(jobs.len(), self.options.threads, |job| {
             let (i, paddle, strategy) = jobs[job];
             let label = self.cases[i].label(strategy);
-            self.insertion(&self.cases[i], &label, &|| self.progress.step()).uncontrolled(paddle)
+            self.insertion(&self.cases[i], label, &|| self.progress.step()).uncontrolled(paddle)
         });
         let mut results: Vec<_> = self.cases.iter().map(|_| (None, None)).collect();
         for ((i, paddle, _), outcome) in jobs.iter().zip(outcomes) {
@@ -299,7 +301,7 @@ impl<'p> Comparison<'p> {
         Ok(results)
     }
 
-    fn insertion<'a>(&'a self, case: &Case, label: &'a Label<'a>, progress: &'a dyn Fn()) -> SimulatedInsertion<'a> {
+    fn insertion<'a>(&'a self, case: &Case, label: Label, progress: &'a dyn Fn()) -> SimulatedInsertion<'a> {
         let studied = self.studied(case.tissue);
         SimulatedInsertion {
             model: &studied.study.model,
@@ -349,10 +351,7 @@ impl<'p> Comparison<'p> {
         mode: RunMode,
         spectator: Option<&dyn Spectator>,
     ) -> Result<MeasuredInsertion, SimError> {
-        let label = case.label(match mode {
-            RunMode::Lockstep => "dynamic",
-            RunMode::FreeRun => "dynamic-free-run",
-        });
+        let label = case.label(Strategy::dynamic(mode));
         self.progress.say(&format!("{}: dynamic, {mode}", case.tissue));
         let controller = ControllerSetup {
             program: &self.options.program,
@@ -362,14 +361,14 @@ impl<'p> Comparison<'p> {
             hardware: self.options.hardware,
             spectator,
         };
-        self.insertion(case, &label, &|| self.progress.step()).controlled(&controller)
+        self.insertion(case, label, &|| self.progress.step()).controlled(&controller)
     }
 
     fn case_result(&self, case: &Case, encoded: &EncodedTable, strategies: Strategies) -> Result<CaseResult, SimError> {
         let EncodedTable { table, bytes } = encoded;
         let settings = self.simulation.loop_settings.settings(table.validity.depth_end);
         let controller = Controller::new(table, &settings)?;
-        let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+        let dynamic = strategies.controlled();
         let over = |strategy: &Option<StrategyResult>| {
             let factor = |dynamic: &StrategyResult| {
                 strategy.as_ref().map(|other| other.max_orthogonal_error / dynamic.max_orthogonal_error)

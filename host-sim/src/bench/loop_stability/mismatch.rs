@@ -12,7 +12,7 @@ use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::behaviour::Behaviour;
 use super::cells::simulate;
-use crate::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 
 /// One depth of one paddle.
 #[derive(Clone, Copy, Debug, PartialEq)]

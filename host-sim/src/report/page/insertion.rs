@@ -6,26 +6,8 @@ use model_offline::output::chart::{Axis, Colour, Dash, Drawing, Panel, Place, Re
 
 use super::embed::CHART_WIDTH;
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::bench::strategy::Strategy;
 use crate::runtime::names;
-
-/// Strategies in the order in which they are shown: class of their line and name.
-pub(super) fn strategies(case: &CaseResult) -> Vec<(&'static str, &'static str, &StrategyResult)> {
-    let all = &case.strategies;
-    [
-        ("none", "no paddle", &all.none),
-        ("static", "static", &all.static_paddle),
-        ("dynamic", "dynamic", &all.dynamic),
-        ("free", "dynamic, free-run", &all.dynamic_free_run),
-    ]
-    .into_iter()
-    .filter_map(|(class, name, strategy)| strategy.as_ref().map(|strategy| (class, name, strategy)))
-    .collect()
-}
-
-/// Whether a strategy has a controller.
-fn is_dynamic(class: &str) -> bool {
-    matches!(class, "dynamic" | "free")
-}
 
 /// A case in words.
 pub(super) fn case_name(case: &CaseResult) -> String {
@@ -37,12 +19,12 @@ pub(super) fn case_name(case: &CaseResult) -> String {
 }
 
 /// Colour and pattern of a strategy's line, the same in every chart.
-fn look(class: &str) -> (Colour, Dash) {
-    match class {
-        "static" => (Colour::Vermillion, Dash::Dashed),
-        "dynamic" => (Colour::Blue, Dash::Solid),
-        "free" => (Colour::Green, Dash::DashDot),
-        _ => (Colour::Quiet, Dash::Dotted),
+fn look(strategy: Strategy) -> (Colour, Dash) {
+    match strategy {
+        Strategy::None => (Colour::Quiet, Dash::Dotted),
+        Strategy::Static => (Colour::Vermillion, Dash::Dashed),
+        Strategy::Dynamic => (Colour::Blue, Dash::Solid),
+        Strategy::DynamicFreeRun => (Colour::Green, Dash::DashDot),
     }
 }
 
@@ -100,18 +82,19 @@ fn error_panel(run: &RunResult, case: &CaseResult) -> Panel {
     let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));
     panel.description = format!("Orthogonal error along the insertion, {}", case_name(case));
     panel.lines.push(zero());
-    for (class, name, strategy) in strategies(case).into_iter().filter(|shown| shown.0 != "free") {
-        let name = strategy.paddle.map_or_else(|| name.to_owned(), |paddle| format!("{name}, paddle {paddle}"));
-        let (colour, dash) = look(class);
-        panel.series.push(Series::curve(&name, colour, dash, errors(strategy)));
+    for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
+        let name = strategy.title();
+        let name = result.paddle.map_or_else(|| name.to_owned(), |paddle| format!("{name}, paddle {paddle}"));
+        let (colour, dash) = look(strategy);
+        panel.series.push(Series::curve(&name, colour, dash, errors(result)));
     }
     panel
 }
 
 /// Error of the dynamic strategies, enlarged, beside the sensor's noise.
 fn enlarged_panel(run: &RunResult, case: &CaseResult) -> Panel {
-    let dynamic = || strategies(case).into_iter().filter(|(class, ..)| is_dynamic(class));
-    let largest = dynamic().map(|(.., strategy)| strategy.max_orthogonal_error).fold(0.0, f64::max);
+    let dynamic = || case.strategies.iter().filter(|shown| shown.0.has_controller());
+    let largest = dynamic().map(|(_, result)| result.max_orthogonal_error).fold(0.0, f64::max);
     let title = format!("Dynamic alone, enlarged: at most {}", number(largest, 2));
     let depth = Axis::linear("needle depth", &run.units[0]).range(0.0, run.settings.depth);
     let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));
@@ -123,9 +106,9 @@ fn enlarged_panel(run: &RunResult, case: &CaseResult) -> Panel {
             panel.lines.push(ReferenceLine::new("±1 σ of the sensor's noise", Place::Y(level), Dash::DashDot));
         }
     }
-    for (class, name, strategy) in dynamic() {
-        let (colour, dash) = look(class);
-        panel.series.push(Series::curve(name, colour, dash, errors(strategy)));
+    for (strategy, result) in dynamic() {
+        let (colour, dash) = look(strategy);
+        panel.series.push(Series::curve(strategy.title(), colour, dash, errors(result)));
     }
     panel
 }
@@ -152,9 +135,9 @@ fn paddle_panel(run: &RunResult, case: &CaseResult, name: &str, strategy: &Strat
 /// Error of all strategies, error of the dynamic ones enlarged, paddle displacement.
 pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> CaseCharts {
     let mut charts = vec![("error", Panel { cursor: true, ..error_panel(run, case) })];
-    if let Some((_, name, strategy)) = strategies(case).into_iter().find(|(class, ..)| is_dynamic(class)) {
+    if let Some((strategy, result)) = case.strategies.iter().find(|shown| shown.0.has_controller()) {
         charts.push(("enlarged", Panel { cursor: true, ..enlarged_panel(run, case) }));
-        charts.push(("paddle", paddle_panel(run, case, name, strategy)));
+        charts.push(("paddle", paddle_panel(run, case, strategy.title(), result)));
     }
     CaseCharts(charts.into_iter().map(|(what, panel)| (format!("case{number}-{what}"), panel)).collect())
 }
@@ -170,14 +153,14 @@ pub(super) fn table(run: &RunResult) -> Markup {
                 th { (in_unit("largest error", unit)) } th { (in_unit("at depth", unit)) } th { (in_unit("RMS error", unit)) }
                 th { (in_unit("paddle travel", unit)) } th.left { "final state" } th.left { "faults ever present" }
             } }
-            tbody { @for case in &run.cases { @for (_, name, strategy) in strategies(case) {
+            tbody { @for case in &run.cases { @for (strategy, result) in case.strategies.iter() {
                 tr {
-                    td { (case.tissue) } td.left { (case.table_tissue) } td.left { (name) } td.left { (strategy.mode) }
-                    td { (strategy.paddle.map_or_else(|| NO_NUMBER.to_owned(), |index| index.to_string())) }
-                    td { (number(strategy.max_orthogonal_error, 4)) } td { (plain(strategy.max_error_depth)) }
-                    td { (number(strategy.rms_orthogonal_error, 4)) }
-                    td { (number(strategy.paddle_travel, 4)) }
-                    td.left { (names::mode::name(strategy.final_state)) } td.wrap { (strategy.faults) }
+                    td { (case.tissue) } td.left { (case.table_tissue) } td.left { (strategy.title()) } td.left { (result.mode) }
+                    td { (result.paddle.map_or_else(|| NO_NUMBER.to_owned(), |index| index.to_string())) }
+                    td { (number(result.max_orthogonal_error, 4)) } td { (plain(result.max_error_depth)) }
+                    td { (number(result.rms_orthogonal_error, 4)) }
+                    td { (number(result.paddle_travel, 4)) }
+                    td.left { (names::mode::name(result.final_state)) } td.wrap { (result.faults) }
                 }
             } } }
         } }

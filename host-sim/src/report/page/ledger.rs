@@ -4,21 +4,20 @@ use firmware::Discard;
 use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, count};
 
-use super::insertion::strategies;
 use crate::bench::result::RunResult;
 use crate::runtime::accounting::ledger::LedgerResult;
 
 fn ledgers(run: &RunResult) -> Vec<(String, &LedgerResult)> {
     run.cases
         .iter()
-        .flat_map(|case| strategies(case).into_iter().map(move |shown| (case, shown)))
-        .filter_map(|(case, (.., strategy))| {
+        .flat_map(|case| case.strategies.iter().map(move |shown| (case, shown)))
+        .filter_map(|(case, (_, result))| {
             let table = if case.table_tissue.is(case.tissue) {
                 String::new()
             } else {
                 format!(" (table of {})", case.table_tissue)
             };
-            strategy.ledger.as_ref().map(|ledger| (format!("{}{table}, {}", case.tissue, strategy.mode), ledger))
+            result.ledger.as_ref().map(|ledger| (format!("{}{table}, {}", case.tissue, result.mode), ledger))
         })
         .collect()
 }

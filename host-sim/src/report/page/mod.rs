@@ -26,7 +26,7 @@ use model_offline::output::chart::number::{in_unit, number, plain};
 use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
 
 use self::embed::{charts, inline, panels};
-use self::insertion::{CaseCharts, case_charts, case_name, strategies};
+use self::insertion::{CaseCharts, case_charts, case_name};
 use super::paper::{is_paper, paper_optima};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 
@@ -44,11 +44,6 @@ const PARTS: [(&str, &str); 7] = [
     ("ledger", "Ledger"),
     ("repeat", "To repeat it"),
 ];
-
-/// The dynamic strategy of a case: lockstep, or free-run where that is all.
-fn dynamic(case: &CaseResult) -> Option<&StrategyResult> {
-    case.strategies.dynamic.as_ref().or(case.strategies.dynamic_free_run.as_ref())
-}
 
 /// The result in one sentence.
 fn sentence(run: &RunResult) -> String {
@@ -111,7 +106,7 @@ fn head(run: &RunResult) -> Markup {
                 td { (case.tissue) }
                 td { (largest(case.strategies.none.as_ref())) }
                 td { (largest(case.strategies.static_paddle.as_ref())) }
-                td.best { (largest(dynamic(case))) }
+                td.best { (largest(case.strategies.controlled())) }
                 td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td { (case.improvement_over_none.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td.left { (case.table_tissue) }
@@ -149,7 +144,7 @@ fn part(number: usize, content: &Markup) -> Markup {
 }
 
 fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
-    let frames = strategies_of(run).map(|strategy| strategy.frames.len()).max().unwrap_or(0);
+    let frames = run.results().map(|strategy| strategy.frames.len()).max().unwrap_or(0);
     html! {
         figure.scene { (inline(&scene::at_rest(run))) figcaption {
             "At rest: outline, nodes (dots), immobile boundary (hatched), needle with its contact and direction, paddle \
@@ -180,10 +175,6 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
             "A strategy that would repeat another case is left out."
         }
     }
-}
-
-fn strategies_of(run: &RunResult) -> impl Iterator<Item = &StrategyResult> {
-    run.cases.iter().flat_map(strategies).map(|(.., strategy)| strategy)
 }
 
 fn static_part(run: &RunResult) -> Markup {
@@ -290,9 +281,9 @@ fn scene_picture(run: &RunResult, drawings: &[Drawing]) -> String {
 pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     let surface = scene::Surface::new(run);
     let mut scene = vec![scene::at_rest(run)];
-    if let Some((i, case)) = run.cases.iter().enumerate().find(|(_, case)| dynamic(case).is_some()) {
+    if let Some((i, case)) = run.cases.iter().enumerate().find(|(_, case)| case.strategies.controlled().is_some()) {
         let body = |strategy| surface.body(run, String::new(), &format!("dynamic, case {i}"), strategy);
-        let body = dynamic(case).map(body);
+        let body = case.strategies.controlled().map(body);
         scene.extend(body.map(|body| sheet("", &[body, surface.colour_bar(run)], 1)));
     }
     let insertion: Vec<Panel> =

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, in_unit, minus, number, plain};
 use model_offline::output::chart::{Axis, Bars, Colour, Dash, Marker, Panel, Place, ReferenceLine, Series, Strip};
+use model_offline::scene::TissueVariant;
 
 use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
 use crate::report::paper::{is_paper, paper_controllability, paper_optima};
@@ -40,10 +41,10 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
     run.placements
         .iter()
         .map(|placement| {
-            let figure = match placement.tissue.name() {
-                "homogeneous" if is_paper(&run.scene) => " (the paper's Figure 2)",
-                "inclusion" if is_paper(&run.scene) => " (the paper's Figure 3)",
-                _ => "",
+            let figure = match placement.tissue {
+                _ if !is_paper(&run.scene) => "",
+                TissueVariant::Homogeneous => " (the paper's Figure 2)",
+                TissueVariant::Inclusion => " (the paper's Figure 3)",
             };
             let mut panel = Panel::new(
                 &format!(

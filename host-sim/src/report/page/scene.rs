@@ -10,6 +10,7 @@ use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
 use super::embed::inline;
 use super::view::{PlaneView, along, inside, middle};
 use crate::bench::result::{CaseResult, Geometry, RunResult, StrategyResult};
+use crate::bench::strategy::Strategy;
 
 /// Width of the scene and of a body, px.
 const SCENE_WIDTH: f64 = 420.0;
@@ -147,9 +148,9 @@ impl Surface {
     pub(super) fn new(run: &RunResult) -> Self {
         let view = PlaneView::new(run, BODY_WIDTH);
         let geometry = &run.geometry;
-        let strategies = run.cases.iter().flat_map(super::insertion::strategies);
-        let largest = strategies
-            .flat_map(|(.., strategy)| displaced(&view, geometry, &strategy.deformed_nodes))
+        let largest = run
+            .results()
+            .flat_map(|result| displaced(&view, geometry, &result.deformed_nodes))
             .map(|(_, displacement)| displacement)
             .filter(|displacement| displacement.is_finite())
             .fold(0.0, f64::max);
@@ -212,14 +213,14 @@ impl Surface {
 pub(super) fn bodies(run: &RunResult, surface: &Surface, case_number: usize, case: &CaseResult) -> Markup {
     html! {
         div.bodies {
-            @for (class, name, strategy) in super::insertion::strategies(case).iter().filter(|shown| shown.0 != "free") {
+            @for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
                 figure {
-                    (inline(&surface.body(run, body_id(case_number, class), name, strategy)))
+                    (inline(&surface.body(run, body_id(case_number, strategy), strategy.title(), result)))
                     figcaption {
-                        b { (name) @if let Some(paddle) = strategy.paddle { ", paddle " (paddle) } }
-                        " · " output id=(format!("{}-numbers", body_id(case_number, class))) {
+                        b { (strategy.title()) @if let Some(paddle) = result.paddle { ", paddle " (paddle) } }
+                        " · " output id=(format!("{}-numbers", body_id(case_number, strategy))) {
                             "orthogonal error at the end "
-                            (strategy.series.last().map_or_else(String::new, |point| number(point.orthogonal_error, 3)))
+                            (result.series.last().map_or_else(String::new, |point| number(point.orthogonal_error, 3)))
                         }
                     }
                 }
@@ -229,6 +230,6 @@ pub(super) fn bodies(run: &RunResult, surface: &Surface, case_number: usize, cas
 }
 
 /// Identifier of a body in the page.
-pub(super) fn body_id(case: usize, class: &str) -> String {
-    format!("body{case}-{class}")
+pub(super) fn body_id(case: usize, strategy: Strategy) -> String {
+    format!("body{case}-{strategy}")
 }

@@ -3,7 +3,7 @@
 use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, count, number, plain};
 
-use super::insertion::{case_name, strategies};
+use super::insertion::case_name;
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
 
 /// A word of a command line as a shell takes it.
@@ -66,9 +66,9 @@ fn tables(run: &RunResult) -> Markup {
 
 fn case_files(case: &CaseResult) -> Markup {
     html! {
-        @for (_, name, strategy) in strategies(case) { @for (file, hash) in files(strategy) {
+        @for (strategy, result) in case.strategies.iter() { @for (file, hash) in files(result) {
             tr {
-                td { (case_name(case)) ": " (name) } td.left { code { (file) } }
+                td { (case_name(case)) ": " (strategy.title()) } td.left { code { (file) } }
                 td.wrap { @if let Some(hash) = hash { code { (hash) } } @else { (NO_NUMBER) } }
             }
         } }

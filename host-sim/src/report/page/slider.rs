@@ -3,7 +3,7 @@
 use model_offline::output::chart::style::BANDS;
 use serde::Serialize;
 
-use super::insertion::{CaseCharts, strategies};
+use super::insertion::CaseCharts;
 use super::scene::{Surface, body_id};
 use crate::bench::result::{RunResult, StrategyResult};
 
@@ -76,8 +76,8 @@ fn body(run: &RunResult, surface: &Surface, id: String, strategy: &StrategyResul
 pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) -> String {
     let mut bodies = Vec::new();
     for (number, case) in run.cases.iter().enumerate() {
-        for (class, _, strategy) in strategies(case).into_iter().filter(|shown| shown.0 != "free") {
-            bodies.push(body(run, surface, body_id(number, class), strategy));
+        for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
+            bodies.push(body(run, surface, body_id(number, strategy), result));
         }
     }
     let geometry = &run.geometry;

@@ -3,7 +3,8 @@
 use super::*;
 use crate::bench::result::*;
 use crate::bench::study_failure::StudyFailure;
-use crate::bench::tissue_variant::{TableTissue, TissueVariant};
+use crate::bench::table_tissue::TableTissue;
+use model_offline::scene::TissueVariant;
 use crate::runtime::accounting::ledger::{LedgerResult, StreamResult};
 use crate::runtime::time::clock::Scheduling;
 use crate::runtime::time::durations::{Distribution, LoopTiming};

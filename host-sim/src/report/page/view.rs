@@ -22,8 +22,7 @@ impl PlaneView {
     /// Everything that is ever drawn, this wide.
     pub(super) fn new(run: &RunResult, width: f64) -> Self {
         let geometry = &run.geometry;
-        let strategies = run.cases.iter().flat_map(super::insertion::strategies);
-        let deformed = strategies.flat_map(|(.., strategy)| &strategy.deformed_nodes);
+        let deformed = run.results().flat_map(|result| &result.deformed_nodes);
         let mut bounds = Bounds::default();
         geometry.outline.iter().chain(&geometry.nodes).chain(deformed).for_each(|point| bounds.add(*point));
         let extent = bounds.extent();

@@ -9,7 +9,7 @@ use crate::bench::loop_stability::behaviour::Behaviour;
 use crate::bench::loop_stability::cells::{Boundary, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
 use crate::bench::loop_stability::rate_limit::{self, Cell, Integrator};
-use crate::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 use model_offline::output::csv::table;
 
 /// Columns of the three parts; those that do not belong to a part are empty.

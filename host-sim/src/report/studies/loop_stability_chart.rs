@@ -10,7 +10,7 @@ use crate::bench::loop_stability::behaviour::Behaviour;
 use crate::bench::loop_stability::cells::{ANGLES, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
 use crate::bench::loop_stability::rate_limit::{self, Integrator};
-use crate::bench::tissue_variant::TissueVariant;
+use model_offline::scene::TissueVariant;
 
 /// Delays and paddles, one after the other.
 const MARKERS: [Marker; 6] =

@@ -64,7 +64,7 @@ fn error(strategy: Option<&StrategyResult>) -> String {
 
 fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
     let strategies = &case.strategies;
-    let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref());
+    let dynamic = strategies.controlled();
     write!(
         text,
         "  {:<13} {:<13} {:>10} {:>13} {:>13}",

@@ -28,7 +28,7 @@ use super::measurement::Linearity;
 use crate::discretization::{Basis, Integration, Resolution};
 use crate::model::TissueModel;
 use crate::placement::reference::Reference;
-use crate::scene::Scene;
+use crate::scene::{Scene, TissueVariant};
 use crate::scene::schema::{PlantModel, TableScalar};
 use crate::table::TableBuildError;
 use serde::Serialize;
@@ -82,7 +82,7 @@ pub struct Fit {
     /// Scene name.
     pub scene: String,
     /// Tissue.
-    pub tissue: &'static str,
+    pub tissue: TissueVariant,
     /// Relative error asked for.
     pub tolerance: f64,
     /// What was chosen.

@@ -1,4 +1,4 @@
-//! One strategy on one tissue: simulated, measured, recorded.
+//! One insertion: simulated, measured, recorded.
 
 mod measure;
 
@@ -8,10 +8,12 @@ use std::time::Duration;
 use firmware::contract::Table;
 use iceoryx2::service::ipc;
 use model_offline::model::TissueModel;
+use model_offline::scene::TissueVariant;
 use sha2::{Digest, Sha256};
 
 use self::measure::measure;
 use super::result::{RecordingResult, StrategyResult};
+use super::strategy::Strategy;
 use crate::bench::error::SimError;
 use crate::exchange::{Departure, PlantPorts, Space};
 use crate::record::error::FileError;
@@ -54,18 +56,23 @@ pub struct MeasuredInsertion {
     pub artifacts: Vec<Artifact>,
 }
 
-/// Name of files of a strategy, unique in a run.
-#[derive(Clone, Debug)]
-pub struct Label<'a> {
+/// What is simulated: names its files, unique in a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Label {
     /// Tissue of the simulation.
-    pub tissue: &'a str,
+    pub tissue: TissueVariant,
     /// Tissue of the table.
-    pub table_tissue: &'a str,
+    pub table_tissue: TissueVariant,
     /// Strategy.
-    pub strategy: &'a str,
+    pub strategy: Strategy,
 }
 
-impl Label<'_> {
+impl Label {
+    /// A strategy on a tissue, with what was precomputed for the same one.
+    pub fn new(tissue: TissueVariant, strategy: Strategy) -> Self {
+        Self { tissue, table_tissue: tissue, strategy }
+    }
+
     fn file(&self, extension: &str) -> String {
         format!("{}.{extension}", self.stem())
     }
@@ -113,7 +120,7 @@ pub struct ControllerSetup<'a> {
 /// One insertion that is to be simulated.
 ///
 /// ```
-/// use host_sim::{SimulatedInsertion, Label, LoopSettings, Simulation};
+/// use host_sim::{Label, LoopSettings, SimulatedInsertion, Simulation, Strategy, TissueVariant};
 /// use model_offline::{placement::discretise, scene::Scene};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -121,8 +128,8 @@ pub struct ControllerSetup<'a> {
 /// let (model, _) = discretise(&scene)?;
 /// let loop_settings = LoopSettings { rate: 50.0, ..LoopSettings::default() };
 /// let simulation = Simulation { loop_settings, ..Simulation::new(&scene).with_insertion(1.0) };
-/// let label = Label { tissue: "inclusion", table_tissue: "inclusion", strategy: "static" };
-/// let insertion = SimulatedInsertion::new(&model, &simulation, &label);
+/// let label = Label::new(TissueVariant::Inclusion, Strategy::Static);
+/// let insertion = SimulatedInsertion::new(&model, &simulation, label);
 ///
 /// let without = insertion.uncontrolled(None)?.result;
 /// let held = insertion.uncontrolled(Some(2))?.result;
@@ -137,7 +144,7 @@ pub struct SimulatedInsertion<'a> {
     /// Its numbers.
     pub simulation: &'a Simulation,
     /// Names of its files.
-    pub label: &'a Label<'a>,
+    pub label: Label,
     /// Reduced models that insertions into this tissue share; none for one of its own.
     pub reductions: Option<&'a Reductions>,
     /// Files besides recording and time series.
@@ -163,7 +170,7 @@ struct FinishedInsertion<'m> {
 
 impl<'a> SimulatedInsertion<'a> {
     /// An insertion without files for other tools, whose progress nobody follows.
-    pub fn new(model: &'a TissueModel, simulation: &'a Simulation, label: &'a Label<'a>) -> Self {
+    pub fn new(model: &'a TissueModel, simulation: &'a Simulation, label: Label) -> Self {
         Self { model, simulation, label, reductions: None, extras: Extras::default(), progress: &|| {} }
     }
 
