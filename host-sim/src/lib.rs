@@ -62,15 +62,15 @@ pub mod world;
 
 pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
 pub use bench::error::SimError;
-pub use bench::result::RunResult;
 pub use bench::insertion::{ControllerSetup, Extras, Label, SimulatedInsertion};
+pub use bench::result::RunResult;
 pub use bench::strategy::Strategy;
 pub use exchange::Space;
+pub use model_offline::scene::TissueVariant;
 pub use record::recording::Recording;
 pub use record::replay::replay_file;
 pub use runtime::time::mode::RunMode;
 pub use world::World;
 pub use world::loop_settings::LoopSettings;
 pub use world::simulation::Simulation;
-pub use model_offline::scene::TissueVariant;
 pub use world::tissue::WantedPlant;

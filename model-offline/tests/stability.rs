@@ -17,8 +17,8 @@ fn paper() -> Scene {
 fn plain(integration: Integration, spacing: f64, paddle: u32) -> ExperimentResult {
     let scene = paper();
     let place = scene.paddles.iter().position(|p| p.index == paddle).unwrap();
-    let setting = Experiment { line_search: false, cutback: false, ..base(&scene, integration, spacing) };
-    run(&scene, place, &setting)
+    let experiment = Experiment { line_search: false, cutback: false, ..base(&scene, integration, spacing) };
+    run(&scene, place, &experiment)
 }
 
 /// Needle depths that an independent implementation reached on this scene (homogeneous, increments of 0.01, plain
@@ -54,8 +54,8 @@ fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
         for (place, depth) in [1, 3].into_iter().zip(depths) {
             let reached = (0..8).map(|seed| {
                 let regular = base(&scene, Integration::FemT6, spacing);
-                let setting = Experiment { line_search: false, cutback: false, jitter: 0.01, seed, ..regular };
-                let outcome = run(&scene, place, &setting);
+                let experiment = Experiment { line_search: false, cutback: false, jitter: 0.01, seed, ..regular };
+                let outcome = run(&scene, place, &experiment);
                 assert_eq!(outcome.nodes, nodes);
                 outcome.depth
             });

@@ -6,7 +6,7 @@ use model_offline::geometry::Point2;
 use model_offline::linalg::Pattern;
 use model_offline::material::Law;
 use model_offline::mechanics::Tissue;
-use model_offline::mechanics::assembly::{BlockPositions, State, internal_force, tangent};
+use model_offline::mechanics::assembly::{AssemblyState, BlockPositions, internal_force, tangent};
 use model_offline::model::TissueModel;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::Scene;
@@ -66,8 +66,8 @@ fn wavy(planar: &Planar) -> Vec<f64> {
     planar.positions().iter().flat_map(wave).collect()
 }
 
-fn energy_and_force(planar: &Planar, tissue: &Tissue, d: &[f64]) -> (f64, Vec<f64>, State<2>) {
-    let (mut state, mut force) = (State::default(), vec![0.0; d.len()]);
+fn energy_and_force(planar: &Planar, tissue: &Tissue, d: &[f64]) -> (f64, Vec<f64>, AssemblyState<2>) {
+    let (mut state, mut force) = (AssemblyState::default(), vec![0.0; d.len()]);
     let energy = internal_force(planar.rule(), tissue, d, &mut state, &mut force).unwrap();
     (energy, force, state)
 }

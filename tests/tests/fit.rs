@@ -47,7 +47,7 @@ fn the_scene_that_is_written_is_the_model_that_was_chosen() {
     assert!(kept.controllability <= 0.05 && kept.displacement <= 0.05, "{kept:?}");
     // The paper's law at full depth is far from linear: the linear law is rejected with its number.
     assert_eq!(found.chosen.plant, PlantModel::Reduced);
-    assert!(found.rejected.iter().any(|r| r.candidate.decision() == Decision::Law && r.reason.number() > Some(0.05)));
+    assert!(found.rejected.iter().any(|r| r.alternative.decision() == Decision::Law && r.reason.number() > Some(0.05)));
     // Comments of the original survive.
     let comments = BUNDLED[0].1.lines().filter(|l| l.trim_start().starts_with('#')).count();
     assert!(comments > 0 && text.lines().filter(|l| l.trim_start().starts_with('#')).count() >= comments);

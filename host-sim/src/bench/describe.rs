@@ -9,8 +9,8 @@ use super::result::{
     Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings,
 };
 use super::study_failure::StudyFailure;
-use model_offline::scene::TissueVariant;
 use crate::world::simulation::Simulation;
+use model_offline::scene::TissueVariant;
 
 fn point(point: &Point2) -> [f64; 2] {
     [point.x, point.y]

@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 use super::strategy::Strategy;
 use super::study_failure::StudyFailure;
 use super::table_tissue::TableTissue;
-use model_offline::scene::TissueVariant;
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::PlantAccount;
+use model_offline::scene::TissueVariant;
 
 /// Version of this format.
 pub const FORMAT: u32 = 1;

@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use clap::Args;
 use host_sim::SimError;
-use model_offline::scene::TissueVariant;
 use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
 use host_sim::runtime::plant::PlantLoop;
@@ -17,6 +16,7 @@ use host_sim::world::World;
 use host_sim::world::tissue::Reductions;
 use model_offline::output::table_text::hex;
 use model_offline::placement::model_with_paddle;
+use model_offline::scene::TissueVariant;
 
 use super::outputs::check_outputs;
 use super::world_args::{PATIENCE, WorldArgs};

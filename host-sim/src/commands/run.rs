@@ -6,7 +6,6 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::{Comparison, ComparisonOptions, EncodedTable};
 use host_sim::bench::insertion::Extras;
-use model_offline::scene::TissueVariant;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_run};
 use host_sim::report::terminal::summary::summary;
@@ -18,6 +17,7 @@ use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{self, InsertionBasis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
 use model_offline::scene::TableScalar;
+use model_offline::scene::TissueVariant;
 
 use super::outputs::check_json_beside_report;
 use super::world_args::{WorldArgs, threads_within_reason};

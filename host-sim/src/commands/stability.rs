@@ -22,7 +22,7 @@ const PARTS: u64 = 3;
 
 /// Options of `stability`.
 #[derive(Args, Clone, Debug)]
-pub(crate) struct StabilityArgs {
+pub(crate) struct LoopStabilityArgs {
     /// Folder for closed_loop.csv and closed_loop.svg; made when it is not there
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
@@ -44,7 +44,7 @@ pub(crate) struct StabilityArgs {
 ///
 /// # Errors
 /// [`SimError`]: a bad scene, tissue that cannot be modelled, files that cannot be written.
-pub(crate) fn stability(args: &StabilityArgs) -> Result<(), SimError> {
+pub(crate) fn stability(args: &LoopStabilityArgs) -> Result<(), SimError> {
     signals::install();
     let scene = Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?;
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;

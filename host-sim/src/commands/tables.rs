@@ -6,13 +6,13 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::Progress as _;
 use host_sim::bench::tables::{KNOTS, compare};
-use model_offline::scene::TissueVariant;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::studies::tables::{csv, figure, summary};
 use model_offline::parallel;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
+use model_offline::scene::TissueVariant;
 
 use super::world_args::threads_within_reason;
 

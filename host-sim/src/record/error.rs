@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use firmware::contract::TableError;
 
+use super::difference::Difference;
 use crate::runtime::error::RuntimeError;
 
 /// A file that cannot be read or written.
@@ -108,7 +109,7 @@ pub enum RecordError {
     #[diagnostic(transparent)]
     Runtime(#[from] RuntimeError),
     /// A replayed command is not the recorded one.
-    #[error("{}: {differences} of {ticks} commands differ, the first at tick {tick}: {detail}", path.display())]
+    #[error("{}: {differences} of {ticks} commands differ, the first at tick {tick}: {first}", path.display())]
     ReplayDiffers {
         /// File.
         path: PathBuf,
@@ -119,6 +120,6 @@ pub enum RecordError {
         /// Tick of the first difference.
         tick: u64,
         /// What differs there.
-        detail: String,
+        first: Difference,
     },
 }

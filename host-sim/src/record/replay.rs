@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use firmware::Mode;
-use firmware::contract::PaddleCommand;
 
+use super::difference::difference;
 use super::error::RecordError;
 use super::recording::Recording;
 use crate::runtime::executor::AnyTable;
@@ -55,36 +55,16 @@ pub fn replay(recording: &Recording, path: &Path) -> Result<Replayed, RecordErro
         }
         was_safe = record.tick.command.state == Mode::Safe as u32;
         let command = executor.step(inputs)?;
-        if let Some(detail) = difference(&record.tick.command, &command) {
+        if let Some(difference) = difference(&record.tick.command, &command) {
             differences += 1;
-            first.get_or_insert((inputs.tick, detail));
+            first.get_or_insert((inputs.tick, difference));
         }
     }
     let ticks = recording.records.len() as u64;
     match first {
         None => Ok(Replayed { ticks, mode: header.mode, seed: header.seed }),
-        Some((tick, detail)) => {
-            Err(RecordError::ReplayDiffers { path: path.to_owned(), differences, ticks, tick, detail })
+        Some((tick, first)) => {
+            Err(RecordError::ReplayDiffers { path: path.to_owned(), differences, ticks, tick, first })
         }
     }
-}
-
-/// The first field that differs in a single bit; NaN and −0 are not excused.
-pub fn difference(recorded: &PaddleCommand, again: &PaddleCommand) -> Option<String> {
-    macro_rules! compare {
-        ($($field:ident),*) => {
-            $(if recorded.$field != again.$field {
-                let (was, is) = (recorded.$field, again.$field);
-                return Some(format!(concat!(stringify!($field), " was {}, is {}"), was, is));
-            })*
-        };
-    }
-    compare!(sequence, state, tick, time_ns, faults, needle_sequence, target_sequence, paddle_index, flags);
-    let pairs = recorded.displacement.iter().zip(&again.displacement);
-    for (axis, (was, is)) in ["x", "y"].iter().zip(pairs) {
-        if was.to_bits() != is.to_bits() {
-            return Some(format!("displacement {axis} was {was:?}, is {is:?}"));
-        }
-    }
-    None
 }

@@ -71,9 +71,13 @@ fn table_of(study: &PlacementStudy) -> Result<Vec<u8>, CliError> {
     Ok(table::to_bytes(&table::build(&study.model, paddle, &TableOptions::default())?)?)
 }
 
-type Accuracy = Result<StudyAccuracy, ModelError>;
+type AccuracyOutcome = Result<StudyAccuracy, ModelError>;
 
-fn document(study: &PlacementStudy, accuracy: Option<&Accuracy>, table: Option<&Result<Vec<u8>, CliError>>) -> Value {
+fn document(
+    study: &PlacementStudy,
+    accuracy: Option<&AccuracyOutcome>,
+    table: Option<&Result<Vec<u8>, CliError>>,
+) -> Value {
     let scene = study.model.scene();
     let known = accuracy.and_then(|a| a.as_ref().ok());
     let mut paddles = json!(study.placement.paddles);

@@ -38,11 +38,11 @@ impl std::fmt::Display for Inverted {
 
 /// Displacement gradients of all integration points, kept from the force evaluation for the tangent.
 #[derive(Debug, Clone, Default)]
-pub struct State<const D: usize> {
+pub struct AssemblyState<const D: usize> {
     gradients: Vec<Matrix<D>>,
 }
 
-impl<const D: usize> State<D> {
+impl<const D: usize> AssemblyState<D> {
     /// Displacement gradients H = F − I, per integration point.
     pub fn displacement_gradients(&self) -> &[Matrix<D>] {
         &self.gradients
@@ -74,7 +74,7 @@ pub fn internal_force<const D: usize>(
     rule: &Quadrature<D>,
     tissue: &Tissue,
     coefficients: &[f64],
-    state: &mut State<D>,
+    state: &mut AssemblyState<D>,
     force: &mut [f64],
 ) -> Result<f64, Inverted> {
     force.fill(0.0);
@@ -147,7 +147,7 @@ impl BlockPositions {
 pub fn tangent<const D: usize>(
     rule: &Quadrature<D>,
     tissue: &Tissue,
-    state: &State<D>,
+    state: &AssemblyState<D>,
     blocks: &BlockPositions,
     values: &mut [f64],
 ) {

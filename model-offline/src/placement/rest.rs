@@ -3,7 +3,7 @@
 
 use super::controllability::best_direction;
 use crate::mechanics::ConstrainedRows;
-use crate::mechanics::assembly::{State, internal_force, tangent};
+use crate::mechanics::assembly::{AssemblyState, internal_force, tangent};
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::{ConstrainedSolver, Unknowns};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
@@ -83,7 +83,7 @@ pub(super) fn for_each_paddle(
         .collect::<Option<_>>()
         .ok_or(ModelError::ImposedWeakly)?;
     let analysis = model.analysis();
-    let (mut state, mut force) = (State::default(), vec![0.0; unknowns]);
+    let (mut state, mut force) = (AssemblyState::default(), vec![0.0; unknowns]);
     internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)
         .map_err(|_| singular("at rest"))?;
     let mut at_rest = vec![0.0; analysis.pattern().entries()];

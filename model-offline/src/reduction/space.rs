@@ -64,7 +64,7 @@ impl Sampling {
 }
 
 /// Modes of the snapshots, with what the full model says about them.
-pub(super) struct Space {
+pub(super) struct ModalSpace {
     lifts: Vec<Vec<f64>>,
     modes: Vec<Vec<f64>>,
     /// Displacement gradients: column by column (lifts, then modes), point by point.
@@ -74,7 +74,7 @@ pub(super) struct Space {
     states: Vec<(Vec<f64>, DVector<f64>)>,
 }
 
-impl Space {
+impl ModalSpace {
     /// Proper orthogonal decomposition of what the responses at rest leave of the snapshots.
     pub(super) fn new(model: &TissueModel, lifts: &[Vec<f64>], snapshots: &[Snapshot]) -> Self {
         let rest: Vec<DVector<f64>> = snapshots

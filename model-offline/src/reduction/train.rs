@@ -5,7 +5,7 @@ pub use super::error::TrainingError;
 use super::lifting::lifting;
 use super::online::{Domain, Invalid, ReducedModel};
 use super::snapshots::{Grid, SNAPSHOT_SETTINGS, Snapshot, States, states};
-use super::space::{GUARDS, MODES, Size, Space};
+use super::space::{GUARDS, MODES, ModalSpace, Size};
 use crate::discretization::Resolution;
 use crate::model::{ModelError, TissueModel};
 use crate::placement::controllability::best_direction;
@@ -129,7 +129,7 @@ pub fn train(
         let grid = if range.amax() > 0.0 { Grid::with_paddle() } else { Grid::of_depths() };
         let asked = Domain { depth, paddle: range };
         outcome = states(&at_rest, &grid, asked, (CALIBRATION + FRESH) as u32, options.threads).and_then(|states| {
-            let space = Space::new(model, &lifts, &states.snapshots);
+            let space = ModalSpace::new(model, &lifts, &states.snapshots);
             smallest(model, &space, &states, options.tolerance)
         });
         if outcome.is_ok() {
@@ -142,7 +142,7 @@ pub fn train(
 /// The smallest model that passes its trial.
 fn smallest(
     model: &TissueModel,
-    space: &Space,
+    space: &ModalSpace,
     states: &States,
     tolerance: f64,
 ) -> Result<(Arc<ReducedModel>, TrainingReport), TrainingError> {
@@ -252,7 +252,7 @@ fn conformal_scale(outcomes: &[(f64, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::starter::{Labels, starter};
+    use crate::scene::starter::{StarterNames, starter};
     use crate::solver::equilibrium::NewtonSettings;
 
     #[test]
@@ -296,7 +296,7 @@ mod tests {
 
     /// A block with nodes gathered at the ends of its paddles.
     fn block() -> TissueModel {
-        let labels = Labels { name: "block".into(), length: "mm".into(), stress: "kPa".into() };
+        let labels = StarterNames { name: "block".into(), length: "mm".into(), stress: "kPa".into() };
         let scene = Scene::parse(&starter(&labels, None), "block").unwrap();
         crate::placement::adaptive::discretise(&scene).unwrap().0
     }
@@ -311,7 +311,7 @@ mod tests {
         let lifts = lifting(&model, paddle, at_rest.clone()).unwrap();
         let domain = Domain { depth: model.scene().needle.depth, paddle: workspaces(&model, paddle).unwrap()[0] };
         let states = states(&at_rest, &Grid::with_paddle(), domain, 1, 2).unwrap();
-        let space = Space::new(&model, &lifts, &states.snapshots);
+        let space = ModalSpace::new(&model, &lifts, &states.snapshots);
         for modes in [4, 8, 12] {
             let [first, _] = space.sampling(&model, Size { modes, guards: 4 }).next(1e-2);
             assert!(first.len() > 3 * modes, "{modes} modes: {} points", first.len());
@@ -392,7 +392,7 @@ mod tests {
         let lifts = lifting(&model, Some(2), at_rest.clone()).unwrap();
         let domain = Domain { depth: 0.1, paddle: Vector2::repeat(0.02) };
         let states = states(&at_rest, &Grid::with_paddle(), domain, 4, 1).unwrap();
-        let space = Space::new(&model, &lifts, &states.snapshots);
+        let space = ModalSpace::new(&model, &lifts, &states.snapshots);
         let mut sampling = space.sampling(&model, Size { modes: 4, guards: 4 });
         for misfit in SAMPLING_TOLERANCES {
             let [first, second] = sampling.next(misfit);

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 /// What a starter scene is called and measured in.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Labels {
+pub struct StarterNames {
     /// Name of the scene.
     pub name: String,
     /// Length unit.
@@ -22,7 +22,7 @@ const PADDLES: usize = 5;
 ///
 /// What holds the body, where the needle goes in and where paddles may sit is a suggestion: the lowest edge is immobile,
 /// the needle enters at the highest edge, paddles sit on the longest of the others, the target is the innermost point.
-pub fn starter(labels: &Labels, imported: Option<&Imported>) -> String {
+pub fn starter(labels: &StarterNames, imported: Option<&Imported>) -> String {
     let block = || {
         let rectangle =
             |a: [f64; 2], b: [f64; 2]| Polygon::new([a, [b[0], a[1]], b, [a[0], b[1]]].map(Point2::from).to_vec()).ok();
@@ -98,8 +98,8 @@ impl Layout {
         }
     }
 
-    fn text(&self, labels: &Labels, imported: &Imported) -> String {
-        let Labels { name, length, stress } = labels;
+    fn text(&self, labels: &StarterNames, imported: &Imported) -> String {
+        let StarterNames { name, length, stress } = labels;
         let mut out = String::new();
         let _ = write!(
             out,
@@ -218,8 +218,8 @@ mod tests {
     use crate::scene::Scene;
     use crate::scene::import::{assemble, svg};
 
-    fn labels() -> Labels {
-        Labels { name: "mine".into(), length: "mm".into(), stress: "kPa".into() }
+    fn labels() -> StarterNames {
+        StarterNames { name: "mine".into(), length: "mm".into(), stress: "kPa".into() }
     }
 
     #[test]

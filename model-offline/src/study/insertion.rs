@@ -2,7 +2,7 @@
 
 use super::candidates::base_spacing;
 use super::extent::Extent;
-use super::measurement::{Job, Linearity, ModelKind, Point, PointFailure};
+use super::measurement::{Job, Linearity, Measurement, MeasurementFailure, ModelKind};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::material::{Law, Material};
 use crate::model::{ModelError, TissueModel};
@@ -52,7 +52,7 @@ pub type Profile = Vec<Vec<Vector2<f64>>>;
 
 /// The insertion by every method, and the fine one that they are held against.
 pub(super) struct InsertionComparison {
-    pub points: Vec<Point>,
+    pub points: Vec<Measurement>,
     pub reference: Profile,
     /// Distance of the reference's two levels.
     pub open: f64,
@@ -127,7 +127,7 @@ pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertio
         for &nodes in nodes {
             let candidate = scene.discretization.with(nodes, Method::new(integration));
             for law in [Linearity::Nonlinear, Linearity::Linear] {
-                let mut point = Point::new(Job::Insertion, candidate, law);
+                let mut point = Measurement::new(Job::Insertion, candidate, law);
                 let start = Instant::now();
                 let outcome = build(scene, candidate).and_then(|model| {
                     (point.nodes, point.spacing) = (model.nodes(), model.spacing());
@@ -149,7 +149,7 @@ pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertio
 }
 
 /// Times one tick of a simulated insertion with each kind of plant.
-pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) -> Result<Vec<Point>, ModelError> {
+pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) -> Result<Vec<Measurement>, ModelError> {
     let base = base_spacing(scene);
     let mut candidates =
         vec![scene.discretization.with(Resolution::Spacing(base), Method::new(Integration::Scni)), fine(scene, -2)];
@@ -168,23 +168,29 @@ pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) ->
             body.drive(depth, Vector2::zeros())?;
             Ok(body.target_displacement())
         });
-        let empty = Point::new(Job::Step, candidate, Linearity::Nonlinear);
-        let empty = Point { nodes: model.nodes(), spacing: model.spacing(), ..empty };
+        let empty = Measurement::new(Job::Step, candidate, Linearity::Nonlinear);
+        let empty = Measurement { nodes: model.nodes(), spacing: model.spacing(), ..empty };
         points.push(timed(empty.clone(), &reference, full));
         points.push(reduced_point(scene, &model, paddle, &reference, empty.clone()));
         let condensed = std::hint::black_box(Condensed::new(&model, Some(paddle))?);
         let linear = time_ticks(scene, TICKS, |depth| -> Result<_, Infallible> {
             Ok(condensed.target_displacement(std::hint::black_box(depth), Vector2::zeros()))
         });
-        let empty = Point { method: ModelKind::Condensed, law: Linearity::Linear, ..empty };
+        let empty = Measurement { model_kind: ModelKind::Condensed, law: Linearity::Linear, ..empty };
         points.push(timed(empty, &reference, linear));
     }
     Ok(points)
 }
 
 /// One tick of a model reduced with the usual options.
-fn reduced_point(scene: &Scene, model: &TissueModel, paddle: usize, reference: &Profile, empty: Point) -> Point {
-    let empty = Point { method: ModelKind::Reduced, ..empty };
+fn reduced_point(
+    scene: &Scene,
+    model: &TissueModel,
+    paddle: usize,
+    reference: &Profile,
+    empty: Measurement,
+) -> Measurement {
+    let empty = Measurement { model_kind: ModelKind::Reduced, ..empty };
     match train(model, Some(paddle), &TrainingOptions::default()) {
         Ok((reduced, _)) => {
             let mut body = reduced.body();
@@ -194,12 +200,16 @@ fn reduced_point(scene: &Scene, model: &TissueModel, paddle: usize, reference: &
             });
             timed(empty, reference, measured)
         }
-        Err(error) => Point { failure: Some(error.into()), ..empty },
+        Err(error) => Measurement { failure: Some(error.into()), ..empty },
     }
 }
 
 /// A point with its time and error, or with why it has none.
-fn timed<E: Into<PointFailure>>(mut point: Point, reference: &Profile, measured: Result<(f64, Profile), E>) -> Point {
+fn timed<E: Into<MeasurementFailure>>(
+    mut point: Measurement,
+    reference: &Profile,
+    measured: Result<(f64, Profile), E>,
+) -> Measurement {
     match measured {
         Ok((wall_s, profile)) => {
             point.wall_s = wall_s;

@@ -11,11 +11,11 @@ use strum::{Display, VariantArray};
 
 /// One setting, measured.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct Measurement {
     /// Which job.
     pub job: Job,
     /// What kind of model answers.
-    pub method: ModelKind,
+    pub model_kind: ModelKind,
     /// The discretization.
     pub discretization: Discretization,
     /// Number of nodes (0 where building failed).
@@ -31,14 +31,14 @@ pub struct Point {
     /// Worst error of the target displacement, over the largest.
     pub error_static: f64,
     /// Why it failed.
-    pub failure: Option<PointFailure>,
+    pub failure: Option<MeasurementFailure>,
     /// Whether nothing is both faster and more accurate.
     pub on_front: bool,
 }
 
 /// Why a setting has no time or no error.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum PointFailure {
+pub enum MeasurementFailure {
     /// It cannot be built, or solved at rest.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -93,18 +93,18 @@ pub enum Linearity {
     Nonlinear,
 }
 
-impl Point {
+impl Measurement {
     /// The error by which the job's front is drawn.
     pub fn error(&self) -> f64 {
         if self.job == Job::Placement { self.error_cm } else { self.error_static }
     }
 }
 
-impl Point {
+impl Measurement {
     pub(super) fn new(job: Job, discretization: Discretization, law: Linearity) -> Self {
         Self {
             job,
-            method: if discretization.method.integration.is_element() { ModelKind::Fem } else { ModelKind::Rkpm },
+            model_kind: if discretization.method.integration.is_element() { ModelKind::Fem } else { ModelKind::Rkpm },
             discretization,
             nodes: 0,
             spacing: if let Resolution::Spacing(h) = discretization.resolution { h } else { f64::NAN },

@@ -10,7 +10,7 @@
 use super::candidates::{assess, families};
 use super::extent::Extent;
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
-use super::measurement::{Job, Linearity, Point};
+use super::measurement::{Job, Linearity, Measurement};
 use crate::discretization::Discretization;
 use crate::model::ModelError;
 use crate::output::csv::table;
@@ -30,7 +30,7 @@ const LONGEST_QUICK_S: f64 = 0.2;
 #[derive(Debug, Clone)]
 pub struct Pareto {
     /// Every setting tried.
-    pub points: Vec<Point>,
+    pub points: Vec<Measurement>,
     /// How good the references are: worst relative distance of their two finest levels, for `placement` and for the
     /// finite depths of the other two jobs.
     pub open: (f64, f64),
@@ -74,8 +74,8 @@ pub fn compare(scene: &Scene, extent: Extent, progress: &dyn Fn(f64)) -> Result<
     Ok(Pareto { points, open: (reference.open, open), reference_nodes: (reference.nodes, nodes), barrier })
 }
 
-fn placement_point(discretization: Discretization, scene: &Scene, reference: &Reference) -> Point {
-    let mut point = Point::new(Job::Placement, discretization, Linearity::Linear);
+fn placement_point(discretization: Discretization, scene: &Scene, reference: &Reference) -> Measurement {
+    let mut point = Measurement::new(Job::Placement, discretization, Linearity::Linear);
     let start = std::time::Instant::now();
     match assess(discretization, scene, reference, REPEATS) {
         Ok(found) => {
@@ -91,8 +91,8 @@ fn placement_point(discretization: Discretization, scene: &Scene, reference: &Re
 }
 
 /// Marks the points of a job that no other beats in both time and error.
-fn mark_front(points: &mut [Point], job: Job) {
-    let usable = |p: &Point| p.job == job && p.failure.is_none() && p.wall_s.is_finite() && p.error().is_finite();
+fn mark_front(points: &mut [Measurement], job: Job) {
+    let usable = |p: &Measurement| p.job == job && p.failure.is_none() && p.wall_s.is_finite() && p.error().is_finite();
     let mut order: Vec<usize> = (0..points.len()).filter(|&i| usable(&points[i])).collect();
     order.sort_by(|&i, &j| points[i].wall_s.total_cmp(&points[j].wall_s));
     let mut best = f64::INFINITY;
@@ -126,8 +126,8 @@ const COLUMNS: [&str; 16] = [
 
 impl Pareto {
     /// The points of a job's front, fastest first.
-    pub fn front(&self, job: Job) -> Vec<&Point> {
-        let mut front: Vec<&Point> = self.points.iter().filter(|p| p.job == job && p.on_front).collect();
+    pub fn front(&self, job: Job) -> Vec<&Measurement> {
+        let mut front: Vec<&Measurement> = self.points.iter().filter(|p| p.job == job && p.on_front).collect();
         front.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
         front
     }
@@ -139,7 +139,7 @@ impl Pareto {
             let method = p.discretization.method;
             let element = method.integration.is_element();
             [
-                p.method.to_string(),
+                p.model_kind.to_string(),
                 method.displacement_basis().to_string(),
                 method.integration.to_string(),
                 p.discretization.resolution.is_graded().to_string(),
@@ -168,10 +168,13 @@ mod tests {
     #[test]
     fn the_front_is_what_nothing_beats() {
         let candidate = Discretization::new(Resolution::Spacing(0.1), Method::new(Integration::Scni));
-        let at =
-            |wall_s, error_cm| Point { wall_s, error_cm, ..Point::new(Job::Placement, candidate, Linearity::Linear) };
+        let at = |wall_s, error_cm| Measurement {
+            wall_s,
+            error_cm,
+            ..Measurement::new(Job::Placement, candidate, Linearity::Linear)
+        };
         let mut points = vec![at(1.0, 0.1), at(2.0, 0.2), at(3.0, 0.05), at(0.5, 0.3), at(0.4, f64::NAN)];
-        points.push(Point { failure: Some(ModelError::NoPaddleControls.into()), ..at(0.1, 0.01) });
+        points.push(Measurement { failure: Some(ModelError::NoPaddleControls.into()), ..at(0.1, 0.01) });
         mark_front(&mut points, Job::Placement);
         assert_eq!(points.iter().map(|p| p.on_front).collect::<Vec<_>>(), [true, false, true, true, false, false]);
     }

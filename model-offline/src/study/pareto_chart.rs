@@ -1,7 +1,7 @@
 //! The comparison as a figure and as a table for the terminal.
 
 use super::looks::look;
-use super::measurement::{Job, Linearity, ModelKind, Point};
+use super::measurement::{Job, Linearity, Measurement, ModelKind};
 use super::pareto::Pareto;
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Note, Panel, Series};
 use crate::scene::TissueVariant;
@@ -12,7 +12,7 @@ struct View {
     job: Job,
     title: &'static str,
     quantity: &'static str,
-    error: fn(&Point) -> f64,
+    error: fn(&Measurement) -> f64,
     /// What filled and open markers tell apart; nothing where all are alike.
     filled: Option<Filling>,
 }
@@ -22,7 +22,7 @@ struct View {
 struct Filling {
     /// What a filled and an open marker stand for.
     names: [&'static str; 2],
-    of: fn(&Point) -> bool,
+    of: fn(&Measurement) -> bool,
 }
 
 const GRADED: Filling =
@@ -61,9 +61,9 @@ const VIEWS: [View; 4] = [
     },
 ];
 
-/// Name, colour and marker of a point's method: of the rule, or of the plant where the job compares plants.
-fn method(point: &Point) -> (&'static str, Colour, Marker) {
-    match (point.job, point.method) {
+/// Name, colour and marker of a point: of the rule, or of the plant where the job compares plants.
+fn appearance(point: &Measurement) -> (&'static str, Colour, Marker) {
+    match (point.job, point.model_kind) {
         (Job::Step, ModelKind::Reduced) => ("reduced", Colour::Green, Marker::Square),
         (Job::Step, ModelKind::Condensed) => ("condensed", Colour::Blue, Marker::Diamond),
         (Job::Step, _) => ("full", Colour::Vermillion, Marker::Circle),
@@ -84,9 +84,9 @@ fn percent(error: f64) -> String {
 
 impl View {
     /// The points that no other beats in both time and this panel's error, fastest first.
-    fn front<'a>(&self, pareto: &'a Pareto) -> Vec<&'a Point> {
-        let usable = |p: &&Point| p.job == self.job && p.failure.is_none() && p.wall_s.is_finite();
-        let mut front: Vec<&Point> =
+    fn front<'a>(&self, pareto: &'a Pareto) -> Vec<&'a Measurement> {
+        let usable = |p: &&Measurement| p.job == self.job && p.failure.is_none() && p.wall_s.is_finite();
+        let mut front: Vec<&Measurement> =
             pareto.points.iter().filter(usable).filter(|p| (self.error)(p).is_finite()).collect();
         front.sort_by(|a, b| a.wall_s.total_cmp(&b.wall_s));
         let mut best = f64::INFINITY;
@@ -99,8 +99,8 @@ impl View {
     }
 
     /// Method with its second property, as the conclusion names it.
-    fn kind(&self, point: &Point) -> String {
-        let name = method(point).0;
+    fn kind(&self, point: &Measurement) -> String {
+        let name = appearance(point).0;
         match (self.job, self.filled.is_some_and(|filling| (filling.of)(point))) {
             (Job::Placement, true) => format!("{name} on graded nodes"),
             (Job::Placement, false) => format!("{name} on uniform nodes"),
@@ -111,9 +111,9 @@ impl View {
     }
 
     /// Who holds the widest stretch of the front, and from which error to which.
-    fn conclusion(&self, front: &[&Point]) -> Option<String> {
+    fn conclusion(&self, front: &[&Measurement]) -> Option<String> {
         let stretches = front.chunk_by(|a, b| self.kind(a) == self.kind(b));
-        let width = |stretch: &[&Point]| (self.error)(stretch[0]) / (self.error)(stretch[stretch.len() - 1]);
+        let width = |stretch: &[&Measurement]| (self.error)(stretch[0]) / (self.error)(stretch[stretch.len() - 1]);
         let widest = stretches.max_by(|a, b| width(a).total_cmp(&width(b)))?;
         let (first, last) = (widest.first()?, widest.last()?);
         let ends = [first, last].map(|p| percent((self.error)(p)));
@@ -129,9 +129,9 @@ impl View {
         let mut panel = Panel::new(&title, Axis::log(what, "s"), Axis::log(self.quantity, "1"));
         let front_line = front.iter().map(|p| (p.wall_s, (self.error)(p))).collect();
         panel.series.push(Series::curve("Pareto front", Colour::Ink, Dash::Solid, front_line));
-        let all: Vec<&Point> = pareto.points.iter().filter(|p| p.job == self.job).collect();
+        let all: Vec<&Measurement> = pareto.points.iter().filter(|p| p.job == self.job).collect();
         // Dominated points first: the front lies above them.
-        let on_front = |p: &Point| front.iter().any(|f| std::ptr::eq(*f, p));
+        let on_front = |p: &Measurement| front.iter().any(|f| std::ptr::eq(*f, p));
         for bright in [false, true] {
             for point in all.iter().filter(|p| on_front(p) == bright) {
                 self.add(&mut panel.series, point, bright);
@@ -140,14 +140,14 @@ impl View {
         self.explain(&mut panel.series, &all);
         panel.notes = front
             .iter()
-            .map(|p| Note { at: (p.wall_s, (self.error)(p)), text: format!("{}, {}", method(p).0, p.nodes) })
+            .map(|p| Note { at: (p.wall_s, (self.error)(p)), text: format!("{}, {}", appearance(p).0, p.nodes) })
             .collect();
         panel
     }
 
     /// Adds a point to the series of its look.
-    fn add(&self, series: &mut Vec<Series>, point: &Point, bright: bool) {
-        let (name, colour, marker) = method(point);
+    fn add(&self, series: &mut Vec<Series>, point: &Measurement, bright: bool) {
+        let (name, colour, marker) = appearance(point);
         let colour = if bright { colour } else { Colour::Faint };
         let filled = self.filled.is_none_or(|filling| (filling.of)(point));
         let alike = |s: &Series| (s.marker, s.filled, s.colour) == (Some(marker), filled, colour);
@@ -166,14 +166,14 @@ impl View {
     }
 
     /// What shapes and fillings mean, for the legend alone.
-    fn explain(&self, series: &mut Vec<Series>, all: &[&Point]) {
+    fn explain(&self, series: &mut Vec<Series>, all: &[&Measurement]) {
         let mut sample = |label: &str, colour, marker| {
             series.push(Series::scatter(label, colour, marker, Vec::new()));
             series.len() - 1
         };
         let mut seen: Vec<&str> = Vec::new();
         for point in all {
-            let (name, colour, marker) = method(point);
+            let (name, colour, marker) = appearance(point);
             if !seen.contains(&name) {
                 seen.push(name);
                 sample(name, colour, marker);
@@ -221,8 +221,8 @@ impl Pareto {
             let _ = writeln!(out, "{what}: {} settings, {failed} failed; the front", all.count());
             let _ = writeln!(out, "  {:>11} {:>9} {:>10}  {:<10} settings", "time", "error cm", "static", "method");
             for p in self.front(job) {
-                let name = match p.method {
-                    ModelKind::Reduced | ModelKind::Condensed => p.method.to_string(),
+                let name = match p.model_kind {
+                    ModelKind::Reduced | ModelKind::Condensed => p.model_kind.to_string(),
                     ModelKind::Rkpm | ModelKind::Fem => p.discretization.method.integration.to_string(),
                 };
                 let percent = |e: f64| if e.is_finite() { format!("{:.3} %", 100.0 * e) } else { "–".into() };

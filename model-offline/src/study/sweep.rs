@@ -18,9 +18,9 @@ const LEVELS: std::ops::RangeInclusive<i32> = -2..=3;
 /// Distance of the reference's two levels.
 const REFERENCE_SHARE: f64 = 2e-3;
 
-/// One mesh.
+/// One discretization on the way.
 #[derive(Debug, Clone)]
-pub struct Mesh {
+pub struct SweepStep {
     /// The discretization.
     pub discretization: Discretization,
     /// Number of nodes.
@@ -33,8 +33,8 @@ pub struct Mesh {
 #[derive(Debug, Clone)]
 pub struct Sweep {
     scene: Scene,
-    /// Every mesh, method by method from coarse to fine.
-    pub steps: Vec<Mesh>,
+    /// Every discretization, rule by rule from coarse to fine.
+    pub steps: Vec<SweepStep>,
     /// The continuum limit that they go to.
     pub reference: Reference,
 }
@@ -58,7 +58,7 @@ pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Res
         let nodes = model.as_ref().map_or(0, TissueModel::nodes);
         let responses = model.and_then(|model| rest_responses(&model));
         progress();
-        Mesh { discretization, nodes, responses }
+        SweepStep { discretization, nodes, responses }
     });
     Ok(Sweep { scene: scene.clone(), steps, reference })
 }
@@ -155,7 +155,7 @@ impl Sweep {
     /// Best paddles on the coarsest and on the finest mesh of a rule, and in the limit.
     fn moves(&self, rule: Integration) -> [(u32, u32); 3] {
         let of_rule = || self.steps.iter().filter(|step| step.discretization.method.integration == rule);
-        let optima = |step: Option<&Mesh>| {
+        let optima = |step: Option<&SweepStep>| {
             step.and_then(|step| step.responses.as_deref().ok()).map_or((0, 0), |responses| self.optima(responses))
         };
         [optima(of_rule().next()), optima(of_rule().next_back()), self.optima(self.reference.responses())]

@@ -12,8 +12,8 @@ use crate::exchange::board::BoardError;
 use crate::exchange::board::device::Device;
 use crate::exchange::board::image::{Image, MemoryUse, Processor};
 use crate::exchange::board::qemu::ICOUNT_SHIFT;
+use crate::record::difference::{Difference, difference};
 use crate::record::recording::Recording;
-use crate::record::replay::difference;
 
 /// A step that takes longer than this is no step.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -62,7 +62,7 @@ pub enum MeasureError {
         /// The tick.
         tick: u64,
         /// First field that differs.
-        difference: String,
+        difference: Difference,
     },
     /// Samples of a scenario are in no account.
     #[error("{scenario}: samples unaccounted for")]
@@ -92,7 +92,7 @@ pub enum Complaint {
         /// Name of the image.
         image: String,
         /// Which figure.
-        figure: Figure,
+        figure: BudgetItem,
         /// The figure.
         is: u32,
         /// Its budget.
@@ -123,7 +123,7 @@ pub enum Complaint {
 /// A figure that has a budget.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::Display)]
 #[strum(serialize_all = "kebab-case")]
-pub enum Figure {
+pub enum BudgetItem {
     /// Flash without a table, bytes.
     Flash,
     /// Statics, bytes.
@@ -351,22 +351,22 @@ pub const TOLERANCE: f64 = 0.02;
 /// Figures above their budget.
 pub fn exceeded(measured: &Figures, budget: &Figures, image: &str) -> Vec<Complaint> {
     let mut found = Vec::new();
-    let mut hold = |figure: Figure, is: u32, allowed: u32| {
+    let mut hold = |figure: BudgetItem, is: u32, allowed: u32| {
         if f64::from(is) > f64::from(allowed) * (1.0 + TOLERANCE) {
             found.push(Complaint::Above { image: image.to_owned(), figure, is, allowed });
         }
     };
-    hold(Figure::Flash, measured.flash, budget.flash);
-    hold(Figure::Ram, measured.ram, budget.ram);
-    hold(Figure::Stack, measured.stack, budget.stack);
+    hold(BudgetItem::Flash, measured.flash, budget.flash);
+    hold(BudgetItem::Ram, measured.ram, budget.ram);
+    hold(BudgetItem::Stack, measured.stack, budget.stack);
     for (branch, is) in &measured.instructions {
         match budget.instructions.get(branch) {
             Some(allowed) => {
-                hold(Figure::Min(*branch), is.min, allowed.min);
-                hold(Figure::Median(*branch), is.median, allowed.median);
-                hold(Figure::Max(*branch), is.max, allowed.max);
+                hold(BudgetItem::Min(*branch), is.min, allowed.min);
+                hold(BudgetItem::Median(*branch), is.median, allowed.median);
+                hold(BudgetItem::Max(*branch), is.max, allowed.max);
             }
-            None => hold(Figure::Unbudgeted(*branch), is.max, 0),
+            None => hold(BudgetItem::Unbudgeted(*branch), is.max, 0),
         }
     }
     let unreached = budget.instructions.keys().filter(|branch| !measured.instructions.contains_key(branch));

@@ -6,8 +6,8 @@ use model_offline::scene::Scene;
 use crate::bench::error::SimError;
 use crate::bench::insertion::Label;
 use crate::bench::strategy::Strategy;
-use model_offline::scene::TissueVariant;
 use crate::runtime::time::mode::RunMode;
+use model_offline::scene::TissueVariant;
 
 /// A plant, and what its controller believes.
 #[derive(Clone, Copy, Debug)]

@@ -6,8 +6,8 @@ use firmware::contract::{Table, decode};
 use model_offline::scene::Scene;
 
 use crate::bench::error::SimError;
-use model_offline::scene::TissueVariant;
 use crate::record::files::read_bytes;
+use model_offline::scene::TissueVariant;
 
 /// Reads and validates a table file.
 ///

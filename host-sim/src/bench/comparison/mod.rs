@@ -21,11 +21,10 @@ use self::cases::{Case, cases};
 pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
 pub use self::progress::{Progress, Silent};
 use super::describe;
-use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
 use super::insertion::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
+use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
 use super::strategy::Strategy;
 use super::table_tissue::TableTissue;
-use model_offline::scene::TissueVariant;
 use crate::bench::error::SimError;
 use crate::exchange::board::{Image, Processor};
 use crate::record::files::Artifact;
@@ -35,6 +34,7 @@ use crate::runtime::signals;
 use crate::runtime::time::mode::RunMode;
 use crate::world::simulation::Simulation;
 use crate::world::tissue::Reductions;
+use model_offline::scene::TissueVariant;
 
 /// What is compared, and how.
 #[derive(Clone, Debug)]

@@ -25,7 +25,7 @@ use super::error::SimError;
 
 /// Everything that was simulated.
 #[derive(Debug)]
-pub struct StabilityResult {
+pub struct LoopStabilityResult {
     /// The scene's name.
     pub scene: String,
     /// Paddle whose Jacobian the cells are simulated around.
@@ -46,7 +46,7 @@ pub struct StabilityResult {
     pub cells: Vec<Cell>,
 }
 
-impl StabilityResult {
+impl LoopStabilityResult {
     /// Gains of the cells along every boundary.
     pub fn gains(&self) -> Vec<f64> {
         cells::gains(self.extent)
@@ -62,7 +62,7 @@ pub fn simulate(
     extent: Extent,
     threads: usize,
     progress: &dyn Fn(),
-) -> Result<StabilityResult, SimError> {
+) -> Result<LoopStabilityResult, SimError> {
     let plain = scene.without_inclusions();
     let (model, paddle) = model_with_paddle(&plain, None)?;
     let place = model.paddle_position(paddle);
@@ -84,7 +84,7 @@ pub fn simulate(
     let cells = rate_limit::map(extent);
     progress();
     let lambda_max = TableOptions::default().lambda_max;
-    Ok(StabilityResult {
+    Ok(LoopStabilityResult {
         scene: scene.name.clone(),
         paddle,
         jacobian,

@@ -4,13 +4,13 @@ use super::*;
 use crate::bench::result::*;
 use crate::bench::study_failure::StudyFailure;
 use crate::bench::table_tissue::TableTissue;
-use model_offline::scene::TissueVariant;
 use crate::runtime::accounting::ledger::{LedgerResult, StreamResult};
 use crate::runtime::time::clock::Scheduling;
 use crate::runtime::time::durations::{Distribution, LoopTiming};
 use crate::runtime::time::mode::RunMode;
 use firmware::{Discard, Faults};
 use model_offline::discretization::Integration;
+use model_offline::scene::TissueVariant;
 use model_offline::solver::equilibrium::FailureReason;
 
 const EVIL: &str = "<script>alert(\"x\")</script>&'";

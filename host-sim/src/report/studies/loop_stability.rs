@@ -4,13 +4,13 @@ use std::fmt::Write as _;
 
 use firmware::loop_stability::gain_limit;
 
-use crate::bench::loop_stability::StabilityResult;
+use crate::bench::loop_stability::LoopStabilityResult;
 use crate::bench::loop_stability::behaviour::Behaviour;
 use crate::bench::loop_stability::cells::{Boundary, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
 use crate::bench::loop_stability::rate_limit::{self, Cell, Integrator};
-use model_offline::scene::TissueVariant;
 use model_offline::output::csv::table;
+use model_offline::scene::TissueVariant;
 
 /// Columns of the three parts; those that do not belong to a part are empty.
 const COLUMNS: [&str; 22] = [
@@ -39,7 +39,7 @@ const COLUMNS: [&str; 22] = [
 ];
 
 /// One table for the three parts.
-pub fn csv(result: &StabilityResult) -> Vec<u8> {
+pub fn csv(result: &LoopStabilityResult) -> Vec<u8> {
     let boundaries = result.boundaries.iter().map(|boundary| boundary_row(boundary, result.paddle));
     let mismatches = result.mismatches.iter().map(mismatch_row);
     let rows: Vec<_> = boundaries.chain(mismatches).chain(result.cells.iter().map(rate_limit_row)).collect();
@@ -98,14 +98,14 @@ fn rate_limit_row(c: &Cell) -> [String; 22] {
 }
 
 /// The middle between the last cell that settles and the first that does not.
-pub(super) fn simulated_limit(result: &StabilityResult, boundary: &Boundary) -> f64 {
+pub(super) fn simulated_limit(result: &LoopStabilityResult, boundary: &Boundary) -> f64 {
     let gains = result.gains();
     let last = gains[boundary.simulated_cells - 1];
     gains.get(boundary.simulated_cells).map_or(last, |next| (last * next).sqrt())
 }
 
 /// One screen.
-pub fn summary(result: &StabilityResult) -> String {
+pub fn summary(result: &LoopStabilityResult) -> String {
     let mut out = format!("{} · closed loop around paddle {}\n\n", result.scene, result.paddle);
     let cells = result.boundaries.len() * result.gains().len();
     let disagreeing: usize = result.boundaries.iter().map(|b| b.disagreeing).sum();

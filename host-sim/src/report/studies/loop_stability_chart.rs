@@ -5,7 +5,7 @@ use model_offline::output::chart::number::number;
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
 
 use super::loop_stability::simulated_limit;
-use crate::bench::loop_stability::StabilityResult;
+use crate::bench::loop_stability::LoopStabilityResult;
 use crate::bench::loop_stability::behaviour::Behaviour;
 use crate::bench::loop_stability::cells::{ANGLES, DELAYS};
 use crate::bench::loop_stability::mismatch::Mismatch;
@@ -21,7 +21,7 @@ fn look(k: usize) -> (Colour, Marker) {
 }
 
 /// Theory beside simulation, tables on other tissue, and rate limits.
-pub fn figure(result: &StabilityResult) -> Figure {
+pub fn figure(result: &LoopStabilityResult) -> Figure {
     let mut panels = vec![boundary_panel(result)];
     if !result.mismatches.is_empty() {
         panels.push(size_panel(result, TissueVariant::Homogeneous, "Table without the inclusion, tissue with it"));
@@ -46,7 +46,7 @@ pub fn figure(result: &StabilityResult) -> Figure {
 }
 
 /// Limit of the gain against the angle of the eigenvalues, by delay.
-fn boundary_panel(result: &StabilityResult) -> Panel {
+fn boundary_panel(result: &LoopStabilityResult) -> Panel {
     let worst = result.boundaries.iter().map(|b| b.theory_cells.abs_diff(b.simulated_cells)).max().unwrap_or(0);
     let cells = if worst == 1 { "cell" } else { "cells" };
     let largest = ANGLES.iter().copied().fold(0.0, f64::max);
@@ -74,7 +74,7 @@ fn boundary_panel(result: &StabilityResult) -> Panel {
 }
 
 /// One line per paddle for tables of one tissue on the other.
-fn by_paddle(result: &StabilityResult, table: TissueVariant, height: fn(&Mismatch) -> f64) -> Vec<Series> {
+fn by_paddle(result: &LoopStabilityResult, table: TissueVariant, height: fn(&Mismatch) -> f64) -> Vec<Series> {
     let mut paddles: Vec<u32> = result.mismatches.iter().map(|m| m.paddle).collect();
     paddles.sort_unstable();
     paddles.dedup();
@@ -91,7 +91,7 @@ fn heights(series: &[Series]) -> impl Iterator<Item = f64> {
     series.iter().flat_map(|s| &s.points).map(|p| p.1).filter(|y| y.is_finite())
 }
 
-fn size_panel(result: &StabilityResult, table: TissueVariant, title: &str) -> Panel {
+fn size_panel(result: &LoopStabilityResult, table: TissueVariant, title: &str) -> Panel {
     let series = by_paddle(result, table, |m| m.largest);
     let largest = heights(&series).fold(0.0, f64::max);
     let top = 1.15 * largest.max(result.lambda_max);
@@ -107,7 +107,7 @@ fn size_panel(result: &StabilityResult, table: TissueVariant, title: &str) -> Pa
     }
 }
 
-fn margin_panel(result: &StabilityResult) -> Panel {
+fn margin_panel(result: &LoopStabilityResult) -> Panel {
     let series = by_paddle(result, TissueVariant::Inclusion, |m| m.simulated_margin);
     let least = heights(&series).fold(f64::INFINITY, f64::min);
     let top = 1.15 * heights(&series).fold(1.0, f64::max);
@@ -122,7 +122,7 @@ fn margin_panel(result: &StabilityResult) -> Panel {
     }
 }
 
-fn rate_panel(result: &StabilityResult, integrator: Integrator, delay: u32) -> Panel {
+fn rate_panel(result: &LoopStabilityResult, integrator: Integrator, delay: u32) -> Panel {
     let cells = || result.cells.iter().filter(|c| c.integrator == integrator && c.delay == delay);
     let of = |behaviour| {
         let alike = cells().filter(|c| c.behaviour == behaviour);

@@ -7,8 +7,18 @@ use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as S
 
 /// The nodes cannot be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("the nodes cannot be triangulated: {0}")]
-pub struct TriangulationError(pub String);
+#[non_exhaustive]
+pub enum TriangulationError {
+    /// A coordinate that is not finite, or too large or too small for exact predicates.
+    #[error("the nodes cannot be triangulated: {0}")]
+    Coordinate(spade::InsertionError),
+    /// Two nodes at one point.
+    #[error("the nodes cannot be triangulated: two nodes coincide")]
+    Coincident,
+    /// The triangles do not tile the body.
+    #[error("the nodes cannot be triangulated: the nodes do not follow the outline: put nodes on every corner")]
+    OffTheOutline,
+}
 
 /// Triangles (counter-clockwise node numbers) that tile the outline. Their edges follow the outlines of `inclusions`
 /// wherever nodes lie on them.
@@ -32,14 +42,13 @@ pub fn triangulate_along(
     outline: &Polygon,
     lines: &[(Point2, Point2)],
 ) -> Result<Vec<[u32; 3]>, TriangulationError> {
-    let fail = |reason: &str| TriangulationError(reason.to_owned());
     let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
     let tolerance = 1e-9 * outline.size();
     let edges = edges_along(nodes, outline.edges(), tolerance);
     let mut mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt(sites, edges)
-        .map_err(|error| fail(&error.to_string()))?;
+        .map_err(TriangulationError::Coordinate)?;
     if mesh.num_vertices() != nodes.len() {
-        return Err(fail("two nodes coincide"));
+        return Err(TriangulationError::Coincident);
     }
     for [a, b] in edges_along(nodes, lines.iter().copied(), tolerance) {
         let (a, b) = (FixedVertexHandle::from_index(a), FixedVertexHandle::from_index(b));
@@ -59,7 +68,7 @@ pub fn triangulate_along(
         .collect();
     let area: f64 = triangles.iter().map(|t| area(nodes, t)).sum();
     if (area - outline.area()).abs() > 1e-6 * outline.area() {
-        return Err(fail("the nodes do not follow the outline: put nodes on every corner"));
+        return Err(TriangulationError::OffTheOutline);
     }
     Ok(triangles)
 }
@@ -70,10 +79,9 @@ pub fn triangulate_along(
 /// Nodes that coincide.
 pub fn neighbours(nodes: &[Point2]) -> Result<Vec<Vec<u32>>, TriangulationError> {
     let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
-    let mesh = DelaunayTriangulation::<Site<f64>>::bulk_load_stable(sites)
-        .map_err(|error| TriangulationError(error.to_string()))?;
+    let mesh = DelaunayTriangulation::<Site<f64>>::bulk_load_stable(sites).map_err(TriangulationError::Coordinate)?;
     if mesh.num_vertices() != nodes.len() {
-        return Err(TriangulationError("two nodes coincide".to_owned()));
+        return Err(TriangulationError::Coincident);
     }
     Ok(mesh.vertices().map(|v| v.out_edges().map(|e| e.to().index() as u32).collect()).collect())
 }

@@ -21,7 +21,7 @@ use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::mechanics::Tissue;
-use crate::mechanics::assembly::{self, BlockPositions, Inverted, State};
+use crate::mechanics::assembly::{self, AssemblyState, BlockPositions, Inverted};
 use crate::mechanics::{Constraints, WeaklyImposed};
 use std::sync::Arc;
 
@@ -73,7 +73,7 @@ struct Configuration<const D: usize> {
     /// Gradient of the potential energy.
     force: Vec<f64>,
     energy: f64,
-    state: State<D>,
+    state: AssemblyState<D>,
 }
 
 impl<const D: usize> Equilibrium<D> {
@@ -116,7 +116,7 @@ impl<const D: usize> Equilibrium<D> {
             external: vec![0.0; nodes * D],
             force: vec![0.0; nodes * D],
             energy: 0.0,
-            state: State::default(),
+            state: AssemblyState::default(),
         };
         let mut body = Self {
             rule,
@@ -167,7 +167,7 @@ impl<const D: usize> Equilibrium<D> {
     }
 
     /// Displacement gradients at the integration points.
-    pub fn state(&self) -> &State<D> {
+    pub fn state(&self) -> &AssemblyState<D> {
         &self.at.state
     }
 

@@ -165,9 +165,8 @@ impl<const D: usize> Equilibrium<D> {
                 return failed;
             }
             let slope = dot(&step.step, &self.at.force);
-            match self.search(&step.step, step.feasible.then_some(slope)) {
-                Ok(()) => {}
-                Err((reason, detail)) => return Attempt::Failed(reason, detail),
+            if let Err(failed) = self.search(&step.step, step.feasible.then_some(slope)) {
+                return failed;
             }
             self.factor_is_current = false;
             let largest = step.step.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -210,7 +209,7 @@ impl<const D: usize> Equilibrium<D> {
     /// `slope` is given) the energy has decreased enough (Armijo). Where the decrease drowns in the rounding of the
     /// energy, as in the small steps of a simulation, the slope decides instead: the approximate Wolfe condition of
     /// Hager and Zhang (SIAM J. Optim. 16, 2005, equation 4.1).
-    fn search(&mut self, step: &[f64], slope: Option<f64>) -> Result<(), (FailureReason, String)> {
+    fn search(&mut self, step: &[f64], slope: Option<f64>) -> Result<(), Attempt> {
         const SUFFICIENT: f64 = 1e-4;
         // Share of the energy within which two energies are the same for the approximate condition: Hager and Zhang
         // take 1e-6; rounding at strains of 1e-6 needs 1e-10.
@@ -241,10 +240,11 @@ impl<const D: usize> Equilibrium<D> {
             length *= 0.5;
             if length < shortest {
                 return Err(match outcome {
-                    Err(at) => (reason_of(&at), at.to_string()),
-                    Ok(()) => {
-                        (FailureReason::NotConverged, "no step along Newton's direction lowers the energy".into())
-                    }
+                    Err(at) => Attempt::Failed(reason_of(&at), at.to_string()),
+                    Ok(()) => Attempt::Failed(
+                        FailureReason::NotConverged,
+                        "no step along Newton's direction lowers the energy".into(),
+                    ),
                 });
             }
         }

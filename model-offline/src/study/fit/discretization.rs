@@ -1,7 +1,7 @@
 //! The cheapest discretization that keeps its share of the tolerance.
 
 use super::cost::cost;
-use super::rejection::{Candidate, Rejected, RejectionReason};
+use super::rejection::{Alternative, Rejected, RejectionReason};
 use super::search::{Search, Trials, Unfit, cheapest};
 use crate::discretization::Discretization;
 use crate::model::{ModelError, TissueModel};
@@ -49,7 +49,7 @@ pub fn discretization(
             Unfit::Unusable(error) => RejectionReason::DoesNotWork(error),
             Unfit::Unconfirmable(error) => RejectionReason::NoFinerModel(error),
         };
-        Rejected::new(Candidate::Discretization(candidate), reason)
+        Rejected::new(Alternative::Discretization(candidate), reason)
     });
     let rejected: Vec<Rejected> = reasons.collect();
     let Some(best) = best else {

@@ -21,15 +21,15 @@ mod written;
 
 pub use discretization::{ChosenDiscretization, discretization};
 pub use plant::EndToEnd;
-pub use rejection::{Candidate, Decision, Rejected, RejectionReason};
+pub use rejection::{Alternative, Decision, Rejected, RejectionReason};
 
 use super::candidates::{Assessment, assess};
 use super::measurement::Linearity;
 use crate::discretization::{Basis, Integration, Resolution};
 use crate::model::TissueModel;
 use crate::placement::reference::Reference;
-use crate::scene::{Scene, TissueVariant};
 use crate::scene::schema::{PlantModel, TableScalar};
+use crate::scene::{Scene, TissueVariant};
 use crate::table::TableBuildError;
 use serde::Serialize;
 use std::time::Instant;

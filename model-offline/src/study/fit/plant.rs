@@ -2,7 +2,7 @@
 
 use super::LAW_NODES;
 use super::discretization::build;
-use super::rejection::{Candidate, Rejected, RejectionReason};
+use super::rejection::{Alternative, Rejected, RejectionReason};
 use crate::discretization::Discretization;
 use crate::model::{Body, ModelError, TissueModel, graded_model};
 use crate::placement::study::best_dynamic;
@@ -60,12 +60,12 @@ pub(super) fn plant(
     if law_error <= tolerance {
         return Ok((condensed(model, paddle)?, Vec::new()));
     }
-    let mut rejected = vec![Rejected::new(Candidate::LinearLaw, RejectionReason::LinearLaw(law_error))];
+    let mut rejected = vec![Rejected::new(Alternative::LinearLaw, RejectionReason::LinearLaw(law_error))];
     let options = TrainingOptions { tolerance, threads, ..TrainingOptions::default() };
     let plant = match train(model, paddle, &options) {
         Ok((trained, report)) => reduced(model, &trained, report.domain.depth, paddle),
         Err(error) => {
-            rejected.push(Rejected::new(Candidate::ReducedPlant, RejectionReason::NotReduced(error)));
+            rejected.push(Rejected::new(Alternative::ReducedPlant, RejectionReason::NotReduced(error)));
             full(model, paddle)?
         }
     };

@@ -22,7 +22,7 @@ pub enum Decision {
 
 /// What was considered.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Candidate {
+pub enum Alternative {
     /// A discretization.
     Discretization(Discretization),
     /// The law's small-strain limit, and the condensed plant that it allows.
@@ -35,7 +35,7 @@ pub enum Candidate {
     SinglePrecision,
 }
 
-impl Candidate {
+impl Alternative {
     /// What it would have decided.
     pub fn decision(&self) -> Decision {
         match self {
@@ -47,7 +47,7 @@ impl Candidate {
     }
 }
 
-impl fmt::Display for Candidate {
+impl fmt::Display for Alternative {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Discretization(discretization) => discretization.fmt(f),
@@ -125,14 +125,14 @@ impl RejectionReason {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rejected {
     /// What it is.
-    pub candidate: Candidate,
+    pub alternative: Alternative,
     /// What rejected it.
     pub reason: RejectionReason,
 }
 
 impl Rejected {
-    pub(super) fn new(candidate: Candidate, reason: RejectionReason) -> Self {
-        Self { candidate, reason }
+    pub(super) fn new(alternative: Alternative, reason: RejectionReason) -> Self {
+        Self { alternative, reason }
     }
 }
 
@@ -146,8 +146,8 @@ impl Serialize for Rejected {
             reason: String,
         }
         let row = Row {
-            candidate: self.candidate.to_string(),
-            decision: self.candidate.decision(),
+            candidate: self.alternative.to_string(),
+            decision: self.alternative.decision(),
             number: self.reason.number(),
             reason: self.reason.to_string(),
         };

@@ -1,7 +1,7 @@
 //! The smallest table that interpolates within its share of the tolerance.
 
 use super::LAW_NODES;
-use super::rejection::{Candidate, Rejected, RejectionReason};
+use super::rejection::{Alternative, Rejected, RejectionReason};
 use crate::model::{TissueModel, graded_model};
 use crate::placement::study::best_dynamic;
 use crate::scene::schema::TableScalar;
@@ -47,14 +47,14 @@ pub(super) fn table(model: &TissueModel, tolerance: f64) -> Result<FittedTable, 
             knots = count;
             break;
         }
-        rejected.push(Rejected::new(Candidate::Knots(count), RejectionReason::Interpolation(error)));
+        rejected.push(Rejected::new(Alternative::Knots(count), RejectionReason::Interpolation(error)));
     }
     let rounding = table_distance(&dense.cast::<f32>().cast::<f64>(), &dense);
     // Rounding must disappear in the tolerance, not use it up.
     let scalar = if rounding <= 0.01 * tolerance {
         TableScalar::F32
     } else {
-        rejected.push(Rejected::new(Candidate::SinglePrecision, RejectionReason::Rounding(rounding)));
+        rejected.push(Rejected::new(Alternative::SinglePrecision, RejectionReason::Rounding(rounding)));
         TableScalar::F64
     };
     Ok(FittedTable { knots: knots as u32, scalar, rejected })

@@ -92,7 +92,7 @@ impl Fit {
         };
         out.push_str("rejected:\n");
         for r in &self.rejected {
-            let _ = writeln!(out, "  {:<56} {:>10}  {}", r.candidate.to_string(), r.reason.number_text(), r.reason);
+            let _ = writeln!(out, "  {:<56} {:>10}  {}", r.alternative.to_string(), r.reason.number_text(), r.reason);
         }
         out
     }

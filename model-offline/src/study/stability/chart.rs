@@ -1,7 +1,7 @@
 //! The study as a figure: a panel per parameter, the law's limit, and the zero-energy modes.
 
 use super::super::looks::look;
-use super::plan::{Entry, Parameter, SOLVERS, base};
+use super::plan::{Entry, Parameter, Safeguards, base};
 use super::{ExperimentResult, Stability};
 use crate::discretization::Integration;
 use crate::output::chart::number::plain;
@@ -33,13 +33,13 @@ fn empty_series(integration: Integration) -> Series {
 /// Where a run stands along an abscissa; none where it is not part of the panel.
 type Abscissa<'a> = &'a dyn Fn(&Entry, &ExperimentResult) -> Option<f64>;
 
-/// One series per method of the rows that `place` puts on the x axis; several rows at one x become their median. A run
+/// One series per integration rule of the rows that `place` puts on the x axis; several rows at one x become their median. A run
 /// without a model is a failure at depth 0.
-fn by_method(study: &Stability, place: Abscissa<'_>, height: fn(&ExperimentResult) -> f64) -> Vec<Series> {
-    let of_method = |&method: &Integration| {
+fn by_integration(study: &Stability, place: Abscissa<'_>, height: fn(&ExperimentResult) -> f64) -> Vec<Series> {
+    let of_rule = |&integration: &Integration| {
         let mut groups: Vec<(f64, Vec<f64>)> = Vec::new();
-        let mut series = empty_series(method);
-        for (entry, outcome) in study.rows.iter().filter(|r| r.0.setting.method.integration == method) {
+        let mut series = empty_series(integration);
+        for (entry, outcome) in study.rows.iter().filter(|r| r.0.experiment.method.integration == integration) {
             let Some(x) = place(entry, outcome) else { continue };
             if outcome.depth == 0.0 {
                 series.failures.push((x, 0.0));
@@ -57,10 +57,10 @@ fn by_method(study: &Stability, place: Abscissa<'_>, height: fn(&ExperimentResul
         }
         series
     };
-    Integration::VARIANTS.iter().map(of_method).collect()
+    Integration::VARIANTS.iter().map(of_rule).collect()
 }
 
-/// Mean over the methods of their values at the left and at the right end.
+/// Mean over the rules of their values at the left and at the right end.
 fn ends(series: &[Series]) -> Option<[f64; 2]> {
     let drawn = || series.iter().filter(|s| !s.points.is_empty());
     let count = drawn().count() as f64;
@@ -71,7 +71,7 @@ fn ends(series: &[Series]) -> Option<[f64; 2]> {
 /// Depth reached over one parameter.
 fn depth_panel(study: &Stability, title: &str, x: Axis, place: Abscissa<'_>) -> Panel {
     let scene = &study.scene;
-    let series = by_method(study, place, |o| o.depth);
+    let series = by_integration(study, place, |o| o.depth);
     let title = ends(&series).map_or_else(
         || title.to_owned(),
         |[left, right]| {
@@ -90,13 +90,14 @@ fn deepest(study: &Stability) -> f64 {
 /// A parameter's sweep at the study's spacing, its values mapped to the axis.
 fn sweep(study: &Stability, title: &str, x: Axis, parameter: Parameter, at: fn(f64) -> f64) -> Panel {
     depth_panel(study, title, x, &|e, _| {
-        (e.parameter == parameter && e.setting.spacing == study.spacing).then(|| at(e.value))
+        (e.parameter == parameter && e.experiment.spacing == study.spacing).then(|| at(e.value.abscissa()))
     })
 }
 
 /// Values of a parameter, each once, in their order.
 fn values(study: &Stability, parameter: Parameter) -> Vec<f64> {
-    let mut values: Vec<f64> = study.rows.iter().filter(|r| r.0.parameter == parameter).map(|r| r.0.value).collect();
+    let mut values: Vec<f64> =
+        study.rows.iter().filter(|r| r.0.parameter == parameter).map(|r| r.0.value.abscissa()).collect();
     values.sort_by(f64::total_cmp);
     values.dedup();
     values
@@ -111,14 +112,14 @@ fn named_place(study: &Stability, parameter: Parameter) -> impl Fn(&Entry, &Expe
     let values = values(study, parameter);
     let spacing = study.spacing;
     move |e, _| {
-        let here = e.parameter == parameter && e.setting.spacing == spacing;
-        here.then(|| values.iter().position(|v| *v == e.value).map(|i| i as f64)).flatten()
+        let here = e.parameter == parameter && e.experiment.spacing == spacing;
+        here.then(|| values.iter().position(|v| *v == e.value.abscissa()).map(|i| i as f64)).flatten()
     }
 }
 
 fn stretch_panel(study: &Stability) -> Panel {
     let place = named_place(study, Parameter::C);
-    let mut series = by_method(study, &place, |o| o.min_stretch);
+    let mut series = by_integration(study, &place, |o| o.min_stretch);
     let limits = study.limits.iter().filter_map(|l| l.confined.filter(|_| l.c.is_some())).enumerate();
     let limits: Vec<(f64, f64)> = limits.map(|(i, limit)| (i as f64, limit)).collect();
     let runs = || series.iter().flat_map(|s| &s.points);
@@ -132,7 +133,7 @@ fn stretch_panel(study: &Stability) -> Panel {
     Panel { series, ..Panel::new(&title, x, y) }
 }
 
-/// Energies of the zero-energy modes, each method by its own look.
+/// Energies of the zero-energy modes, each rule by its own look.
 fn energy_panel(study: &Stability) -> Panel {
     let regular: Vec<_> = study.zero_energy.iter().filter(|z| z.jitter == 0.0).collect();
     let ghosts = regular.iter().filter(|z| z.bloch_share < 0.01).map(|z| z.integration.name());
@@ -162,12 +163,12 @@ fn energy_panel(study: &Stability) -> Panel {
     panel
 }
 
-/// Which method goes deepest and which stops first by the scene's own setting.
+/// Which rule goes deepest and which stops first by the scene's own setting.
 fn conclusion(study: &Stability) -> Option<String> {
     let distinct = study.distinct();
-    let depth = |&method: &Integration| {
-        let own = base(&study.scene, method, study.spacing);
-        distinct.iter().find(|(setting, _)| *setting == own).map(|(_, outcome)| (method, outcome.depth))
+    let depth = |&integration: &Integration| {
+        let own = base(&study.scene, integration, study.spacing);
+        distinct.iter().find(|(experiment, _)| *experiment == own).map(|(_, outcome)| (integration, outcome.depth))
     };
     let depths: Vec<(Integration, f64)> = Integration::VARIANTS.iter().filter_map(depth).collect();
     let most = depths.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -180,9 +181,13 @@ fn conclusion(study: &Stability) -> Option<String> {
 pub fn figure(study: &Stability) -> Figure {
     let unit = study.scene.length_unit.as_str();
     let same = |v: f64| v;
-    let spacing = |e: &Entry, _: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(e.value);
+    let spacing = |e: &Entry, _: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(e.value.abscissa());
     let nodes = |e: &Entry, o: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(o.nodes as f64);
-    let means = SOLVERS.iter().map(|s| s.replace("line-search", "search").replace("both+barrier", "both\n+barrier"));
+    let safeguards = Safeguards::VARIANTS.iter().map(|safeguards| match safeguards {
+        Safeguards::LineSearch => "search".to_owned(),
+        Safeguards::BothWithBarrier => "both\n+barrier".to_owned(),
+        other => other.to_string(),
+    });
     let mut panels = vec![
         depth_panel(study, "Node spacing", Axis::log("spacing", unit), &spacing),
         depth_panel(study, "Degrees of freedom", Axis::log("nodes", ""), &nodes),
@@ -219,7 +224,7 @@ pub fn figure(study: &Stability) -> Figure {
             Parameter::IncrementsPlain,
             same,
         ),
-        sweep(study, "Means of the solver", Axis::categories("", means.collect()), Parameter::Solver, same),
+        sweep(study, "Means of the solver", Axis::categories("", safeguards.collect()), Parameter::Safeguards, same),
         energy_panel(study),
     ];
     // What the scene's law or tissue does not have is not varied.

@@ -1,6 +1,6 @@
 //! The claim that meshfree methods are more stable than finite elements under large deformation, counted.
 
-use super::plan::{Experiment, Parameter};
+use super::plan::{Experiment, Parameter, Safeguards, Value};
 use super::{ExperimentResult, Stability};
 use crate::discretization::{Integration, Method};
 use std::fmt::Write as _;
@@ -69,7 +69,7 @@ pub struct ClaimCounts {
     pub not_elliptic: (usize, usize),
 }
 
-/// A setting with what came of it.
+/// An experiment with what came of it.
 type Run<'a, 's> = &'a (Experiment, &'s ExperimentResult);
 
 /// Counts every pair of runs that differ in the method only (and, for equal degrees of freedom, in the spacing).
@@ -99,7 +99,7 @@ pub fn claim_counts(study: &Stability) -> ClaimCounts {
     let [linear, quadratic] = [Integration::FemT3, Integration::FemT6];
     let started: Vec<Run<'_, '_>> = distinct.iter().filter(|d| d.1.depth > 0.0).collect();
     let limited: Vec<(f64, &ExperimentResult)> =
-        started.iter().filter_map(|(setting, outcome)| Some((limit_of(study, setting)?, *outcome))).collect();
+        started.iter().filter_map(|(experiment, outcome)| Some((limit_of(study, experiment)?, *outcome))).collect();
     ClaimCounts {
         linear: pairs(linear, &equal_spacing),
         quadratic_equal_spacing: pairs(quadratic, &equal_spacing),
@@ -109,15 +109,15 @@ pub fn claim_counts(study: &Stability) -> ClaimCounts {
     }
 }
 
-/// The law's limit under a setting; none where a barrier or another Poisson ratio makes it another law.
-pub(super) fn limit_of(study: &Stability, setting: &Experiment) -> Option<f64> {
-    if setting.barrier.is_some_and(|b| b > 0.0) || setting.poisson.is_some() {
+/// The law's limit in an experiment; none where a barrier or another Poisson ratio makes it another law.
+pub(super) fn limit_of(study: &Stability, experiment: &Experiment) -> Option<f64> {
+    if experiment.barrier.is_some_and(|b| b > 0.0) || experiment.poisson.is_some() {
         return None;
     }
-    study.limits.iter().find(|l| l.c == setting.c)?.confined
+    study.limits.iter().find(|l| l.c == experiment.c)?.confined
 }
 
-/// One screen: depths by method and parameter, and the claim's answer.
+/// One screen: depths by integration rule and parameter, and the claim's answer.
 pub fn summary(study: &Stability) -> String {
     let scene = &study.scene;
     let mut out = format!(
@@ -134,20 +134,20 @@ pub fn summary(study: &Stability) -> String {
     out
 }
 
-/// Depths by method and parameter.
+/// Depths by integration rule and parameter.
 fn write_depths(study: &Stability, out: &mut String) {
     let _ = write!(out, "{:<26}", "depth reached");
-    for &method in Integration::VARIANTS {
-        let _ = write!(out, "{:>9}", method.name());
+    for &integration in Integration::VARIANTS {
+        let _ = write!(out, "{:>9}", integration.name());
     }
     out.push('\n');
     let mut line = |label: &str, pick: &dyn Fn(&super::Entry) -> bool| {
         let _ = write!(out, "{label:<26}");
-        for &method in Integration::VARIANTS {
+        for &integration in Integration::VARIANTS {
             let depths: Vec<f64> = study
                 .rows
                 .iter()
-                .filter(|(e, _)| e.setting.method.integration == method && pick(e))
+                .filter(|(e, _)| e.experiment.method.integration == integration && pick(e))
                 .map(|(_, o)| o.depth)
                 .collect();
             let low = depths.iter().copied().fold(f64::INFINITY, f64::min);
@@ -155,18 +155,18 @@ fn write_depths(study: &Stability, out: &mut String) {
         }
         out.push('\n');
     };
-    let mut seen: Vec<(Parameter, String)> = Vec::new();
+    let mut seen: Vec<(Parameter, Value)> = Vec::new();
     for (entry, _) in &study.rows {
-        let key = (entry.parameter, entry.value_text());
+        let key = (entry.parameter, entry.value);
         let shown = match entry.parameter {
             Parameter::Spacing => true,
-            Parameter::Jitter => entry.value == 40.0,
-            Parameter::Contrast => entry.value == 1e6,
-            Parameter::Poisson => entry.value >= 0.49,
-            Parameter::C => entry.value != 0.779,
-            Parameter::Support => [1.2, 3.0, 4.0].contains(&entry.value),
-            Parameter::Solver => entry.value == 0.0,
-            Parameter::Barrier => entry.value == 1.0,
+            Parameter::Jitter => entry.value.is(40.0),
+            Parameter::Contrast => entry.value.is(1e6),
+            Parameter::Poisson => entry.value >= Value::Number(0.49),
+            Parameter::C => !entry.value.is(0.779),
+            Parameter::Support => [1.2, 3.0, 4.0].iter().any(|&support| entry.value.is(support)),
+            Parameter::Safeguards => entry.value == Value::Safeguards(Safeguards::Plain),
+            Parameter::Barrier => entry.value.is(1.0),
             Parameter::Increments | Parameter::IncrementsPlain => false,
         };
         if shown && !seen.contains(&key) {
@@ -176,7 +176,7 @@ fn write_depths(study: &Stability, out: &mut String) {
             };
             let sweep = entry.parameter != Parameter::Spacing;
             line(&label, &|e| {
-                e.parameter == key.0 && e.value_text() == key.1 && (!sweep || e.setting.spacing == study.spacing)
+                e.parameter == key.0 && e.value == key.1 && (!sweep || e.experiment.spacing == study.spacing)
             });
             seen.push(key);
         }

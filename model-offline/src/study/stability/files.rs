@@ -8,7 +8,7 @@ fn family(integration: Integration) -> &'static str {
     if !integration.is_element() { "rkpm" } else { "fem" }
 }
 
-/// One row per setting.
+/// One row per entry.
 pub fn csv(study: &Stability) -> Vec<u8> {
     let columns = [
         "method",
@@ -29,13 +29,13 @@ pub fn csv(study: &Stability) -> Vec<u8> {
         "detail",
     ];
     table(columns, &study.rows, |(entry, o)| {
-        let s = &entry.setting;
+        let s = &entry.experiment;
         let integration = s.method.integration;
         [
             family(integration).to_owned(),
             integration.name().to_owned(),
             entry.parameter.name().to_owned(),
-            entry.value_text(),
+            entry.value.to_string(),
             s.spacing.to_string(),
             o.nodes.to_string(),
             format!("{:.6}", o.depth),

@@ -62,8 +62,8 @@ impl Stability {
     pub fn distinct(&self) -> Vec<(Experiment, &ExperimentResult)> {
         let mut distinct: Vec<(Experiment, &ExperimentResult)> = Vec::new();
         for (entry, outcome) in &self.rows {
-            if !distinct.iter().any(|d| d.0 == entry.setting) {
-                distinct.push((entry.setting, outcome));
+            if !distinct.iter().any(|d| d.0 == entry.experiment) {
+                distinct.push((entry.experiment, outcome));
             }
         }
         distinct
@@ -75,26 +75,26 @@ impl Stability {
 pub struct Plan {
     entries: Vec<Entry>,
     /// Settings that differ, finest first, so that long runs do not come last.
-    settings: Vec<Experiment>,
+    experiments: Vec<Experiment>,
 }
 
 impl Plan {
     /// What the study of a scene will run. Empty when the scene's resolution is not a spacing.
     pub fn new(scene: &Scene, extent: Extent) -> Self {
         let entries = plan::entries(scene, extent);
-        let mut settings: Vec<Experiment> = Vec::new();
+        let mut experiments: Vec<Experiment> = Vec::new();
         for entry in &entries {
-            if !settings.contains(&entry.setting) {
-                settings.push(entry.setting);
+            if !experiments.contains(&entry.experiment) {
+                experiments.push(entry.experiment);
             }
         }
-        settings.sort_by(|a, b| a.spacing.total_cmp(&b.spacing));
-        Self { entries, settings }
+        experiments.sort_by(|a, b| a.spacing.total_cmp(&b.spacing));
+        Self { entries, experiments }
     }
 
     /// Number of runs.
     pub fn runs(&self) -> usize {
-        self.settings.len()
+        self.experiments.len()
     }
 
     /// Runs everything with the paddle of this index attached; the result does not depend on `threads`.
@@ -113,8 +113,8 @@ impl Plan {
             return Err(ModelError::NoSpacing);
         };
         let place = scene.paddles.iter().position(|p| p.index == paddle).ok_or(ModelError::NoSuchPaddle(paddle))?;
-        let outcomes = parallel::map(self.settings.len(), threads, |i| {
-            let outcome = probe::run(scene, place, &self.settings[i]);
+        let outcomes = parallel::map(self.experiments.len(), threads, |i| {
+            let outcome = probe::run(scene, place, &self.experiments[i]);
             progress();
             outcome
         });
@@ -122,7 +122,7 @@ impl Plan {
             .entries
             .iter()
             .filter_map(|entry| {
-                let place = self.settings.iter().position(|s| *s == entry.setting)?;
+                let place = self.experiments.iter().position(|s| *s == entry.experiment)?;
                 Some((*entry, outcomes[place].clone()))
             })
             .collect();
@@ -139,7 +139,7 @@ impl Plan {
 
 /// Limits of the scene's own law, then of those with every c of the plan.
 fn limits(scene: &Scene, entries: &[Entry]) -> Vec<LawLimit> {
-    let mut values: Vec<f64> = entries.iter().filter_map(|e| e.setting.c).collect();
+    let mut values: Vec<f64> = entries.iter().filter_map(|e| e.experiment.c).collect();
     values.sort_by(f64::total_cmp);
     values.dedup();
     std::iter::once(None)

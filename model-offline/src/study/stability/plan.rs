@@ -4,7 +4,8 @@ use crate::discretization::{Integration, Method, Resolution};
 use crate::material::Material;
 use crate::scene::Scene;
 use crate::study::extent::Extent;
-use strum::VariantArray as _;
+use std::fmt;
+use strum::{Display, IntoStaticStr, VariantArray};
 
 /// Everything that decides a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,8 +53,8 @@ pub enum Parameter {
     Increments,
     /// Increments over the scene's depth, plain Newton.
     IncrementsPlain,
-    /// Means of the solver.
-    Solver,
+    /// Safeguards of the solver.
+    Safeguards,
     /// Volumetric barrier over the shear modulus.
     Barrier,
 }
@@ -70,14 +71,75 @@ impl Parameter {
             Self::C => "c",
             Self::Increments => "increments",
             Self::IncrementsPlain => "increments_plain",
-            Self::Solver => "solver",
+            Self::Safeguards => "solver",
             Self::Barrier => "barrier_over_mu",
         }
     }
 }
 
-/// Names of the solver's means, by the value of [`Parameter::Solver`].
-pub const SOLVERS: [&str; 5] = ["plain", "line-search", "cutback", "both", "both+barrier"];
+/// What keeps Newton's method from diverging.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Display, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Safeguards {
+    /// Nothing.
+    Plain,
+    /// Steps that raise the energy are shortened.
+    LineSearch,
+    /// An increment that fails is cut.
+    Cutback,
+    /// Both.
+    Both,
+    /// Both, and a law with a volumetric barrier.
+    #[strum(serialize = "both+barrier")]
+    BothWithBarrier,
+}
+
+impl Safeguards {
+    /// The experiment with these instead of its own.
+    fn of(self, base: Experiment) -> Experiment {
+        let (line_search, cutback) = match self {
+            Self::Plain => (false, false),
+            Self::LineSearch => (true, false),
+            Self::Cutback => (false, true),
+            Self::Both | Self::BothWithBarrier => (true, true),
+        };
+        let barrier = if self == Self::BothWithBarrier { Some(1.0) } else { base.barrier };
+        Experiment { line_search, cutback, barrier, ..base }
+    }
+}
+
+/// A value of a [`Parameter`].
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+pub enum Value {
+    /// A number, in the parameter's unit.
+    Number(f64),
+    /// Safeguards of the solver.
+    Safeguards(Safeguards),
+}
+
+impl Value {
+    /// Where it stands on an axis: the number, or the place among the safeguards.
+    pub fn abscissa(self) -> f64 {
+        match self {
+            Self::Number(number) => number,
+            Self::Safeguards(safeguards) => safeguards as u8 as f64,
+        }
+    }
+
+    /// Whether it is this number.
+    pub fn is(self, number: f64) -> bool {
+        self == Self::Number(number)
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => number.fmt(f),
+            Self::Safeguards(safeguards) => safeguards.fmt(f),
+        }
+    }
+}
 
 /// One row of the study.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,19 +147,9 @@ pub struct Entry {
     /// What is varied.
     pub parameter: Parameter,
     /// Its value.
-    pub value: f64,
-    /// All of the setting.
-    pub setting: Experiment,
-}
-
-impl Entry {
-    /// The value as files show it.
-    pub fn value_text(&self) -> String {
-        match self.parameter {
-            Parameter::Solver => SOLVERS[self.value as usize].to_owned(),
-            _ => format!("{}", self.value),
-        }
-    }
+    pub value: Value,
+    /// Everything that decides it.
+    pub experiment: Experiment,
 }
 
 /// The scene's own setting with a method at a spacing.
@@ -168,8 +220,8 @@ pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
     for &integration in Integration::VARIANTS {
         for factor in factors {
             // 0.15, not 0.15000000000000002.
-            let setting = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
-            entries.push(Entry { parameter: Parameter::Spacing, value: setting.spacing, setting });
+            let experiment = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
+            entries.push(Entry { parameter: Parameter::Spacing, value: Value::Number(experiment.spacing), experiment });
         }
         let values = extent.choose(Values::full(), Values::few());
         sweeps(scene, base(scene, integration, spacing), &values, &mut entries);
@@ -177,13 +229,14 @@ pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
             sweeps(scene, base(scene, integration, 0.5 * spacing), &Values::few(), &mut entries);
         }
     }
-    let key = |e: &Entry| (e.parameter, Integration::VARIANTS.iter().position(|m| *m == e.setting.method.integration));
+    let key =
+        |e: &Entry| (e.parameter, Integration::VARIANTS.iter().position(|m| *m == e.experiment.method.integration));
     entries.sort_by(|a, b| {
         key(a)
             .cmp(&key(b))
-            .then(b.setting.spacing.total_cmp(&a.setting.spacing))
-            .then(a.value.total_cmp(&b.value))
-            .then(a.setting.seed.cmp(&b.setting.seed))
+            .then(b.experiment.spacing.total_cmp(&a.experiment.spacing))
+            .then(a.value.abscissa().total_cmp(&b.value.abscissa()))
+            .then(a.experiment.seed.cmp(&b.experiment.seed))
     });
     entries
 }
@@ -199,7 +252,8 @@ fn stress_scale(scene: &Scene) -> f64 {
 }
 
 fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>) {
-    let mut push = |parameter, value, setting| out.push(Entry { parameter, value, setting });
+    let mut push =
+        |parameter, value, experiment| out.push(Entry { parameter, value: Value::Number(value), experiment });
     if !base.method.integration.is_element() {
         for &support in &values.support {
             push(Parameter::Support, support, Experiment { method: Method { support, ..base.method }, ..base });
@@ -226,22 +280,17 @@ fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>
             push(Parameter::C, c, Experiment { c: Some(c), ..base });
         }
     }
-    let plain = Experiment { line_search: false, cutback: false, ..base };
+    let plain = Safeguards::Plain.of(base);
     for &increments in values.increments {
         push(Parameter::Increments, f64::from(increments), Experiment { increments, ..base });
         push(Parameter::IncrementsPlain, f64::from(increments), Experiment { increments, ..plain });
     }
-    let means = [
-        plain,
-        Experiment { cutback: false, ..base },
-        Experiment { line_search: false, ..base },
-        base,
-        Experiment { barrier: Some(1.0), ..base },
-    ];
-    for (place, setting) in means.into_iter().enumerate() {
-        push(Parameter::Solver, place as f64, setting);
-    }
     for &barrier in values.barrier {
         push(Parameter::Barrier, barrier, Experiment { barrier: Some(barrier), ..base });
     }
+    out.extend(Safeguards::VARIANTS.iter().map(|&safeguards| Entry {
+        parameter: Parameter::Safeguards,
+        value: Value::Safeguards(safeguards),
+        experiment: safeguards.of(base),
+    }));
 }

@@ -64,7 +64,7 @@ pub struct ExperimentResult {
 }
 
 /// Runs a setting with the paddle at this place of the scene's list static.
-pub fn run(scene: &Scene, paddle: usize, setting: &Experiment) -> ExperimentResult {
+pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentResult {
     let stopped = |nodes: usize, error: ModelError| ExperimentResult {
         nodes,
         depth: 0.0,
@@ -74,21 +74,21 @@ pub fn run(scene: &Scene, paddle: usize, setting: &Experiment) -> ExperimentResu
         ellipticity: 1.0,
         energy: 0.0,
     };
-    let scene = match varied(scene, setting) {
+    let scene = match varied(scene, experiment) {
         Ok(scene) => scene,
         Err(error) => {
             return ExperimentResult { reason: StopReason::UnstableLaw, ..stopped(0, error.into()) };
         }
     };
-    let nodes = jittered(&scene, setting);
+    let nodes = jittered(&scene, experiment);
     let count = nodes.len();
-    let model = match with_nodes(&scene, nodes, setting) {
+    let model = match with_nodes(&scene, nodes, experiment) {
         Ok(model) => model,
         Err(error) => return stopped(count, error),
     };
     let settings = NewtonSettings {
-        line_search: setting.line_search,
-        max_cutbacks: if setting.cutback { MAX_CUTBACKS } else { 0 },
+        line_search: experiment.line_search,
+        max_cutbacks: if experiment.cutback { MAX_CUTBACKS } else { 0 },
         ..NewtonSettings::default()
     };
     let mut body = match model.body(Some(paddle), settings) {
@@ -96,8 +96,8 @@ pub fn run(scene: &Scene, paddle: usize, setting: &Experiment) -> ExperimentResu
         Err(failure) => return stopped(model.nodes(), failure.into()),
     };
     let (mut reason, mut detail) = (StopReason::Reached, String::new());
-    for increment in 1..=BEYOND * setting.increments {
-        let depth = scene.needle.depth * f64::from(increment) / f64::from(setting.increments);
+    for increment in 1..=BEYOND * experiment.increments {
+        let depth = scene.needle.depth * f64::from(increment) / f64::from(experiment.increments);
         if let Err(failure) = body.drive(depth, Vector2::zeros()) {
             (reason, detail) = (StopReason::Solve(failure.reason), failure.detail);
             break;
@@ -151,20 +151,20 @@ fn reason_of(error: &ModelError) -> StopReason {
 }
 
 /// The scene with the setting's material and inclusions.
-pub(super) fn varied(scene: &Scene, setting: &Experiment) -> Result<Scene, MaterialError> {
+pub(super) fn varied(scene: &Scene, experiment: &Experiment) -> Result<Scene, MaterialError> {
     let mut law = scene.material.clone();
-    if let Some(poisson) = setting.poisson {
+    if let Some(poisson) = experiment.poisson {
         law = law.with_poisson_ratio(poisson).unwrap_or(Ok(law))?;
     }
-    if let Some(c) = setting.c {
+    if let Some(c) = experiment.c {
         law = law.with_exponential_factor(c).unwrap_or(Ok(law))?;
     }
-    if let Some(share) = setting.barrier {
+    if let Some(share) = experiment.barrier {
         let shear = law.tangent(&Matrix2::zeros())[0][1][0][1];
         law = law.with_barrier(share * shear)?;
     }
     let mut scene = scene.clone();
-    match setting.contrast {
+    match experiment.contrast {
         None => scene.inclusions.clear(),
         Some(contrast) => scene.inclusions.iter_mut().for_each(|i| i.stiffness = contrast),
     }
@@ -173,15 +173,15 @@ pub(super) fn varied(scene: &Scene, setting: &Experiment) -> Result<Scene, Mater
 }
 
 /// Lattice nodes, those inside the body moved at random; nodes on the boundary and on the needle stay.
-fn jittered(scene: &Scene, setting: &Experiment) -> Vec<Point2> {
-    let mut nodes = lattice_nodes(&scene.features(), setting.spacing);
-    if setting.jitter == 0.0 {
+fn jittered(scene: &Scene, experiment: &Experiment) -> Vec<Point2> {
+    let mut nodes = lattice_nodes(&scene.features(), experiment.spacing);
+    if experiment.jitter == 0.0 {
         return nodes;
     }
     let tolerance = 1e-9 * scene.outline.size();
-    let mut random = SplitMix64(setting.seed);
+    let mut random = SplitMix64(experiment.seed);
     for x in &mut nodes {
-        let shift = Point2::new(random.symmetric(), random.symmetric()) * (setting.jitter * setting.spacing);
+        let shift = Point2::new(random.symmetric(), random.symmetric()) * (experiment.jitter * experiment.spacing);
         let inside = scene.outline.locate(*x, tolerance) == Location::Inside;
         if inside && distance_to_polyline(*x, &scene.needle.contact) > tolerance {
             *x += shift;
@@ -190,18 +190,18 @@ fn jittered(scene: &Scene, setting: &Experiment) -> Vec<Point2> {
     nodes
 }
 
-fn with_nodes(scene: &Scene, nodes: Vec<Point2>, setting: &Experiment) -> Result<TissueModel, ModelError> {
+fn with_nodes(scene: &Scene, nodes: Vec<Point2>, experiment: &Experiment) -> Result<TissueModel, ModelError> {
     let planar =
-        Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(setting.spacing), setting.method)?;
-    TissueModel::on(scene, planar, setting.spacing)
+        Planar::new(&scene.outline, &scene.inclusion_outlines(), nodes, Some(experiment.spacing), experiment.method)?;
+    TissueModel::on(scene, planar, experiment.spacing)
 }
 
-/// The homogeneous model of a setting, for measures other than the insertion, and the lattice it was jittered from.
+/// The homogeneous model of an experiment, for measures other than the insertion, and the lattice it was jittered from.
 ///
 /// # Errors
 /// [`ModelError`] when there is none.
-pub(super) fn model(scene: &Scene, setting: &Experiment) -> Result<TissueModel, ModelError> {
+pub(super) fn model(scene: &Scene, experiment: &Experiment) -> Result<TissueModel, ModelError> {
     let scene = scene.without_inclusions();
-    let nodes = jittered(&scene, setting);
-    with_nodes(&scene, nodes, setting)
+    let nodes = jittered(&scene, experiment);
+    with_nodes(&scene, nodes, experiment)
 }

@@ -56,21 +56,21 @@ pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelErro
         .flat_map(|jitter| {
             Integration::VARIANTS.iter().map(move |m| Experiment { jitter, ..plan::base(scene, *m, spacing) })
         })
-        .map(|setting| measure_one(scene, &setting))
+        .map(|experiment| measure_one(scene, &experiment))
         .collect()
 }
 
-fn measure_one(scene: &Scene, setting: &Experiment) -> Result<ZeroEnergy, ModelError> {
-    let (integration, spacing) = (setting.method.integration, setting.spacing);
-    let model = probe::model(scene, setting)?;
+fn measure_one(scene: &Scene, experiment: &Experiment) -> Result<ZeroEnergy, ModelError> {
+    let (integration, spacing) = (experiment.method.integration, experiment.spacing);
+    let model = probe::model(scene, experiment)?;
     // The lattice before it was jittered: what the checkerboard alternates on.
-    let lattice = probe::model(scene, &Experiment { jitter: 0.0, ..*setting })?.positions().to_vec();
+    let lattice = probe::model(scene, &Experiment { jitter: 0.0, ..*experiment })?.positions().to_vec();
     let law = scene.material.tangent(&Matrix2::zeros());
     let everywhere = |_: u32| true;
     let stiffness = dense_tangent(model.rule(), &law, model.nodes(), &everywhere);
     // Elements are integrated exactly by their own rule.
     let accurate = match !integration.is_element() {
-        true => Some(accurate_rule(scene, model.positions(), setting)?),
+        true => Some(accurate_rule(scene, model.positions(), experiment)?),
         false => None,
     };
     let exact = match &accurate {
@@ -95,7 +95,7 @@ fn measure_one(scene: &Scene, setting: &Experiment) -> Result<ZeroEnergy, ModelE
         .collect();
     let interior_energy_ratio = accurate.as_ref().map_or(1.0, |(rule, cells)| {
         // Cells in which no kernel feels the boundary.
-        let clear = setting.method.support * spacing - 1e-9 * extent;
+        let clear = experiment.method.support * spacing - 1e-9 * extent;
         let inside = |cells: &[NodalCell]| -> Vec<bool> {
             cells.iter().map(|c| c.corners().iter().all(|x| scene.outline.distance_to_boundary(*x) >= clear)).collect()
         };
@@ -110,13 +110,13 @@ fn measure_one(scene: &Scene, setting: &Experiment) -> Result<ZeroEnergy, ModelE
     let zero = ZERO * eigenvalues.max();
     Ok(ZeroEnergy {
         integration,
-        jitter: setting.jitter,
+        jitter: experiment.jitter,
         nodes: model.nodes(),
         zero_modes: eigenvalues.iter().filter(|v| v.abs() <= zero).count(),
         checkerboard_over_smooth: energy(&stiffness, &checkerboard) / energy(&stiffness, &smooth),
         checkerboard_energy_ratio: energy(&stiffness, &checkerboard) / energy(&exact, &checkerboard),
         interior_energy_ratio,
-        bloch_share: bloch::least_share(integration, setting.method.support, &scene.material)?.share,
+        bloch_share: bloch::least_share(integration, experiment.method.support, &scene.material)?.share,
         least_energy_ratio: if !integration.is_element() { least_share(&stiffness, &exact) } else { 1.0 },
     })
 }
@@ -135,10 +135,10 @@ fn energy(k: &DMatrix<f64>, field: &[f64]) -> f64 {
 fn accurate_rule(
     scene: &Scene,
     nodes: &[Point2],
-    setting: &Experiment,
+    experiment: &Experiment,
 ) -> Result<(Quadrature<2>, Vec<NodalCell>), ModelError> {
-    let cloud = NodeCloud::new(nodes.to_vec(), vec![setting.spacing * setting.method.support; nodes.len()]);
-    let shape = ShapeFunctions::new(&cloud, setting.method.basis);
+    let cloud = NodeCloud::new(nodes.to_vec(), vec![experiment.spacing * experiment.method.support; nodes.len()]);
+    let shape = ShapeFunctions::new(&cloud, experiment.method.basis);
     let triangles = triangulate(nodes, &scene.outline, &[]).map_err(DiscretizationError::from)?;
     let cells = Elements::linear(nodes.to_vec(), triangles.clone()).cells();
     Ok((integration::gauss(&shape, &triangles, &cells, Basis::Quadratic, Consistency::Uncorrected)?, cells))
