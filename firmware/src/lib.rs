@@ -11,6 +11,16 @@
 //! Where to begin: [precompute tables](../model_offline/guide/precompute/index.html),
 //! [run simulations](../host_sim/guide/run_simulations/index.html), [check timing](../host_sim/guide/check_timing/index.html).
 //!
+//! # Modules
+//! In the order of use; each uses only those above it, and `scalar` and `units`:
+//!
+//! 1. [`contract`]: frames, table format, codec, validation, errors: what others rely on.
+//! 2. [`detection`]: what counts as a fault, each limit with its reason. [`schedule`]: absolute release times.
+//! 3. Mathematics: [`law`], [`limits`], [`loop_stability`], [`table_lookup`].
+//! 4. [`settings`] in physical units, checked once and turned into what a tick needs.
+//! 5. [`inputs`]: streams, checks, monitors, supervisor, ledger: what is trusted.
+//! 6. [`controller`]: one tick from inputs to command. [`io`] and [`serial`]: how a host or a board calls it.
+//!
 //! # Control law
 //! With the needle depth z extrapolated by its velocity to the time when the command acts:
 //!
@@ -93,7 +103,7 @@
 #[cfg(test)]
 extern crate std;
 
-// In the order of use: a module uses only what stands above it.
+// In the order of use: a module uses only what stands above its group, or beside it.
 pub mod scalar;
 mod units;
 

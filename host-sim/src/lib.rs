@@ -22,6 +22,8 @@
 //! | [`bench`](mod@bench) | strategies [compared](bench::comparison), [faults](bench::faults), [timing](bench::timing), [stability](bench::loop_stability), the controller on a [board](bench::board) |
 //! | [`report`], [`view`] | what a person sees |
 //!
+//! Beside them stands [`process`], which ends children with their parents.
+//!
 //! Two modes of time, never mixed: in lockstep it comes from the messages, and the same seed gives the same bytes; in
 //! free-run both processes follow the machine's steady clock with absolute deadlines. Either way every tick is recorded and
 //! every sample accounted for ([`runtime::accounting::accounts`]).
@@ -50,15 +52,24 @@
 //! With a [`ControllerSetup`] the paddle moves, and the controller has a process of its own; a [`Comparison`] of all three
 //! is what `host-sim run` does.
 
-pub mod bench;
-pub mod exchange;
-pub mod guide;
+// In the order of use: a module uses only what stands above its group, or beside it.
 pub mod process;
-pub mod record;
-pub mod report;
-pub mod runtime;
-pub mod view;
+
 pub mod world;
+
+pub mod exchange;
+
+pub mod runtime;
+
+pub mod record;
+
+pub mod bench;
+
+pub mod report;
+
+pub mod view;
+
+pub mod guide;
 
 pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
 pub use bench::error::SimError;

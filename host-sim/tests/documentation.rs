@@ -2,6 +2,7 @@
 //! after a comment `<!-- not run by tests: WHY -->` are left out.
 
 mod missing;
+mod results;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -71,6 +72,11 @@ fn every_command_shown_works() {
             // A machine whose host takes its processor away gives no timing to report, and `timing` has to say so.
             let void = rest.starts_with("timing") && output.status.code() == Some(1) && said.contains(VOID);
             assert!(output.status.success() || void, "{}: `{command}`\n{said}", page.display());
+        }
+        if page.ends_with("README.md") {
+            let result = std::fs::read(folder.path().join("stillpoint-report/result.json")).unwrap();
+            let wrong = results::differences(&text, &serde_json::from_slice(&result).unwrap());
+            assert!(wrong.is_empty(), "{}: {wrong:#?}", page.display());
         }
     }
 }

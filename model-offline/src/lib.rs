@@ -23,6 +23,9 @@
 //! 8. [`output`]: JSON, VTU, SVG, tables; every file whole or not at all. [`study`]: which method is fast, which is
 //!    accurate, and where each stops working.
 //!
+//! Beside them stand small things that all may use: [`parallel`] (threads), `random` (seeded numbers), `choice` (enums that
+//! files and command lines call by the same names).
+//!
 //! Where to begin: [precompute tables](guide::precompute), [how it works](guide::how_it_works), a
 //! [worked example](guide::change_a_material).
 //!
@@ -40,23 +43,36 @@
 //! # Ok::<(), table::TableBuildError>(())
 //! ```
 
+// In the order of use: a module uses only what stands above its group, or beside it.
 mod choice;
-pub mod discretization;
-pub mod geometry;
-pub mod guide;
-pub mod linalg;
-pub mod material;
-pub mod mechanics;
-pub mod model;
-pub mod output;
 pub mod parallel;
-pub mod placement;
 mod random;
-pub mod reduction;
-pub mod scene;
+
+pub mod geometry;
+pub mod material;
+
+pub mod linalg;
+
+pub mod discretization;
+
+pub mod mechanics;
+
 pub mod solver;
-pub mod study;
+
+pub mod scene;
+
+pub mod model;
+
+pub mod placement;
+
+pub mod reduction;
 pub mod table;
+
+pub mod output;
+
+pub mod study;
+
+pub mod guide;
 
 pub use discretization::{Basis, Discretization, Essential, Integration, Method, Resolution};
 pub use geometry::{Point2, Polygon};

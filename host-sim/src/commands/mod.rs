@@ -36,7 +36,7 @@ use self::replay::{ReplayArgs, replay};
 use self::report::{ReportArgs, report};
 use self::run::{RunArgs, run};
 use self::schema::{Subject, schema};
-use self::stability::{StabilityArgs, stability};
+use self::stability::{LoopStabilityArgs, stability};
 use self::tables::{TablesArgs, tables};
 use self::timing::{TimingArgs, timing};
 use self::timing_peer::{PeerArgs, timing_peer};
@@ -90,7 +90,7 @@ pub(crate) enum Command {
     Faults(FaultsArgs),
     /// Where the closed loop stops being stable: simulated beside theory
     #[command(after_help = "Example: host-sim stability --out stability --quick")]
-    Stability(StabilityArgs),
+    Stability(LoopStabilityArgs),
     /// Charts what a table's size is worth: closed-loop error and time of a step against knots and number type
     #[command(after_help = "Example: host-sim tables --scene paper --tissue homogeneous --out charts")]
     Tables(TablesArgs),

@@ -58,6 +58,19 @@ pub(crate) fn between_siblings(read: &Crate) -> Vec<String> {
     levels.values().flat_map(|graph| circles(&read.name, graph)).collect()
 }
 
+/// Imports of the crate's own modules from groups that come later than the importing one's.
+pub(crate) fn against_order(read: &Crate, groups: &[Vec<String>]) -> Vec<String> {
+    let group = |module: &[String]| {
+        let room = module.first()?;
+        groups.iter().position(|group| group.contains(room))
+    };
+    let up = |import: &Import| {
+        let [from, to] = [import.from, import.to].map(|file| group(&read.files[file].module));
+        from.zip(to).is_some_and(|(from, to)| from < to)
+    };
+    imports(read).into_iter().filter(up).map(|import| import.text).collect()
+}
+
 fn add(graph: &mut Graph, from: String, to: String, import: String) {
     graph.entry(from).or_default().entry(to).or_default().insert(import);
 }

@@ -29,6 +29,68 @@ fn assert_no_circles_from(name: &str, root: &str) {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
+/// The modules that a crate's root declares, in groups that blank lines part.
+fn groups(root: &str) -> Vec<Vec<String>> {
+    let mut groups = vec![Vec::new()];
+    for line in root.lines() {
+        let declared = line.trim_start_matches("pub ").strip_prefix("mod ").and_then(|rest| rest.strip_suffix(';'));
+        match declared {
+            Some(name) => groups.last_mut().unwrap().push(name.to_owned()),
+            None if line.is_empty() => groups.push(Vec::new()),
+            None => {}
+        }
+    }
+    groups.retain(|group| !group.is_empty());
+    groups
+}
+
+/// What a crate's root promises: modules use only what is declared above their group or in it, and the front page tells
+/// of each, in the same order.
+fn broken_promises(src: &Path) -> Vec<String> {
+    let root = std::fs::read_to_string(src.join("lib.rs")).unwrap();
+    let groups = groups(&root);
+    let mut broken = cycles::against_order(&Crate::read(src, "lib.rs"), &groups);
+    let page: String = root.lines().filter(|line| line.starts_with("//!")).collect();
+    // What stands beside all others is told of after them.
+    let (small, rooms) = groups.split_first().unwrap();
+    let mut last = 0;
+    for group in rooms.iter().filter(|group| **group != ["guide"]) {
+        let places: Vec<Option<usize>> = group.iter().map(|name| page.find(&format!("[`{name}`]"))).collect();
+        for (name, place) in group.iter().zip(&places) {
+            match place {
+                None => broken.push(format!("{name} is not on the front page")),
+                Some(place) if *place < last => broken.push(format!("{name} is told of before what it uses")),
+                Some(_) => {}
+            }
+        }
+        last = places.into_iter().flatten().fold(last, usize::max);
+    }
+    let untold = small.iter().filter(|name| !page.contains(&format!("`{name}`")));
+    broken.extend(untold.map(|name| format!("{name} is not on the front page")));
+    broken
+}
+
+#[test]
+fn modules_use_only_what_stands_above_them_as_the_front_pages_promise() {
+    for name in ["firmware", "model-offline", "host-sim"] {
+        let broken = broken_promises(&src(name));
+        assert!(broken.is_empty(), "{name}:\n{}", broken.join("\n"));
+    }
+}
+
+#[test]
+fn a_planted_import_against_the_order_is_found() {
+    let root = "//! [`low`], [`high`], `small`\nmod small;\n\nmod low;\n\nmod high;\n";
+    let files =
+        |low: &'static str| [("lib.rs", root), ("small.rs", ""), ("low.rs", low), ("high.rs", "pub struct Top;")];
+    let found = |files: &[(&str, &str)]| broken_promises(planted(files).path());
+    assert_eq!(found(&files("use crate::high::Top;")), ["low.rs:1: crate::high::Top"]);
+    assert!(found(&files("")).is_empty());
+    let mut swapped = files("");
+    swapped[0].1 = "//! [`high`], [`low`]\nmod small;\n\nmod low;\n\nmod high;\n";
+    assert_eq!(found(&swapped), ["high is told of before what it uses", "small is not on the front page"]);
+}
+
 fn assert_functions_fit(name: &str) {
     let found = functions::too_large(&src(name));
     assert!(found.is_empty(), "{name}:\n{}", found.join("\n"));
