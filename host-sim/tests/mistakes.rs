@@ -1,6 +1,10 @@
 //! Wrong things that a newcomer does: each ends with the exit code of bad input, says what and where or what to do,
 //! and writes nothing.
 
+mod missing;
+
+use std::path::Path;
+
 use assert_cmd::Command;
 
 #[test]
@@ -81,11 +85,41 @@ fn entries(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
 
 #[test]
 fn every_command_has_an_example_in_its_help() {
-    for command in
-        ["run", "controller", "plant", "timing", "faults", "replay", "report", "export", "schema", "completions", "man"]
-    {
-        let assert = Command::new(env!("CARGO_BIN_EXE_host-sim")).args([command, "--help"]).assert().success();
+    for command in commands(Path::new(env!("CARGO_BIN_EXE_host-sim"))) {
+        let assert = Command::new(env!("CARGO_BIN_EXE_host-sim")).args([command.as_str(), "--help"]).assert().success();
         let said = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
         assert!(said.contains("Example") && said.contains(&format!("host-sim {command}")), "{said}");
+    }
+}
+
+/// The commands that a program's help names.
+fn commands(program: &Path) -> Vec<String> {
+    let assert = Command::new(program).arg("--help").assert().success();
+    let said = String::from_utf8_lossy(&assert.get_output().stdout).into_owned();
+    let listed = said.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let names: Vec<String> = listed.map(|line| line.split_whitespace().next().unwrap().to_owned()).collect();
+    names.into_iter().filter(|name| name != "help").collect()
+}
+
+#[test]
+fn a_command_of_the_other_program_is_told_from_a_wrong_one() {
+    let host_sim = Path::new(env!("CARGO_BIN_EXE_host-sim"));
+    let model_offline = host_sim.with_file_name("model-offline");
+    if !model_offline.is_file() {
+        return missing::skip(
+            "commands of the other program",
+            "model-offline is not built: `cargo test --workspace` does",
+        );
+    }
+    for (program, other) in [(host_sim, model_offline.as_path()), (&model_offline, host_sim)] {
+        let own = commands(program);
+        let elsewhere: Vec<String> = commands(other).into_iter().filter(|command| !own.contains(command)).collect();
+        assert!(elsewhere.len() > 5, "{elsewhere:?}");
+        let name = other.file_name().unwrap().to_string_lossy();
+        for command in elsewhere {
+            let assert = Command::new(program).arg(&command).assert().code(2);
+            let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+            assert!(said.contains(&format!("`{command}` is a command of {name}")), "{said}");
+        }
     }
 }

@@ -21,6 +21,14 @@ pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sy
     }
 }
 
+/// More threads than this help nobody, and starting them may fail.
+const MOST_THREADS: usize = 256;
+
+/// As many threads as are asked for, within reason; without a wish, as many as the machine runs at once.
+pub fn threads(asked: Option<usize>) -> usize {
+    asked.unwrap_or_else(available).clamp(1, MOST_THREADS)
+}
+
 /// As many threads as the machine runs at once.
 pub fn available() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)

@@ -10,7 +10,7 @@ use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
 
-use super::outputs::check_outputs;
+use model_offline::output::check_outputs;
 
 /// Options of `board`.
 #[derive(clap::Args, Clone, Debug)]

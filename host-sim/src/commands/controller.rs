@@ -20,8 +20,8 @@ use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::loop_settings::LoopSettings;
 use model_offline::output::table_text::hex;
 
-use super::outputs::check_outputs;
 use super::world_args::PATIENCE;
+use model_offline::output::check_outputs;
 
 /// Options of the controller process.
 #[derive(clap::Args, Clone, Debug)]

@@ -9,7 +9,7 @@ use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
 
-use super::outputs::check_outputs;
+use model_offline::output::check_outputs;
 
 /// Options of `export`.
 #[derive(Args, Clone, Debug)]

@@ -19,7 +19,7 @@ use host_sim::record::files::{write_bytes, write_json};
 use host_sim::runtime::signals;
 use host_sim::world::error::OptionRange;
 
-use super::outputs::check_outputs;
+use model_offline::output::check_outputs;
 
 /// Options of `faults`.
 #[derive(Args, Clone, Debug)]

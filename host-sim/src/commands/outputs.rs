@@ -4,18 +4,7 @@ use std::path::Path;
 
 use host_sim::SimError;
 use host_sim::bench::usage::UsageError;
-use model_offline::output::OutputRefused;
-
-/// Refuses outputs (the option that names each, its path) that cannot be written, that name one file twice, or that name
-/// one of `inputs`.
-///
-/// # Errors
-/// [`SimError::Refused`] names the option and the file.
-pub(super) fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, Option<&Path>)]) -> Result<(), OutputRefused> {
-    let named: Vec<(&'static str, &Path)> =
-        outputs.iter().filter_map(|&(option, path)| Some((option, path?))).collect();
-    model_offline::output::check_outputs(inputs, &named)
-}
+use model_offline::output::check_outputs;
 
 /// Refuses a `--json` that lies in the report's directory `out` under a name that the report uses itself. Another name
 /// there is fine, although the directory may not exist yet: it is written after the report.

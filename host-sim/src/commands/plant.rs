@@ -18,8 +18,8 @@ use model_offline::output::table_text::hex;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::TissueVariant;
 
-use super::outputs::check_outputs;
 use super::world_args::{PATIENCE, WorldArgs};
+use model_offline::output::check_outputs;
 
 /// Options of the plant process.
 #[derive(Args, Clone, Debug)]

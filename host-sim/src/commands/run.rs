@@ -16,11 +16,12 @@ use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{self, InsertionBasis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
+use model_offline::parallel;
 use model_offline::scene::TableScalar;
 use model_offline::scene::TissueVariant;
 
 use super::outputs::check_json_beside_report;
-use super::world_args::{WorldArgs, threads_within_reason};
+use super::world_args::WorldArgs;
 
 /// Options of `run`.
 #[derive(Args, Clone, Debug)]
@@ -87,7 +88,7 @@ impl RunArgs {
         options.hardware = self.hardware;
         options.scalar = self.scalar;
         options.extras = Extras { mcap: self.mcap, vtu: self.vtu };
-        options.threads = self.threads.map_or(options.threads, threads_within_reason);
+        options.threads = parallel::threads(self.threads);
         Ok(options)
     }
 }

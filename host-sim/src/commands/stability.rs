@@ -15,8 +15,6 @@ use model_offline::parallel;
 use model_offline::scene::Scene;
 use model_offline::study::Extent;
 
-use super::world_args::threads_within_reason;
-
 /// Parts of the simulation.
 const PARTS: u64 = 3;
 
@@ -50,7 +48,7 @@ pub(crate) fn stability(args: &LoopStabilityArgs) -> Result<(), SimError> {
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
     let bar = super::progress_bar(args.quiet);
     bar.begin(PARTS);
-    let threads = threads_within_reason(args.threads.unwrap_or_else(parallel::available));
+    let threads = parallel::threads(args.threads);
     let extent = Extent::of_flag(args.quick);
     let result = signals::ends_at_once(|| simulate(&scene, extent, threads, &|| bar.step()))?;
     bar.finish_and_clear();

@@ -14,8 +14,6 @@ use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
 use model_offline::scene::TissueVariant;
 
-use super::world_args::threads_within_reason;
-
 /// Options of `tables`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct TablesArgs {
@@ -43,7 +41,7 @@ pub(crate) struct TablesArgs {
 pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
     let scene = args.tissue.of(&Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?);
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
-    let threads = threads_within_reason(args.threads.unwrap_or_else(parallel::available));
+    let threads = parallel::threads(args.threads);
     let bar = super::progress_bar(args.quiet);
     bar.begin(KNOTS.len() as u64);
     let (model, paddle) = model_with_paddle(&scene, None)?;

@@ -15,7 +15,7 @@ use host_sim::runtime::signals;
 use host_sim::runtime::time::clock::FIFO_PRIORITY;
 use host_sim::world::error::OptionRange;
 
-use super::outputs::check_outputs;
+use model_offline::output::check_outputs;
 
 const RATE: OptionRange = OptionRange::new("--rate", 0.1, 1e5, " Hz");
 const SECONDS: OptionRange = OptionRange::new("--seconds", 0.01, 86_400.0, " s");

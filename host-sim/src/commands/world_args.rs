@@ -54,14 +54,6 @@ pub(crate) struct WorldArgs {
     pub(crate) paddle_gain: f64,
 }
 
-/// More threads than this help nobody, and starting them may fail.
-const MOST_THREADS: usize = 256;
-
-/// What `--threads` asks for, at least one.
-pub(super) fn threads_within_reason(asked: usize) -> usize {
-    asked.clamp(1, MOST_THREADS)
-}
-
 impl WorldArgs {
     /// Reads the scene.
     ///

@@ -25,7 +25,7 @@ fn tells(cell: &str, strategy: &Value) -> bool {
 }
 
 /// What the page's table says otherwise than the result of `host-sim run`.
-pub fn differences(page: &str, result: &Value) -> Vec<String> {
+pub(crate) fn differences(page: &str, result: &Value) -> Vec<String> {
     let (rows, cases) = (rows(page), result["cases"].as_array().unwrap());
     let mut wrong = Vec::new();
     if rows.len() != cases.len() {

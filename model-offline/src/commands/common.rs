@@ -7,7 +7,7 @@ use model_offline::discretization::{Basis, Essential, Integration, Resolution};
 use model_offline::output::terminal;
 use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A scene file, with or without its inclusions.
 #[derive(Debug, Args)]
@@ -79,7 +79,7 @@ impl Common {
     }
 
     pub(super) fn threads(&self) -> usize {
-        threads_or_all(self.threads)
+        parallel::threads(self.threads)
     }
 
     pub(super) fn progress(&self, steps: u64) -> ProgressBar {
@@ -87,18 +87,7 @@ impl Common {
     }
 }
 
-pub(super) fn threads_or_all(threads: Option<usize>) -> usize {
-    threads.unwrap_or_else(parallel::available).max(1)
-}
-
 pub(super) fn no_such_paddle(scene: &Scene, index: u32) -> CliError {
     let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
     CliError::usage(format!("the scene has no paddle {index}"), format!("choose one of {}", known.join(", ")))
-}
-
-/// Refuses outputs that cannot be written, stand twice, or would overwrite an input: before any work.
-pub(super) fn check_outputs(input: &Path, outputs: &[(&'static str, Option<&Path>)]) -> Result<(), CliError> {
-    let named: Vec<(&'static str, &Path)> =
-        outputs.iter().filter_map(|&(option, path)| Some((option, path?))).collect();
-    Ok(model_offline::output::check_outputs(&[input], &named)?)
 }

@@ -1,10 +1,12 @@
 //! `model-offline fit`: the smallest model that keeps a tolerance.
 
-use super::common::{SceneArgs, check_outputs, threads_or_all};
+use super::common::SceneArgs;
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::discretization::Resolution;
 use model_offline::output;
+use model_offline::output::check_outputs;
+use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
 use model_offline::study::fit;
 use std::path::{Path, PathBuf};
@@ -38,8 +40,8 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
         _ => Resolution::Tolerance(args.tolerance),
     };
     limits::check_tolerance(args.tolerance)?;
-    check_outputs(&args.scene.scene, &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
-    let outcome = fit::fit(&scene, args.tolerance, threads_or_all(args.threads))
+    check_outputs(&[&args.scene.scene], &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
+    let outcome = fit::fit(&scene, args.tolerance, parallel::threads(args.threads))
         .map_err(CliError::from)
         .and_then(|fit| Ok((scene_with(&fit, &args.scene.scene)?, fit)));
     let (text, fit) = outcome.map_err(|error| error.reported(args.json.as_deref(), &scene))?;

@@ -1,8 +1,8 @@
 //! `model-offline inspect`: what a table holds.
 
-use super::common::check_outputs;
 use super::error::CliError;
 use super::json::write_json;
+use model_offline::output::check_outputs;
 use model_offline::output::table_text;
 use std::path::PathBuf;
 
@@ -17,7 +17,7 @@ pub(super) struct InspectArgs {
 }
 
 pub(super) fn run(args: &InspectArgs) -> Result<(), CliError> {
-    check_outputs(&args.table, &[("--json", args.json.as_deref())])?;
+    check_outputs(&[&args.table], &[("--json", args.json.as_deref())])?;
     let bytes = std::fs::read(&args.table)
         .map_err(|error| CliError::BadTable { path: args.table.clone(), reason: error.into() })?;
     let contents = table_text::read(&bytes)

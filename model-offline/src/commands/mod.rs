@@ -99,7 +99,8 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 8] = ["run", "controller", "plant", "timing", "faults", "replay", "export", "report"];
+const ELSEWHERE: [&str; 11] =
+    ["run", "controller", "plant", "rearm", "timing", "faults", "tables", "replay", "board", "export", "report"];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
 pub(crate) fn parse() -> Cli {

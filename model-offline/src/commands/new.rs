@@ -65,7 +65,7 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
         }
         Some(path) => {
             let inputs: Vec<&Path> = args.svg.iter().chain(&args.msh).map(PathBuf::as_path).collect();
-            output::check_outputs(&inputs, &[("--output", path)])?;
+            output::check_outputs(&inputs, &[("--output", Some(path))])?;
             output::write_whole(path, text.as_bytes())?;
             println!("{}\nnext: model-offline place {0}", path.display());
         }

@@ -1,11 +1,12 @@
 //! `model-offline place`: the whole placement study.
 
-use super::common::{Common, SceneArgs, check_outputs};
+use super::common::{Common, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
 use super::place_text;
 use model_offline::model::ModelError;
 use model_offline::output;
+use model_offline::output::check_outputs;
 use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;
@@ -30,7 +31,7 @@ pub(super) struct PlaceArgs {
 
 pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
     let scene = args.common.over(args.scene.read()?)?;
-    check_outputs(&args.scene.scene, &[("--json", args.json.as_deref()), ("--table", args.table.as_deref())])?;
+    check_outputs(&[&args.scene.scene], &[("--json", args.json.as_deref()), ("--table", args.table.as_deref())])?;
     place(&scene, args).map_err(|error| error.reported(args.json.as_deref(), &scene))?.finish(args)
 }
 

@@ -1,10 +1,11 @@
 //! `model-offline solve`: one equilibrium.
 
-use super::common::{Common, SceneArgs, check_outputs, no_such_paddle};
+use super::common::{Common, SceneArgs, no_such_paddle};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::model::{Body, ModelError, TissueModel};
 use model_offline::output;
+use model_offline::output::check_outputs;
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::NewtonSettings;
@@ -54,7 +55,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
         return Err(CliError::usage(format!("--depth is {}", args.depth), "give a depth of 0 or more"));
     }
     let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref()), ("--svg", args.svg.as_deref())];
-    check_outputs(&args.scene.scene, &outputs)?;
+    check_outputs(&[&args.scene.scene], &outputs)?;
     solve(&scene, displacement, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
 }
 

@@ -1,7 +1,8 @@
 //! `model-offline table`: the controller table of one paddle.
 
-use super::common::{Common, SceneArgs, check_outputs};
+use super::common::{Common, SceneArgs};
 use super::error::CliError;
+use model_offline::output::check_outputs;
 use model_offline::output::{self, table_text};
 use model_offline::placement::model_with_paddle;
 use model_offline::table::{self, TableOptions};
@@ -27,7 +28,7 @@ pub(super) struct TableArgs {
 
 pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
     let scene = args.common.over(args.scene.read()?)?;
-    check_outputs(&args.scene.scene, &[("--output", Some(&args.output))])?;
+    check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
     let (model, paddle) = model_with_paddle(&scene, args.paddle)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
     let table = table::build(&model, paddle, &options)?;

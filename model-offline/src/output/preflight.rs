@@ -38,10 +38,10 @@ pub enum RefusalReason {
 ///
 /// # Errors
 /// [`OutputRefused`] names the option and the file; nothing has been written.
-pub fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, &Path)]) -> Result<(), OutputRefused> {
+pub fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, Option<&Path>)]) -> Result<(), OutputRefused> {
     let inputs: Vec<Identity> = inputs.iter().filter(|path| path.exists()).map(|path| Identity::of(path)).collect();
     let mut seen: Vec<(&'static str, Identity)> = Vec::new();
-    for &(option, path) in outputs {
+    for (option, path) in outputs.iter().filter_map(|&(option, path)| Some((option, path?))) {
         let refused = |reason| OutputRefused { option, path: path.to_owned(), reason };
         if path.is_dir() {
             return Err(refused(RefusalReason::IsDirectory));
@@ -117,16 +117,17 @@ mod tests {
         std::os::unix::fs::symlink(at("ok.rec"), at("soft")).unwrap();
         let input = at("ok.rec");
         for alias in ["ok.rec", "sub/../ok.rec", "./ok.rec", "hard", "soft"] {
-            let refused = check_outputs(&[&input], &[("--csv", &at(alias))]).unwrap_err();
+            let refused = check_outputs(&[&input], &[("--csv", Some(&at(alias)))]).unwrap_err();
             assert!(matches!(refused.reason, RefusalReason::IsInput), "{alias}: {refused}");
         }
-        let refused = check_outputs(&[], &[("--csv", &at("new")), ("--mcap", &at("sub/../new"))]).unwrap_err();
+        let refused =
+            check_outputs(&[], &[("--csv", Some(&at("new"))), ("--mcap", Some(&at("sub/../new")))]).unwrap_err();
         assert!(matches!(refused.reason, RefusalReason::Twice("--csv")), "{refused}");
-        let refused = check_outputs(&[], &[("--json", &at("sub"))]).unwrap_err();
+        let refused = check_outputs(&[], &[("--json", Some(&at("sub")))]).unwrap_err();
         assert!(matches!(refused.reason, RefusalReason::IsDirectory), "{refused}");
-        let refused = check_outputs(&[], &[("--json", &at("none/x"))]).unwrap_err();
+        let refused = check_outputs(&[], &[("--json", Some(&at("none/x")))]).unwrap_err();
         assert!(matches!(refused.reason, RefusalReason::Folder(_)), "{refused}");
-        check_outputs(&[&input, &at("paper")], &[("--csv", &at("a")), ("--json", &at("b"))]).unwrap();
+        check_outputs(&[&input, &at("paper")], &[("--csv", Some(&at("a"))), ("--json", Some(&at("b")))]).unwrap();
         assert_eq!(
             fs::read_dir(folder.path()).unwrap().count(),
             if cfg!(unix) { 4 } else { 3 },

@@ -38,11 +38,11 @@ impl Processor {
 
     /// `#[inline]` is no reason to inline what is compiled for size: 50 is the threshold without it. Left alone, the
     /// encoders of postcard and serde, all of which have it, take 2 KB more.
-    const fn rustflags(self) -> &'static str {
+    fn rustflags(self) -> &'static str {
         match self {
-            Self::Double => "-C target-cpu=cortex-m7 -C llvm-args=-inlinehint-threshold=50",
+            Self::Double => include_str!("../../../../firmware/image/double.rustflags").trim(),
             // The target's own baseline: Armv7E-M with single-precision hardware.
-            Self::Single => "-C llvm-args=-inlinehint-threshold=50",
+            Self::Single => include_str!("../../../../firmware/image/single.rustflags").trim(),
         }
     }
 }
