@@ -109,14 +109,9 @@ impl<'t> BoardPlant<'t> {
 
     /// One period under `command`, if there is one: the error, length, and the inputs of the next step.
     fn advance(&mut self, command: Option<&PaddleCommand>) -> (f64, Inputs) {
-        let (tick, time_ns) = (self.tick, self.tick * MS);
+        let (truth, inputs) = self.world.tick(self.tick, command, MS).unwrap();
         self.tick += 1;
-        self.world.act(command, time_ns, MS);
-        let truth = self.world.advance(tick, time_ns).unwrap();
-        let (needle, paddle) = self.world.encoders(time_ns);
-        let target = self.world.target_samples(&truth).last();
-        let error = self.world.tissue.error(&Vector2::from(truth.target)).abs();
-        (error, Inputs { tick, time_ns, needle: Some(needle), target, paddle: Some(paddle) })
+        (self.world.tissue.error(&Vector2::from(truth.target)).abs(), inputs)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Large-deformation tissue model, paddle placement and controller tables.
 //!
 //! A body of soft tissue is partly immobile; a needle pushes tissue along its axis; a paddle attached to the accessible
-//! boundary moves a target inside. This crate answers where the paddle belongs and what it must do:
+//! boundary moves a target inside. This crate answers where the paddle belongs and what it must do.
 //!
 //! Modules in the order of the data; each uses only those above it:
 //!

@@ -2,6 +2,7 @@
 
 use assert_cmd::Command;
 use model_offline::discretization::{Integration, Method};
+use model_offline::model::ModelFailure;
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::FailureReason;
 use model_offline::study::stability::plan::{Experiment, base};
@@ -39,7 +40,7 @@ fn depths_agree_with_an_independent_implementation() {
             let outcome = plain(integration, spacing, paddle);
             assert_eq!(outcome.nodes, nodes);
             assert!((outcome.depth - depth).abs() < 0.0101, "{integration:?} {spacing} paddle {paddle}: {outcome:?}");
-            assert!(matches!(outcome.reason, StopReason::Solve(_)), "{outcome:?}");
+            assert!(matches!(outcome.reason, StopReason::Model(ModelFailure::Solve(_))), "{outcome:?}");
         }
     }
 }
@@ -70,7 +71,7 @@ fn every_way_to_fail_has_its_type_and_names_its_place() {
     let scene = paper();
     let regular = base(&scene, Integration::Scni, 0.1);
     let small = run(&scene, 2, &Experiment { method: Method { support: 0.8, ..regular.method }, ..regular });
-    assert_eq!((small.reason, small.depth), (StopReason::SingularMomentMatrix, 0.0));
+    assert_eq!((small.reason, small.depth), (StopReason::Model(ModelFailure::SingularMomentMatrix), 0.0));
     assert!(small.detail.contains("node"), "{}", small.detail);
     let incompressible = run(&scene, 2, &Experiment { poisson: Some(0.5), ..regular });
     assert_eq!(incompressible.reason, StopReason::UnstableLaw);
@@ -82,7 +83,10 @@ fn every_way_to_fail_has_its_type_and_names_its_place() {
         ..regular
     };
     let leap = run(&scene, 2, &leap);
-    assert_eq!((leap.reason, leap.depth), (StopReason::Solve(FailureReason::ElementInverted), 0.0));
+    assert_eq!(
+        (leap.reason, leap.depth),
+        (StopReason::Model(ModelFailure::Solve(FailureReason::ElementInverted)), 0.0)
+    );
     assert!(leap.detail.contains("integration point"), "{}", leap.detail);
     let guarded = run(&scene, 2, &Experiment { barrier: Some(1.0), ..regular });
     assert_eq!((guarded.reason, guarded.depth), (StopReason::Reached, 0.2));

@@ -81,7 +81,7 @@ pub fn placement(tissue: TissueVariant, study: &PlacementStudy) -> PlacementResu
         integration: model.scene().discretization.method.integration,
         wall_s: *wall_s,
         best_static: placement.optimum.static_paddle,
-        best_dynamic: placement.optimum.dynamic_paddle.unwrap_or_default(),
+        best_dynamic: placement.optimum.dynamic_paddle,
         paddles: placement
             .paddles
             .iter()

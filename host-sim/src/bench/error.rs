@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use firmware::SettingsError;
 use firmware::contract::TableError;
+use mcap::McapError;
 use model_offline::model::ModelError;
 use model_offline::output::OutputRefused;
-use model_offline::scene::SceneError;
+use model_offline::scene::{SceneError, TableScalar};
 use model_offline::table::TableBuildError;
 
 use super::board::measure::MeasureError;
@@ -36,7 +37,7 @@ pub enum SimError {
     #[error(transparent)]
     Usage(#[from] UsageError),
     /// A tissue was asked for that the scene does not have.
-    #[error("the scene {scene} has no inclusion: leave --tissue and --table-tissue away")]
+    #[error("the scene {scene} has no inclusion: leave out --tissue and --table-tissue")]
     NoInclusion {
         /// Name of the scene.
         scene: String,
@@ -52,6 +53,17 @@ pub enum SimError {
         /// Why.
         source: TableError,
     },
+    /// A table cannot be encoded in the number type that was asked for.
+    #[error("the table cannot be encoded as {scalar}")]
+    TableScalar {
+        /// The number type.
+        scalar: TableScalar,
+        /// Why.
+        source: TableError,
+    },
+    /// A recording cannot be written as MCAP.
+    #[error("the recording cannot be written as MCAP")]
+    Mcap(#[from] McapError),
     /// A table was computed in other units than the scene's.
     #[error(
         "the table {} is in {}, the scene in {}: compute it from this scene", path.display(), found.join(" and "),
@@ -103,7 +115,7 @@ pub enum SimError {
     Runtime(#[from] RuntimeError),
     /// The live view has no port.
     #[error("no live view: cannot listen on port {port} of 127.0.0.1")]
-    #[diagnostic(help("choose another --view-port, or leave it away for any free one"))]
+    #[diagnostic(help("choose another --view-port, or leave it out for any free one"))]
     ViewPort {
         /// The port; 0: any.
         port: u16,
@@ -174,6 +186,7 @@ impl SimError {
             | Self::NoInclusion { .. }
             | Self::QemuIsLockstepOnly
             | Self::Table { .. }
+            | Self::TableScalar { .. }
             | Self::TableUnits { .. }
             | Self::NotARun { .. } => true,
             Self::Model(error) => error.is_usage(),

@@ -129,19 +129,25 @@ pub struct PlacementResult {
     /// Nodes of the model.
     pub nodes: usize,
     /// Its integration rule.
-    #[schemars(with = "String")]
     pub integration: Integration,
     /// Duration of the study, s.
     pub wall_s: f64,
     /// Best static paddle.
     pub best_static: u32,
-    /// Best dynamic paddle.
-    pub best_dynamic: u32,
+    /// Best dynamic paddle; none where no paddle controls the target.
+    pub best_dynamic: Option<u32>,
     /// All paddles.
     pub paddles: Vec<PaddlePlacement>,
     /// The insertion without a paddle; results of older versions have none.
     #[serde(default)]
     pub no_paddle: Option<NoPaddlePlacement>,
+}
+
+impl PlacementResult {
+    /// The best dynamic paddle as a person reads it.
+    pub fn dynamic_name(&self) -> String {
+        self.best_dynamic.map_or_else(|| "none".to_owned(), |index| index.to_string())
+    }
 }
 
 /// One paddle in a placement study.

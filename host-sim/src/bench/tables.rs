@@ -16,13 +16,11 @@ use nalgebra::Vector2;
 
 use super::error::SimError;
 use crate::runtime::error::RuntimeError;
-use crate::world::actuator::PaddleActuator;
+use crate::world::World;
 use crate::world::error::WorldError;
-use crate::world::needle::NeedleTrajectory;
-use crate::world::sensors::{Encoders, TargetSensor};
+use crate::world::loop_settings::LoopSettings;
 use crate::world::simulation::Simulation;
 use crate::world::tissue::TissuePlant;
-use crate::world::{Sensors, World};
 
 /// Knots that are tried.
 pub const KNOTS: [usize; 7] = [2, 3, 5, 9, 17, 33, 65];
@@ -99,26 +97,6 @@ fn try_table<T: Scalar>(table: &Table<T, 2>, plant: TissuePlant<'_>, simulation:
     trial
 }
 
-/// The world that tables are tried in.
-fn world<'m, T: Scalar>(
-    table: &Table<T, 2>,
-    plant: TissuePlant<'m>,
-    simulation: &Simulation,
-) -> World<TissuePlant<'m>> {
-    let settings = simulation.loop_settings.settings(simulation.depth);
-    let sensors = Sensors {
-        target: TargetSensor::new(
-            settings.target_period_ns,
-            settings.target_latency_ns,
-            NOISE * simulation.depth,
-            simulation.seed,
-        ),
-        encoders: Encoders::new(table.paddle.index),
-    };
-    let drive = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
-    World::of(plant, drive, PaddleActuator::new(simulation.actuator), sensors)
-}
-
 /// One insertion: largest orthogonal error, length, and what the controller was given.
 fn insert<T: Scalar>(
     table: &Table<T, 2>,
@@ -128,21 +106,19 @@ fn insert<T: Scalar>(
     let settings = simulation.loop_settings.settings(simulation.depth);
     let controller = Controller::new(table, &settings)?;
     let mut state = State::<T>::new();
-    let mut world = world(table, plant, simulation);
+    // The controller expects a camera's noise, and gets next to none: what is left is the table's error.
+    let noise = Some(NOISE * simulation.depth);
+    let quiet = Simulation { loop_settings: LoopSettings { noise, ..simulation.loop_settings }, ..*simulation };
+    let mut world = World::simulated(plant, table.paddle.index, &quiet);
     let normal = Vector2::new(table.orthogonal[0].to_f64(), table.orthogonal[1].to_f64());
     let (mut largest, mut seen) = (0.0_f64, Vec::with_capacity(simulation.ticks() as usize));
     let mut command: Option<PaddleCommand> = None;
     for tick in 0..simulation.ticks() {
-        let time_ns = tick * settings.loop_period_ns;
-        world.act(command.as_ref(), time_ns, settings.loop_period_ns);
-        let truth = world.advance(tick, time_ns)?;
+        let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns)?;
         largest = largest.max(Vector2::from(truth.target).dot(&normal).abs());
-        let (needle, paddle) = world.encoders(time_ns);
-        let target = world.target_samples(&truth).last();
-        let inputs = Inputs { tick, time_ns, needle: Some(needle), target, paddle: Some(paddle) };
         command = Some(controller.step(&mut state, &inputs));
         seen.push(inputs);
-        if world.since_start_s(time_ns) >= simulation.duration_s {
+        if world.since_start_s(truth.time_ns) >= simulation.duration_s {
             return Ok((largest, seen));
         }
     }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::record::error::FileError;
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
@@ -35,8 +34,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
         .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
     let mut said = Vec::new();
     if let Some(path) = &args.mcap {
-        let bytes = mcap::encode(&recording, table.orthogonal.into())
-            .map_err(|error| FileError::Write { path: path.clone(), source: std::io::Error::other(error) })?;
+        let bytes = mcap::encode(&recording, table.orthogonal.into())?;
         said.push(written(path, &bytes)?);
     }
     if let Some(path) = &args.csv {

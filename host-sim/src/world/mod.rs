@@ -15,8 +15,8 @@ pub mod simulation;
 pub mod tissue;
 pub mod truth;
 
-use firmware::Mode;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
+use firmware::{Inputs, Mode};
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
@@ -29,7 +29,7 @@ use self::tissue::{Attachment, PlantAccount, Reductions, TissuePlant, TissueResp
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
-/// [`World::advance`], then [`World::encoders`] and [`World::target_samples`].
+/// [`World::advance`], then [`World::encoders`] and [`World::target_samples`]; [`World::tick`] is all of them.
 #[derive(Debug)]
 pub struct World<T, N = NeedleTrajectory> {
     /// The tissue.
@@ -76,11 +76,22 @@ impl<'m> World<TissuePlant<'m>> {
     ) -> Result<Self, WorldError> {
         let position =
             paddle_index.map(|index| model.paddle_position(index).ok_or(WorldError::NoPaddle { index })).transpose()?;
-        let depth = simulation.depth;
-        let settings = simulation.loop_settings.settings(depth);
         let choice = simulation.plant.unwrap_or_default();
         let tissue = TissuePlant::sharing(model, attachment(position), choice, reductions)?;
-        let drive = NeedleTrajectory::new(depth, simulation.insertion_s);
+        Ok(Self::simulated(tissue, paddle_index.unwrap_or(0), simulation))
+    }
+
+    /// Which model answered for the tissue, and how well.
+    pub fn plant_account(&mut self) -> PlantAccount {
+        self.tissue.account()
+    }
+}
+
+impl<T: TissueResponse> World<T> {
+    /// A tissue with the needle drive, the actuator and the sensors of a simulation; the paddle's encoder has this index.
+    pub fn simulated(tissue: T, paddle_index: u32, simulation: &Simulation) -> Self {
+        let settings = simulation.loop_settings.settings(simulation.depth);
+        let drive = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
         let sensors = Sensors {
             target: TargetSensor::new(
                 settings.target_period_ns,
@@ -88,14 +99,9 @@ impl<'m> World<TissuePlant<'m>> {
                 settings.target_noise,
                 simulation.seed,
             ),
-            encoders: Encoders::new(paddle_index.unwrap_or(0)),
+            encoders: Encoders::new(paddle_index),
         };
-        Ok(Self::of(tissue, drive, PaddleActuator::new(simulation.actuator), sensors))
-    }
-
-    /// Which model answered for the tissue, and how well.
-    pub fn plant_account(&mut self) -> PlantAccount {
-        self.tissue.account()
+        Self::of(tissue, drive, PaddleActuator::new(simulation.actuator), sensors)
     }
 }
 
@@ -120,6 +126,25 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
     /// Time since the needle started, s; −1 before.
     pub fn since_start_s(&self, time_ns: u64) -> f64 {
         self.needle_started_ns.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9)
+    }
+
+    /// One tick of a loop without a transport: time goes on by a period under `command`, and every sensor is read at
+    /// once. Returns what is true then, and what the controller is given.
+    ///
+    /// # Errors
+    /// [`WorldError::Tissue`].
+    pub fn tick(
+        &mut self,
+        tick: u64,
+        command: Option<&PaddleCommand>,
+        period_ns: u64,
+    ) -> Result<(Truth, Inputs), WorldError> {
+        let time_ns = tick * period_ns;
+        self.act(command, time_ns, period_ns);
+        let truth = self.advance(tick, time_ns)?;
+        let (needle, paddle) = self.encoders(time_ns);
+        let target = self.target_samples(&truth).last();
+        Ok((truth, Inputs { tick, time_ns, needle: Some(needle), target, paddle: Some(paddle) }))
     }
 
     /// Time goes on under `command`, if there is one. The first RUN starts the needle.

@@ -27,9 +27,9 @@ impl SceneArgs {
     }
 }
 
-/// Flags that override `[discretization]`, and how to run.
+/// Flags that override `[discretization]`.
 #[derive(Debug, Args)]
-pub(super) struct Common {
+pub(super) struct DiscretizationArgs {
     /// Node spacing, length units.
     #[arg(long, value_name = "H", conflicts_with = "tolerance")]
     spacing: Option<f64>,
@@ -48,6 +48,33 @@ pub(super) struct Common {
     /// How essential boundary conditions are imposed.
     #[arg(long)]
     essential: Option<Essential>,
+}
+
+/// The same for studies that vary the rest themselves.
+#[derive(Debug, Args)]
+pub(super) struct VariedArgs {
+    /// Node spacing to vary around, length units.
+    #[arg(long, value_name = "H")]
+    spacing: Option<f64>,
+    /// How essential boundary conditions are imposed.
+    #[arg(long)]
+    essential: Option<Essential>,
+}
+
+impl VariedArgs {
+    /// The scene with the flags in it, checked.
+    pub(super) fn over(&self, mut scene: Scene) -> Result<Scene, CliError> {
+        let spec = &mut scene.discretization;
+        spec.resolution = self.spacing.map_or(spec.resolution, Resolution::Spacing);
+        spec.essential = self.essential.unwrap_or(spec.essential);
+        limits::check(&scene.discretization, &scene.outline)?;
+        Ok(scene)
+    }
+}
+
+/// How to run.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
     /// Threads to use (default: all).
     #[arg(long)]
     threads: Option<usize>,
@@ -56,7 +83,7 @@ pub(super) struct Common {
     pub(super) quiet: bool,
 }
 
-impl Common {
+impl DiscretizationArgs {
     /// The scene with the flags in it, checked.
     pub(super) fn over(&self, mut scene: Scene) -> Result<Scene, CliError> {
         let spec = &mut scene.discretization;
@@ -77,7 +104,9 @@ impl Common {
         limits::check(&scene.discretization, &scene.outline)?;
         Ok(scene)
     }
+}
 
+impl RunArgs {
     pub(super) fn threads(&self) -> usize {
         parallel::threads(self.threads)
     }
@@ -85,9 +114,4 @@ impl Common {
     pub(super) fn progress(&self, steps: u64) -> ProgressBar {
         if self.quiet { ProgressBar::hidden() } else { terminal::progress(steps) }
     }
-}
-
-pub(super) fn no_such_paddle(scene: &Scene, index: u32) -> CliError {
-    let known: Vec<String> = scene.paddles.iter().map(|p| p.index.to_string()).collect();
-    CliError::usage(format!("the scene has no paddle {index}"), format!("choose one of {}", known.join(", ")))
 }

@@ -1,7 +1,6 @@
 //! Why a command failed, and what scripts are told.
 
 use super::json;
-use model_offline::discretization::DiscretizationError;
 use model_offline::model::ModelError;
 use model_offline::output::{OutputError, OutputRefused};
 use model_offline::scene::{LimitError, Scene, SceneError};
@@ -83,19 +82,18 @@ impl CliError {
         match self {
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
             Self::Model(error) if error.is_usage() => 2,
-            Self::Table(TableBuildError::NoSuchPaddle(_) | TableBuildError::Knots(_)) => 2,
+            Self::Table(TableBuildError::Knots(_)) => 2,
             _ => 1,
         }
     }
 
     fn reason(&self) -> String {
         match self {
-            Self::Solve { failure, .. } | Self::Model(ModelError::Solve(failure)) => failure.reason.to_string(),
-            Self::Model(ModelError::Uncontrollable { .. } | ModelError::NoPaddleControls) => "singular-jacobian".into(),
-            Self::Model(ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_))) => {
-                "singular-moment-matrix".into()
-            }
-            _ => "failed".into(),
+            Self::Solve { failure, .. } => failure.reason.to_string(),
+            Self::Model(error) => error.kind().to_string(),
+            Self::Table(_) => "no-table".into(),
+            Self::Output(_) => "not-written".into(),
+            Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => "bad-input".into(),
         }
     }
 

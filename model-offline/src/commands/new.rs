@@ -54,8 +54,8 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
     let stem = |path: &PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let source = args.output.as_ref().or(args.svg.as_ref()).or(args.msh.as_ref());
     let name = args.name.clone().or_else(|| source.and_then(stem)).unwrap_or_else(|| "my-scene".to_owned());
-    let labels = StarterNames { name, length: args.length.clone(), stress: args.stress.clone() };
-    let text = starter(&labels, imported.as_ref());
+    let names = StarterNames { name, length: args.length.clone(), stress: args.stress.clone() };
+    let text = starter(&names, imported.as_ref());
     // A suggestion that validation refuses would only be found out by the next command.
     Scene::parse(&text, "<new scene>")?;
     match &args.output {

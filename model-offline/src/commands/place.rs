@@ -1,6 +1,6 @@
 //! `model-offline place`: the whole placement study.
 
-use super::common::{Common, SceneArgs};
+use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
 use super::place_text;
@@ -26,11 +26,13 @@ pub(super) struct PlaceArgs {
     #[arg(long, value_name = "FILE")]
     table: Option<PathBuf>,
     #[command(flatten)]
-    common: Common,
+    discretization: DiscretizationArgs,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
-    let scene = args.common.over(args.scene.read()?)?;
+    let scene = args.discretization.over(args.scene.read()?)?;
     check_outputs(&[&args.scene.scene], &[("--json", args.json.as_deref()), ("--table", args.table.as_deref())])?;
     place(&scene, args).map_err(|error| error.reported(args.json.as_deref(), &scene))?.finish(args)
 }
@@ -50,17 +52,17 @@ impl Placed {
 }
 
 fn place(scene: &Scene, args: &PlaceArgs) -> Result<Placed, CliError> {
-    let bar = args.common.progress(study::steps(scene));
+    let bar = args.run.progress(study::steps(scene));
     let progress = || bar.inc(1);
-    let threads = args.common.threads();
+    let threads = args.run.threads();
     let options = PlacementOptions { threads, progress: &progress, ..Default::default() };
     let study = PlacementStudy::run(scene, &options)?;
-    let wanted = !args.common.quiet || args.json.is_some();
+    let wanted = !args.run.quiet || args.json.is_some();
     let accuracy = wanted.then(|| study.accuracy(threads));
     bar.finish_and_clear();
     let table = args.table.as_ref().map(|_| table_of(&study));
     write_json(args.json.as_deref(), &document(&study, accuracy.as_ref(), table.as_ref()))?;
-    if !args.common.quiet {
+    if !args.run.quiet {
         print!("{}", place_text::summary(&study, accuracy.as_ref()));
     }
     Ok(Placed { table })

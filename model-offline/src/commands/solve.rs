@@ -1,6 +1,6 @@
 //! `model-offline solve`: one equilibrium.
 
-use super::common::{Common, SceneArgs, no_such_paddle};
+use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::model::{Body, ModelError, TissueModel};
@@ -36,11 +36,13 @@ pub(super) struct SolveArgs {
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     #[command(flatten)]
-    common: Common,
+    discretization: DiscretizationArgs,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
-    let scene = args.common.over(args.scene.read()?)?;
+    let scene = args.discretization.over(args.scene.read()?)?;
     let displacement = match args.paddle_displacement.as_deref() {
         None => Vector2::zeros(),
         Some([x, y]) if x.is_finite() && y.is_finite() => Vector2::new(*x, *y),
@@ -61,7 +63,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
 
 fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<(), CliError> {
     let (model, _) = discretise(scene)?;
-    let position = model.paddle_position(args.paddle).ok_or_else(|| no_such_paddle(scene, args.paddle))?;
+    let position = scene.paddle_position(args.paddle).map_err(ModelError::from)?;
     let mut body = model.body(Some(position), NewtonSettings::default()).map_err(ModelError::from)?;
     // In pieces of the scene's increment: the path matters near the limits of stability.
     let pieces = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0);
@@ -72,7 +74,7 @@ fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<
         }
     }
     write(&model, &mut body, displacement, args)?;
-    if !args.common.quiet {
+    if !args.run.quiet {
         let target = body.target_displacement();
         println!(
             "{} · {} tissue · paddle {} at ({}, {}) · depth {}\ntarget displacement ({:.8}, {:.8}), orthogonal {:.8}",

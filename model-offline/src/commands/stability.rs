@@ -1,8 +1,9 @@
 //! `model-offline stability`: where each method stops working.
 
-use super::common::{Common, no_such_paddle};
+use super::common::{RunArgs, VariedArgs};
 use super::error::CliError;
-use model_offline::discretization::Resolution;
+use model_offline::discretization::{Basis, Resolution};
+use model_offline::model::ModelError;
 use model_offline::output;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
@@ -24,12 +25,24 @@ pub(super) struct StabilityArgs {
     /// Index of the paddle attached, static (default: the best dynamic paddle).
     #[arg(long, value_name = "K")]
     paddle: Option<u32>,
+    /// Kernel support over local spacing, where it is not what is varied.
+    #[arg(long)]
+    support: Option<f64>,
+    /// Basis of the shape functions.
+    #[arg(long)]
+    basis: Option<Basis>,
     #[command(flatten)]
-    common: Common,
+    varied: VariedArgs,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
-    let scene = &args.common.over(Scene::read(&args.scene)?)?;
+    let mut scene = Scene::read(&args.scene)?;
+    let method = &mut scene.discretization.method;
+    method.support = args.support.unwrap_or(method.support);
+    method.basis = args.basis.unwrap_or(method.basis);
+    let scene = &args.varied.over(scene)?;
     let Resolution::Spacing(_) = scene.discretization.resolution else {
         return Err(CliError::usage(
             "the study varies a spacing, and this scene has a tolerance",
@@ -37,19 +50,18 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
         ));
     };
     let paddle = match args.paddle {
-        Some(index) if scene.paddles.iter().any(|p| p.index == index) => index,
-        Some(index) => return Err(no_such_paddle(scene, index)),
+        Some(index) => scene.paddle_position(index).map(|_| index).map_err(ModelError::from)?,
         None => model_with_paddle(&scene.without_inclusions(), None)?.1,
     };
     output::make_folder(&args.out)?;
     let plan = stability::Plan::new(scene, Extent::of_flag(args.quick));
-    let bar = args.common.progress(plan.runs() as u64);
-    let result = plan.run(scene, paddle, args.common.threads(), &|| bar.inc(1))?;
+    let bar = args.run.progress(plan.runs() as u64);
+    let result = plan.run(scene, paddle, args.run.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     output::write_whole(&args.out.join("stability.csv"), &stability::csv(&result))?;
     output::write_whole(&args.out.join("zero_energy.csv"), &stability::zero_energy_csv(&result))?;
     output::write_whole(&args.out.join("stability.svg"), stability::figure(&result).svg().as_bytes())?;
-    if !args.common.quiet {
+    if !args.run.quiet {
         print!("{}", stability::summary(&result));
     }
     Ok(())

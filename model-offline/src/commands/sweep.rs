@@ -1,6 +1,6 @@
 //! `model-offline sweep`: what the mesh does to the choice of a paddle.
 
-use super::common::{Common, SceneArgs};
+use super::common::{RunArgs, SceneArgs, VariedArgs};
 use super::error::CliError;
 use model_offline::output;
 use model_offline::study::sweep;
@@ -15,19 +15,21 @@ pub(super) struct SweepArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]
-    common: Common,
+    varied: VariedArgs,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &SweepArgs) -> Result<(), CliError> {
-    let scene = args.common.over(args.scene.read()?)?;
+    let scene = args.varied.over(args.scene.read()?)?;
     output::make_folder(&args.out)?;
-    let bar = args.common.progress(sweep::STEPS);
-    let found = sweep::sweep(&scene, args.common.threads(), &|| bar.inc(1))?;
+    let bar = args.run.progress(sweep::STEPS);
+    let found = sweep::sweep(&scene, args.run.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
     let (csv, svg) = (args.out.join("sweep.csv"), args.out.join("sweep.svg"));
     output::write_whole(&csv, &found.csv())?;
     output::write_whole(&svg, found.svg().as_bytes())?;
-    if !args.common.quiet {
+    if !args.run.quiet {
         println!("{}\n{}\n{}", found.table(), csv.display(), svg.display());
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! `model-offline table`: the controller table of one paddle.
 
-use super::common::{Common, SceneArgs};
+use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use model_offline::output::check_outputs;
 use model_offline::output::{self, table_text};
@@ -23,18 +23,20 @@ pub(super) struct TableArgs {
     #[arg(long, default_value_t = TableOptions::default().knots)]
     knots: usize,
     #[command(flatten)]
-    common: Common,
+    discretization: DiscretizationArgs,
+    #[command(flatten)]
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
-    let scene = args.common.over(args.scene.read()?)?;
+    let scene = args.discretization.over(args.scene.read()?)?;
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
     let (model, paddle) = model_with_paddle(&scene, args.paddle)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
     let table = table::build(&model, paddle, &options)?;
     let bytes = table::to_bytes(&table)?;
     output::write_whole(&args.output, &bytes)?;
-    if !args.common.quiet {
+    if !args.run.quiet {
         println!("{}: {} bytes\n{}", args.output.display(), bytes.len(), table_text::summary(&table));
     }
     Ok(())

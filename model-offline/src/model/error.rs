@@ -2,7 +2,8 @@
 
 use crate::discretization::{DiscretizationError, ShapeError};
 use crate::material::MaterialError;
-use crate::solver::equilibrium::Failure;
+use crate::scene::NoSuchPaddle;
+use crate::solver::equilibrium::{Failure, FailureReason};
 
 /// Why a scene cannot be modelled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -57,8 +58,8 @@ pub enum ModelError {
     #[error("the study varies a spacing: give one instead of a tolerance")]
     NoSpacing,
     /// No such paddle in the scene.
-    #[error("the scene has no paddle {0}")]
-    NoSuchPaddle(u32),
+    #[error(transparent)]
+    NoSuchPaddle(#[from] NoSuchPaddle),
     /// Nitsche's method for a needle that does not touch the boundary.
     #[error(
         "Nitsche's method holds boundary, and this needle contact is inside the body: use essential = \"transformation\""
@@ -74,7 +75,46 @@ pub enum ModelError {
     Material(#[from] MaterialError),
 }
 
+/// What kind of thing went wrong, by the name that results have for it.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum ModelFailure {
+    /// No equilibrium, or none that is stable.
+    #[error("{0}")]
+    Solve(FailureReason),
+    /// Shape functions do not exist at a node.
+    #[error("singular-moment-matrix")]
+    SingularMomentMatrix,
+    /// The nodes cannot be triangulated.
+    #[error("no-triangulation")]
+    NoTriangulation,
+    /// A constrained feature has no node.
+    #[error("nothing-constrained")]
+    NothingConstrained,
+    /// The paddle does not control the target, or none does.
+    #[error("singular-jacobian")]
+    SingularJacobian,
+    /// The tolerance was not reached, or not with as many nodes as are tried.
+    #[error("tolerance-not-reached")]
+    ToleranceNotReached,
+    /// What was asked for does not go together.
+    #[error("unsupported")]
+    Unsupported,
+}
+
 impl ModelError {
+    /// What kind of thing went wrong.
+    pub fn kind(&self) -> ModelFailure {
+        match self {
+            Self::Shape(_) | Self::Discretization(DiscretizationError::Shape(_)) => ModelFailure::SingularMomentMatrix,
+            Self::Discretization(DiscretizationError::Triangulation(_)) => ModelFailure::NoTriangulation,
+            Self::Solve(failure) => ModelFailure::Solve(failure.reason),
+            Self::NothingConstrained(_) => ModelFailure::NothingConstrained,
+            Self::Uncontrollable { .. } | Self::NoPaddleControls => ModelFailure::SingularJacobian,
+            Self::TooManyNodes { .. } | Self::ToleranceNotReached { .. } => ModelFailure::ToleranceNotReached,
+            _ => ModelFailure::Unsupported,
+        }
+    }
+
     /// Whether it is the question that was wrong, and not a computation that failed.
     pub fn is_usage(&self) -> bool {
         matches!(

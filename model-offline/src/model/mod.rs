@@ -4,7 +4,7 @@ mod error;
 mod graded;
 mod tissue;
 
-pub use error::{BoundaryPart, ModelError};
+pub use error::{BoundaryPart, ModelError, ModelFailure};
 pub use graded::graded_model;
 
 use self::tissue::{Mixing, tissue_of};

@@ -15,9 +15,9 @@ pub fn read(bytes: &[u8]) -> Result<Table<f64, 2>, TableError> {
     }
 }
 
-/// SHA-256 in hexadecimal.
-pub fn hex(hash: &[u8]) -> String {
-    hash.iter().fold(String::new(), |mut s, b| {
+/// Bytes in hexadecimal, two digits each.
+pub fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut s, b| {
         let _ = write!(s, "{b:02x}");
         s
     })

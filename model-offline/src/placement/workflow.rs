@@ -59,8 +59,8 @@ const REFERENCE_OPEN: f64 = 0.01;
 /// [`ModelError::NoSuchPaddle`], and [`ModelError`] when the scene cannot be modelled, its tolerance not be reached, or no paddle
 /// controls the target.
 pub fn model_with_paddle(scene: &Scene, asked: Option<u32>) -> Result<(TissueModel, u32), ModelError> {
-    if let Some(index) = asked.filter(|index| scene.paddles.iter().all(|paddle| paddle.index != *index)) {
-        return Err(ModelError::NoSuchPaddle(index));
+    if let Some(index) = asked {
+        scene.paddle_position(index)?;
     }
     let model = discretise_judged(scene)?.model;
     let paddle = asked.map_or_else(|| best_dynamic(&model), Ok)?;

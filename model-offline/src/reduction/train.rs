@@ -296,8 +296,8 @@ mod tests {
 
     /// A block with nodes gathered at the ends of its paddles.
     fn block() -> TissueModel {
-        let labels = StarterNames { name: "block".into(), length: "mm".into(), stress: "kPa".into() };
-        let scene = Scene::parse(&starter(&labels, None), "block").unwrap();
+        let names = StarterNames { name: "block".into(), length: "mm".into(), stress: "kPa".into() };
+        let scene = Scene::parse(&starter(&names, None), "block").unwrap();
         crate::placement::adaptive::discretise(&scene).unwrap().0
     }
 

@@ -50,3 +50,13 @@ impl Source<'_> {
         }
     }
 }
+
+/// An index that none of the scene's paddles has.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("the scene has no paddle {index}: choose one of {known}")]
+pub struct NoSuchPaddle {
+    /// The index.
+    pub index: u32,
+    /// Those that there are.
+    pub known: String,
+}

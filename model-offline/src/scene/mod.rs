@@ -8,7 +8,7 @@ pub mod starter;
 mod tissue;
 mod validate;
 
-pub use error::SceneError;
+pub use error::{NoSuchPaddle, SceneError};
 pub use limits::LimitError;
 pub use schema::{FitSection, PlantModel, TableScalar};
 pub use tissue::TissueVariant;
@@ -210,6 +210,18 @@ impl Scene {
     /// The regions of the inclusions.
     pub fn inclusion_outlines(&self) -> Vec<Polygon> {
         self.inclusions.iter().map(|i| i.outline.clone()).collect()
+    }
+
+    /// Where a paddle stands in the scene's list, by its index.
+    ///
+    /// # Errors
+    /// [`NoSuchPaddle`] names those that there are.
+    pub fn paddle_position(&self, index: u32) -> Result<usize, NoSuchPaddle> {
+        let known = || self.paddles.iter().map(|paddle| paddle.index.to_string()).collect::<Vec<_>>().join(", ");
+        self.paddles
+            .iter()
+            .position(|paddle| paddle.index == index)
+            .ok_or_else(|| NoSuchPaddle { index, known: known() })
     }
 
     /// Its tissue: whether it has inclusions.

@@ -22,7 +22,7 @@ const PADDLES: usize = 5;
 ///
 /// What holds the body, where the needle goes in and where paddles may sit is a suggestion: the lowest edge is immobile,
 /// the needle enters at the highest edge, paddles sit on the longest of the others, the target is the innermost point.
-pub fn starter(labels: &StarterNames, imported: Option<&Imported>) -> String {
+pub fn starter(names: &StarterNames, imported: Option<&Imported>) -> String {
     let block = || {
         let rectangle =
             |a: [f64; 2], b: [f64; 2]| Polygon::new([a, [b[0], a[1]], b, [a[0], b[1]]].map(Point2::from).to_vec()).ok();
@@ -32,7 +32,7 @@ pub fn starter(labels: &StarterNames, imported: Option<&Imported>) -> String {
     let Some(imported) = imported.cloned().or_else(block) else {
         return String::new();
     };
-    Layout::suggest(&imported.outline).text(labels, &imported)
+    Layout::suggest(&imported.outline).text(names, &imported)
 }
 
 /// Where things go on an outline.
@@ -98,8 +98,8 @@ impl Layout {
         }
     }
 
-    fn text(&self, labels: &StarterNames, imported: &Imported) -> String {
-        let StarterNames { name, length, stress } = labels;
+    fn text(&self, names: &StarterNames, imported: &Imported) -> String {
+        let StarterNames { name, length, stress } = names;
         let mut out = String::new();
         let _ = write!(
             out,
@@ -218,13 +218,13 @@ mod tests {
     use crate::scene::Scene;
     use crate::scene::import::{assemble, svg};
 
-    fn labels() -> StarterNames {
+    fn names() -> StarterNames {
         StarterNames { name: "mine".into(), length: "mm".into(), stress: "kPa".into() }
     }
 
     #[test]
     fn the_starter_is_a_valid_scene() {
-        let scene = Scene::parse(&starter(&labels(), None), "starter").unwrap();
+        let scene = Scene::parse(&starter(&names(), None), "starter").unwrap();
         assert_eq!((scene.paddles.len(), scene.inclusions.len(), scene.length_unit.as_str()), (4, 1, "mm"));
     }
 
@@ -238,7 +238,7 @@ mod tests {
                     Point2::new(width * angle.cos(), height * angle.sin())
                 });
                 let imported = assemble(vec![points.collect()], None).unwrap();
-                let text = starter(&labels(), Some(&imported));
+                let text = starter(&names(), Some(&imported));
                 let scene = Scene::parse(&text, "starter").unwrap_or_else(|e| panic!("{corners} {width}: {e}\n{text}"));
                 assert!(scene.needle.depth > 0.0);
             }
@@ -249,7 +249,7 @@ mod tests {
     fn a_drawing_becomes_a_valid_scene() {
         let drawing = r#"<svg><path d="M 0 0 C 40 -60 160 -60 200 0 Z"/><circle r="3"/></svg>"#;
         let imported = svg::read(drawing, Some(120.0)).unwrap();
-        let scene = Scene::parse(&starter(&labels(), Some(&imported)), "drawing").unwrap();
+        let scene = Scene::parse(&starter(&names(), Some(&imported)), "drawing").unwrap();
         assert!((scene.outline.bounds().1.x - 120.0).abs() < 0.1);
     }
 }

@@ -160,7 +160,7 @@ pub(super) fn step_points(scene: &Scene, extent: Extent, reference: &Profile) ->
     for candidate in candidates {
         let model = build(scene, candidate)?;
         let index = best_dynamic(&model)?;
-        let paddle = model.paddle_position(index).ok_or(ModelError::NoSuchPaddle(index))?;
+        let paddle = model.scene().paddle_position(index)?;
         let reference = vec![reference[paddle].clone()];
         let ticks = extent.choose(TICKS, 200);
         let mut body = model.body(Some(paddle), NewtonSettings::SMALL_STEPS)?;

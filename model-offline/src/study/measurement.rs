@@ -1,4 +1,4 @@
-//! One setting of a method, measured: time and errors of a job.
+//! One discretization, measured: time and errors of a job.
 
 use crate::discretization::{Discretization, Resolution};
 use crate::model::ModelError;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::convert::Infallible;
 use strum::{Display, VariantArray};
 
-/// One setting, measured.
+/// One discretization or plant, measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
     /// Which job.
@@ -36,7 +36,7 @@ pub struct Measurement {
     pub on_front: bool,
 }
 
-/// Why a setting has no time or no error.
+/// Why there is no time or no error.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeasurementFailure {
     /// It cannot be built, or solved at rest.

@@ -29,7 +29,7 @@ const LONGEST_QUICK_S: f64 = 0.2;
 /// A whole comparison.
 #[derive(Debug, Clone)]
 pub struct Pareto {
-    /// Every setting tried.
+    /// Everything that was tried.
     pub points: Vec<Measurement>,
     /// How good the references are: worst relative distance of their two finest levels, for `placement` and for the
     /// finite depths of the other two jobs.

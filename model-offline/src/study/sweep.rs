@@ -14,7 +14,9 @@ use std::fmt::Write as _;
 /// Uniform spacings over the scene's own.
 const SPACINGS: [f64; 5] = [1.0, 0.7, 0.5, 0.25, 0.125];
 /// Levels of graded nodes.
-const LEVELS: std::ops::RangeInclusive<i32> = -2..=3;
+const LEVELS: std::ops::Range<i32> = -2..4;
+/// Rules on uniform nodes.
+const UNIFORM: [Integration; 3] = [Integration::Dni, Integration::Scni, Integration::FemT3];
 /// Distance of the reference's two levels.
 const REFERENCE_SHARE: f64 = 2e-3;
 
@@ -46,7 +48,7 @@ pub struct Sweep {
 pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Result<Sweep, ModelError> {
     let base = base_spacing(scene);
     let candidate = |rule, nodes| scene.discretization.with(nodes, Method::new(rule));
-    let candidates: Vec<Discretization> = [Integration::Dni, Integration::Scni, Integration::FemT3]
+    let candidates: Vec<Discretization> = UNIFORM
         .into_iter()
         .flat_map(|rule| SPACINGS.map(|share| candidate(rule, Resolution::Spacing(base * share))))
         .chain(LEVELS.map(|level| candidate(Integration::FemT6, Resolution::Level(level))))
@@ -64,7 +66,7 @@ pub fn sweep(scene: &Scene, threads: usize, progress: &(dyn Fn() + Sync)) -> Res
 }
 
 /// Number of times [`sweep`] calls its progress function.
-pub const STEPS: u64 = 3 * SPACINGS.len() as u64 + 6;
+pub const STEPS: u64 = (UNIFORM.len() * SPACINGS.len()) as u64 + (LEVELS.end - LEVELS.start) as u64;
 
 /// A mesh, or the limit, with what its model answers.
 struct Row<'s> {

@@ -45,13 +45,10 @@ impl Default for TableOptions {
 /// Why a table could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TableBuildError {
-    /// No such paddle in the scene.
-    #[error("the scene has no paddle {0}")]
-    NoSuchPaddle(u32),
     /// The number of knots is out of range.
     #[error("a table has 2 to {MAX_KNOTS} knots, not {0}")]
     Knots(usize),
-    /// The model failed before the second knot.
+    /// The scene has no such paddle, or the model failed before the second knot.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// The paddle would have to go farther than its actuator can.
@@ -96,7 +93,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
         return Err(TableBuildError::Knots(options.knots));
     }
     let scene = model.scene();
-    let position = model.paddle_position(paddle_index).ok_or(TableBuildError::NoSuchPaddle(paddle_index))?;
+    let position = scene.paddle_position(paddle_index).map_err(ModelError::from)?;
     let settings = NewtonSettings::default();
     let mut still = model.body(Some(position), settings).map_err(ModelError::from)?;
     let mut steered = model.body(Some(position), settings).map_err(ModelError::from)?;

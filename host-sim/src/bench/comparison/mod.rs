@@ -202,7 +202,7 @@ impl<'p> Comparison<'p> {
         Ok(Compared { result: self.result(results), artifacts })
     }
 
-    /// The last case's scene, and the table with its tissue, for who wants to go on.
+    /// The last case's scene, and the table with its tissue, to go on from.
     pub fn last_case(&self) -> Option<(&Scene, TissueVariant, &EncodedTable)> {
         let (case, table) = self.cases.iter().zip(&self.tables).next_back()?;
         Some((self.studied(case.tissue).study.model.scene(), case.table_tissue, table))
@@ -256,8 +256,9 @@ impl<'p> Comparison<'p> {
                 };
                 // Refused settings are bad input: found before anything runs.
                 Controller::new(&table, &loop_settings.settings(table.validity.depth_end))?;
-                let bytes = encode_in(self.options.scalar, &table, bytes);
-                let bytes = bytes.map_err(|source| SimError::Table { path: "as another scalar".into(), source })?;
+                let scalar = self.options.scalar;
+                let bytes = encode_in(scalar, &table, bytes);
+                let bytes = bytes.map_err(|source| SimError::TableScalar { scalar, source })?;
                 Ok(EncodedTable { table, bytes })
             })
             .collect()

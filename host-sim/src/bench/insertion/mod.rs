@@ -267,9 +267,7 @@ impl<'a> SimulatedInsertion<'a> {
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         if extras.mcap {
             let name = label.file("mcap");
-            let bytes = mcap::encode(recording, controller.table.orthogonal.into()).map_err(|error| {
-                FileError::Write { path: name.clone().into(), source: std::io::Error::other(error) }
-            })?;
+            let bytes = mcap::encode(recording, controller.table.orthogonal.into())?;
             artifacts.push(Artifact { name, bytes });
         }
         if extras.vtu {

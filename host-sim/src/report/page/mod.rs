@@ -47,15 +47,15 @@ const PARTS: [(&str, &str); 7] = [
 
 /// The result in one sentence.
 fn sentence(run: &RunResult) -> String {
-    let best = |placement: &PlacementResult| (placement.best_static, placement.best_dynamic);
+    let paddles = |placement: &PlacementResult| Some((placement.best_static, placement.best_dynamic?));
     let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, p.tissue)).collect();
-    let all_agree = paper.iter().zip(&run.placements).all(|(paper, placement)| *paper == Some(best(placement)));
+    let all_agree = paper.iter().zip(&run.placements).all(|(paper, placement)| *paper == paddles(placement));
     let placements: Vec<String> = run
         .placements
         .iter()
         .zip(&paper)
         .map(|(placement, paper)| {
-            let (static_paddle, dynamic) = best(placement);
+            let (static_paddle, dynamic) = (placement.best_static, placement.dynamic_name());
             let found = match paper {
                 Some((static_paddle, dynamic)) if !all_agree => format!(" (the paper: {static_paddle} and {dynamic})"),
                 _ => String::new(),
@@ -263,7 +263,7 @@ fn figure(title: String, panels: Vec<Panel>, columns: usize) -> String {
 }
 
 /// The best paddle of every tissue.
-fn best(run: &RunResult, of: fn(&PlacementResult) -> u32) -> String {
+fn best(run: &RunResult, of: fn(&PlacementResult) -> String) -> String {
     let names = run.placements.iter().map(|placement| format!("{} {}", placement.tissue, of(placement)));
     names.collect::<Vec<_>>().join(", ")
 }
@@ -293,8 +293,8 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
         || "Error along the insertion".to_owned(),
         |range| format!("The dynamic paddle's largest error is {range} times smaller than the static one's"),
     );
-    let static_title = format!("Best static paddle: {}", best(run, |placement| placement.best_static));
-    let dynamic_title = format!("Best dynamic paddle: {}", best(run, |placement| placement.best_dynamic));
+    let static_title = format!("Best static paddle: {}", best(run, |placement| placement.best_static.to_string()));
+    let dynamic_title = format!("Best dynamic paddle: {}", best(run, PlacementResult::dynamic_name));
     let mut pictures = vec![
         ("scene.svg", scene_picture(run, &scene)),
         ("static-error.svg", figure(static_title, placement::static_charts(run), 2)),

@@ -9,8 +9,8 @@ use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
 use crate::report::paper::{is_paper, paper_controllability, paper_optima};
 
 /// Paddles as places of an axis, one of them with words below its number.
-fn places(placement: &PlacementResult, best: u32, words: &str) -> Axis {
-    let name = |index: u32| if index == best { format!("{index}\n{words}") } else { index.to_string() };
+fn places(placement: &PlacementResult, best: Option<u32>, words: &str) -> Axis {
+    let name = |index: u32| if Some(index) == best { format!("{index}\n{words}") } else { index.to_string() };
     Axis::categories("paddle position", placement.paddles.iter().map(|paddle| name(paddle.index)).collect())
 }
 
@@ -51,7 +51,7 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
                     "Tissue {}: paddle {} moves the target least{figure}",
                     placement.tissue, placement.best_static
                 ),
-                places(placement, placement.best_static, "best static"),
+                places(placement, Some(placement.best_static), "best static"),
                 Axis::linear("orthogonal displacement", &run.units[0]).enclosing(values.iter().copied()),
             );
             panel.description = format!("Static error against paddle position, tissue {}", placement.tissue);
@@ -94,8 +94,12 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
     run.placements
         .iter()
         .map(|placement| {
+            let title = match placement.best_dynamic {
+                Some(index) => format!("Tissue {}: paddle {index} needs the least travel", placement.tissue),
+                None => format!("Tissue {}: no paddle controls the target", placement.tissue),
+            };
             let mut panel = Panel::new(
-                &format!("Tissue {}: paddle {} needs the least travel", placement.tissue, placement.best_dynamic),
+                &title,
                 places(placement, placement.best_dynamic, "best dynamic"),
                 Axis::linear("controllability measure ‖J⁻¹n‖ (less is better)", "1").enclosing(values.iter().copied()),
             );
@@ -112,10 +116,6 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
             panel
         })
         .collect()
-}
-
-fn mark(best: bool) -> Option<&'static str> {
-    best.then_some("best")
 }
 
 fn deviation(value: f64, reference: Option<f64>) -> String {
@@ -147,7 +147,7 @@ pub(super) fn static_table(run: &RunResult) -> Markup {
                 th { (in_unit("depth reached", unit)) } th.left { "remark" }
             } }
             tbody { @for placement in &run.placements { @for paddle in &placement.paddles {
-                tr class=[mark(paddle.index == placement.best_static)] {
+                tr class=[(paddle.index == placement.best_static).then_some("best")] {
                     td { (placement.tissue) } td { (paddle.index) }
                     td { (number(at_the_end(paddle), 4)) } td { (number(paddle.max_orthogonal, 4)) }
                     td { (plain(paddle.reached_depth)) }
@@ -176,7 +176,7 @@ pub(super) fn controllability_table(run: &RunResult) -> Markup {
             } }
             tbody { @for placement in &run.placements { @for paddle in &placement.paddles {
                 @let reported = paper_controllability(&run.scene, placement.tissue, paddle.index);
-                tr class=[mark(paddle.index == placement.best_dynamic)] {
+                tr class=[(Some(paddle.index) == placement.best_dynamic).then_some("best")] {
                     td { (placement.tissue) } td { (paddle.index) }
                     td { (paddle.controllability_measure.map_or_else(|| "cannot control".to_owned(), |value| number(value, 5))) }
                     td { (reported.map_or_else(|| NO_NUMBER.to_owned(), |value| number(value, 5))) }

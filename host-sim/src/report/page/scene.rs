@@ -82,7 +82,7 @@ pub(super) fn at_rest(run: &RunResult) -> Drawing {
     geometry.immobile.iter().for_each(|part| hatch(&mut drawing, &view, geometry, part));
     drawing.polyline("contact", &view.path(&geometry.needle_contact));
     needle(&mut drawing, &view, geometry, 0.0);
-    let dynamic: BTreeSet<u32> = run.placements.iter().map(|placement| placement.best_dynamic).collect();
+    let dynamic: BTreeSet<u32> = run.placements.iter().filter_map(|placement| placement.best_dynamic).collect();
     for paddle in &geometry.paddles {
         let best = dynamic.contains(&paddle.index);
         let (class, number) =

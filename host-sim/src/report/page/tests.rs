@@ -103,7 +103,7 @@ fn run(scene: &str) -> RunResult {
         integration: Integration::default(),
         wall_s: 0.1,
         best_static: 1,
-        best_dynamic: 1,
+        best_dynamic: Some(1),
         paddles: vec![paddle_placement(1), paddle_placement(2)],
         no_paddle: None,
     };

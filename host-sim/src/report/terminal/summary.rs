@@ -26,7 +26,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
         let paper = match paper_optima(&run.scene, placement.tissue) {
             None => String::new(),
             Some((static_paddle, dynamic)) => {
-                let agrees = (static_paddle, dynamic) == (placement.best_static, placement.best_dynamic);
+                let agrees = (static_paddle, Some(dynamic)) == (placement.best_static, placement.best_dynamic);
                 let verdict = if agrees { "same" } else { "DIFFERENT" };
                 format!("      paper: {static_paddle} and {dynamic}, {verdict}")
             }
@@ -36,7 +36,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
             "  {:<15} {:>6} {:>9}{paper}",
             placement.tissue.name(),
             placement.best_static,
-            placement.best_dynamic
+            placement.dynamic_name()
         )?;
     }
     writeln!(

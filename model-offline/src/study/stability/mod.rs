@@ -112,7 +112,7 @@ impl Plan {
         let Resolution::Spacing(spacing) = scene.discretization.resolution else {
             return Err(ModelError::NoSpacing);
         };
-        let place = scene.paddles.iter().position(|p| p.index == paddle).ok_or(ModelError::NoSuchPaddle(paddle))?;
+        let place = scene.paddle_position(paddle)?;
         let outcomes = parallel::map(self.experiments.len(), threads, |i| {
             let outcome = probe::run(scene, place, &self.experiments[i]);
             progress();

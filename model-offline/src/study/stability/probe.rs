@@ -1,14 +1,14 @@
 //! One run: the needle goes in until something gives.
 
 use super::plan::Experiment;
+use crate::discretization::Planar;
 use crate::discretization::nodes::lattice::lattice_nodes;
-use crate::discretization::{DiscretizationError, Planar};
 use crate::geometry::{Location, Point2, distance_to_polyline};
 use crate::material::{Law, Material as _, MaterialError};
-use crate::model::{ModelError, TissueModel};
+use crate::model::{ModelError, ModelFailure, TissueModel};
 use crate::random::SplitMix64;
 use crate::scene::Scene;
-use crate::solver::equilibrium::{FailureReason, NewtonSettings};
+use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::{Matrix2, Vector2};
 
 /// How far beyond the scene's depth the needle is driven.
@@ -23,24 +23,12 @@ pub enum StopReason {
     /// It did not: the needle went as far as it was driven.
     #[error("reached")]
     Reached,
-    /// No equilibrium, or none that is stable.
-    #[error("{0}")]
-    Solve(FailureReason),
-    /// Shape functions do not exist at a node.
-    #[error("singular-moment-matrix")]
-    SingularMomentMatrix,
-    /// The nodes cannot be triangulated.
-    #[error("no-triangulation")]
-    NoTriangulation,
-    /// A constrained feature has no node.
-    #[error("nothing-constrained")]
-    NothingConstrained,
+    /// The model cannot be made, or has no equilibrium.
+    #[error(transparent)]
+    Model(ModelFailure),
     /// The law with these numbers is not stable at rest.
     #[error("unstable-law")]
     UnstableLaw,
-    /// The methods do not combine.
-    #[error("unsupported")]
-    Unsupported,
 }
 
 /// What came of a run.
@@ -63,12 +51,12 @@ pub struct ExperimentResult {
     pub energy: f64,
 }
 
-/// Runs a setting with the paddle at this place of the scene's list static.
+/// Runs an experiment with the paddle at this place of the scene's list static.
 pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentResult {
     let stopped = |nodes: usize, error: ModelError| ExperimentResult {
         nodes,
         depth: 0.0,
-        reason: reason_of(&error),
+        reason: StopReason::Model(error.kind()),
         detail: error.to_string(),
         min_stretch: 1.0,
         ellipticity: 1.0,
@@ -99,7 +87,7 @@ pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentR
     for increment in 1..=BEYOND * experiment.increments {
         let depth = scene.needle.depth * f64::from(increment) / f64::from(experiment.increments);
         if let Err(failure) = body.drive(depth, Vector2::zeros()) {
-            (reason, detail) = (StopReason::Solve(failure.reason), failure.detail);
+            (reason, detail) = (StopReason::Model(ModelFailure::Solve(failure.reason)), failure.detail);
             break;
         }
     }
@@ -138,19 +126,7 @@ fn smallest_acoustic(law: &Law, h: &Matrix2<f64>) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-fn reason_of(error: &ModelError) -> StopReason {
-    match error {
-        ModelError::Shape(_) | ModelError::Discretization(DiscretizationError::Shape(_)) => {
-            StopReason::SingularMomentMatrix
-        }
-        ModelError::Discretization(DiscretizationError::Triangulation(_)) => StopReason::NoTriangulation,
-        ModelError::Solve(failure) => StopReason::Solve(failure.reason),
-        ModelError::NothingConstrained(_) => StopReason::NothingConstrained,
-        _ => StopReason::Unsupported,
-    }
-}
-
-/// The scene with the setting's material and inclusions.
+/// The scene with the experiment's material and inclusions.
 pub(super) fn varied(scene: &Scene, experiment: &Experiment) -> Result<Scene, MaterialError> {
     let mut law = scene.material.clone();
     if let Some(poisson) = experiment.poisson {

@@ -112,7 +112,12 @@ proptest! {
         let table = table();
         let controller = Controller::new(&table, &settings()).unwrap();
         let mut state = State::<f64>::new();
-        for (i, (age, arrives)) in ages.into_iter().enumerate() {
+        let mut is_adopted = false;
+        // In the end it rests, and every sample arrives: then it must be adopted.
+        for (i, (age, arrives)) in ages.into_iter().chain([(0, true); 200]).enumerate() {
+            if i >= 400 && state.mode() == Mode::Safe {
+                state.rearm();
+            }
             let tick = 20_000 + i as u64;
             let age = if i == 0 { first_age } else { age };
             // What is 20 s old was measured elsewhere.
@@ -125,9 +130,11 @@ proptest! {
             if command.is_valid() {
                 let off = distance(command.displacement, truth(tick));
                 prop_assert!(off <= RESOLUTION * (1.0 + 1e-9), "tick {}: {} off", tick, off);
+                is_adopted = true;
                 break;
             }
         }
+        prop_assert!(is_adopted, "{:?}", state.faults());
     }
 
     /// A paddle that follows, hangs, slips, or is taken away by somebody for a while.
@@ -138,8 +145,9 @@ proptest! {
         let table = table();
         let mut closed = Loop::new(&table, &settings());
         closed.plant.push = 0.05;
-        let mut away = 0;
-        for (kind, ticks, x, y) in events {
+        let (mut away, mut compared) = (0, 0);
+        // In the end it follows again, so that there is something to compare.
+        for (kind, ticks, x, y) in events.into_iter().chain([(5, 400, 0.0, 0.0)]) {
             for _ in 0..ticks {
                 let mut inputs = closed.plant.sense();
                 if kind == 0 {
@@ -167,6 +175,7 @@ proptest! {
                 let explained = FOLLOWING_FRACTION * RANGE + RATE * (age + 2e-3 + 1e-3);
                 let off = distance(command.displacement, last.displacement);
                 // Further away in no more samples than the following error takes to be certain.
+                compared += 1;
                 away = if off > explained { away + 1 } else { 0 };
                 // A command is compared with the next sample.
                 prop_assert!(away <= 21, "{} off in {} samples", off, away);
@@ -175,5 +184,6 @@ proptest! {
                 }
             }
         }
+        prop_assert!(compared > 0, "{:?}", closed.state.faults());
     }
 }
