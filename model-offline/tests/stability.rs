@@ -1,13 +1,15 @@
 //! The stability study: depths of an independent implementation, typed reasons, and the files as a user gets them.
 
 use assert_cmd::Command;
-use model_offline::discretization::{Integration, Method};
+use model_offline::discretization::{Integration, Method, Resolution};
 use model_offline::model::ModelFailure;
+use model_offline::model::TissueModel;
 use model_offline::scene::Scene;
-use model_offline::solver::equilibrium::FailureReason;
+use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
 use model_offline::study::stability::plan::{Experiment, base};
 use model_offline::study::stability::probe::{ExperimentResult, StopReason, run};
 use model_offline::study::stability::zero_energy;
+use nalgebra::Vector2;
 use std::path::Path;
 
 fn paper() -> Scene {
@@ -162,5 +164,55 @@ fn bad_requests_are_refused_before_anything_is_written() {
             .assert()
             .code(2);
         assert!(!out.exists());
+    }
+}
+
+/// A slender column between clamps: compressed by more than Euler's ε = 4π²/12 (h/L)², it buckles.
+const COLUMN: &str = r#"
+[scene]
+name = "column"
+dimension = 2
+units = { length = "mm", stress = "kPa" }
+[domain]
+outline = [[0.0, 0.0], [5.0, 0.0], [5.0, 50.0], [0.0, 50.0]]
+[material]
+model = "neo-hookean"
+lambda = 0.0
+mu = 5.0
+[immobile]
+paths = [[[0.0, 0.0], [5.0, 0.0]]]
+[needle]
+contact = [[0.0, 50.0], [5.0, 50.0]]
+axis = [0.0, -1.0]
+depth = 5.0
+increments = 10
+[target]
+position = [2.5, 25.0]
+[[paddle]]
+index = 1
+segment = [[0.0, 20.0], [0.0, 30.0]]
+[discretization]
+spacing = 1.25
+integration = "fem-t6"
+"#;
+
+/// A simulator's small steps look for stability as large ones do: beyond the load at which a column buckles there is a
+/// typed failure and no answer, although Newton's method goes on to find the straight column.
+#[test]
+fn small_steps_stop_where_a_column_buckles() {
+    let model = TissueModel::new(&Scene::parse(COLUMN, "column").unwrap()).unwrap();
+    let reached = |settings: NewtonSettings| {
+        let mut body = model.body(None, settings).unwrap();
+        let failure = (1..=400).find_map(|step| body.drive(0.01 * f64::from(step), Vector2::zeros()).err());
+        (body.depth() / 50.0, failure.map(|failure| failure.reason))
+    };
+    let euler = 4.0 * std::f64::consts::PI.powi(2) / 12.0 * 0.1_f64.powi(2);
+    for settings in [NewtonSettings::SMALL_STEPS, NewtonSettings::default()] {
+        let (strain, reason) = reached(settings);
+        assert!((strain / euler - 1.0).abs() < 0.03, "{strain}, Euler {euler}");
+        assert_eq!(reason, Some(FailureReason::LostStability));
+        // The straight column is there all the same, for those who do not ask.
+        let (careless, _) = reached(NewtonSettings { require_stability: false, ..settings });
+        assert!(careless > 1.2 * euler, "{careless}, Euler {euler}");
     }
 }

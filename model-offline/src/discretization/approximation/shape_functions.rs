@@ -354,6 +354,21 @@ mod tests {
         }
     }
 
+    /// At a support of two spacings the nodes two spacings away lie at the very end of the kernel, where rounding of their
+    /// distance must not let some in.
+    #[test]
+    fn stencils_do_not_depend_on_the_unit_of_length() {
+        for spacing in [1.0, 0.1, 0.07, 1e-3, 3.0] {
+            let positions = (0..81).map(|n| Point::<2>::new(f64::from(n % 9), f64::from(n / 9)) * spacing).collect();
+            let cloud = NodeCloud::new(positions, vec![2.0 * spacing; 81]);
+            let shape = ShapeFunctions::new(&cloud, Basis::Linear);
+            for node in [20, 21, 22, 30, 40, 48] {
+                let stencil = shape.at(&cloud.positions()[node], Wanted::VALUES).unwrap();
+                assert_eq!(stencil.nodes.len(), 9, "spacing {spacing}, node {node}: {:?}", stencil.nodes);
+            }
+        }
+    }
+
     #[test]
     fn linear_and_quadratic_fields_are_reproduced_in_two_and_three_dimensions() {
         reproduces::<2>(Basis::Linear, 1);

@@ -294,3 +294,37 @@ fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>
         experiment: safeguards.of(base),
     }));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::BUNDLED;
+
+    fn swept(scene: &Scene) -> Vec<f64> {
+        let all = entries(scene, Extent::Quick);
+        let mut factors: Vec<f64> =
+            all.iter().filter(|e| e.parameter == Parameter::C).filter_map(|e| e.experiment.c).collect();
+        factors.sort_by(f64::total_cmp);
+        factors.dedup();
+        factors
+    }
+
+    #[test]
+    fn the_exponential_factor_is_varied_in_the_unit_of_stress_of_the_scene() {
+        let values = [0.0, 0.779, 10.0, 100.0, 1000.0];
+        assert_eq!(swept(&Scene::bundled("paper").unwrap()), values);
+        // The same tissue in a unit a thousand times smaller.
+        let mut text = BUNDLED[0].1.to_owned();
+        for (number, thousandfold) in
+            [("lambda = 383.0", "lambda = 383000.0"), ("mu = 318.5", "mu = 318500.0"), ("c = 0.779", "c = 779.0")]
+        {
+            assert_eq!(text.matches(&format!("\n{number}")).count(), 1);
+            text = text.replace(&format!("\n{number}"), &format!("\n{thousandfold}"));
+        }
+        let small = swept(&Scene::parse(&text, "paper in small units").unwrap());
+        assert_eq!(small.len(), values.len());
+        for (small, value) in small.iter().zip(values) {
+            assert!((small - 1000.0 * value).abs() <= 1e-9 * small, "{small} {value}");
+        }
+    }
+}
