@@ -93,3 +93,24 @@ pub(crate) fn bounded<T: Scalar>(value: T, low: T, high: T) -> T {
         value
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_have_rusts_names_and_are_read_back() {
+        for (kind, name) in [(<f32 as Scalar>::KIND, "f32"), (<f64 as Scalar>::KIND, "f64")] {
+            assert_eq!((kind.name(), ScalarKind::from_byte(kind as u8)), (name, Some(kind)));
+        }
+        assert_eq!(ScalarKind::from_byte(0), None);
+    }
+
+    #[test]
+    fn bounds_are_inclusive_and_keep_the_bits_of_what_is_inside() {
+        assert_eq!([-2.0, 0.5, 2.0].map(|x| bounded(x, -1.0, 1.0)), [-1.0, 0.5, 1.0]);
+        // A zero of either sign lies on a bound of the other: it stays as it is.
+        assert_eq!(bounded(-0.0_f64, 0.0, 1.0).to_bits(), (-0.0_f64).to_bits());
+        assert_eq!(bounded(0.0_f64, -1.0, -0.0).to_bits(), 0.0_f64.to_bits());
+    }
+}
