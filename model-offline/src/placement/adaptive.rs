@@ -5,7 +5,7 @@
 //! towards the singular points, level by level, until their distance to that, with what it leaves open, is within the
 //! tolerance. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
 
-use super::goal_oriented;
+use super::goal_oriented::Refinement;
 use super::reference::Reference;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
@@ -111,7 +111,8 @@ const PROFILE_NODES: usize = 1500;
 
 fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let method = scene.discretization.method;
-    let mut reference = Reference::compute(scene, REFERENCE_SHARE * tolerance)?;
+    let mut refinement = Refinement::new(scene)?;
+    let mut reference = Reference::sharpened(&mut refinement, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
     let mut level = first_level(tolerance);
     let mut tried = level - 1;
@@ -133,13 +134,13 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
             && reference.open > SHARP_SHARE * tolerance
         {
             // What the reference leaves open decides: sharpening it costs less than another level, and serves all to come.
-            reference = Reference::compute(scene, SHARP_SHARE * tolerance)?;
+            reference = Reference::sharpened(&mut refinement, SHARP_SHARE * tolerance)?;
             estimate = ErrorEstimate::of(&responses, &reference, level);
         }
         if estimate.worst() <= tolerance {
             if !reference.tells(&responses, SHARP_SHARE * tolerance) {
                 // Enough to accept, but not to say how far off each paddle is.
-                reference = Reference::compute(scene, TELLING_SHARE * tolerance)?;
+                reference = Reference::sharpened(&mut refinement, TELLING_SHARE * tolerance)?;
                 estimate = ErrorEstimate::of(&responses, &reference, level);
             }
             return Ok(Judged { model, estimate: Some(estimate), reference: Some(reference) });
@@ -164,7 +165,8 @@ fn first_level(tolerance: f64) -> i32 {
 fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut level = MIN_LEVEL - 1;
     let mut estimate = None;
-    let (certified, reached) = goal_oriented::refine(scene, |certified| {
+    let mut refinement = Refinement::new(scene)?;
+    let (certified, reached) = refinement.until(|certified| {
         level += 1;
         let found = ErrorEstimate::of(&certified.responses, &Reference::from_certified(certified), level);
         estimate = Some(found);
@@ -174,7 +176,7 @@ fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> 
         let reached = estimate.map_or(f64::INFINITY, |e| e.worst());
         return Err(ModelError::ToleranceNotReached { tolerance, reached });
     }
-    let reference = Some(Reference::from_certified(&certified));
+    let reference = Some(Reference::from_certified(certified));
     let model = TissueModel::on(scene, certified.model.planar().clone(), certified.model.spacing())?;
     Ok(Judged { model, estimate, reference })
 }

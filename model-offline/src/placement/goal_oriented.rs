@@ -58,34 +58,61 @@ impl Certified {
     }
 }
 
-/// Refines until `enough` says so; the last pair of meshes, enough or not, when more nodes would be too many.
-///
-/// # Errors
-/// [`ModelError`] as for any model.
-pub(super) fn refine(
-    scene: &Scene,
-    mut enough: impl FnMut(&Certified) -> bool,
-) -> Result<(Certified, bool), ModelError> {
-    let mut scene = scene.clone();
-    scene.discretization.essential = crate::discretization::Essential::Transformation;
-    scene.discretization.method = Method::new(Integration::FemT6);
-    let features = scene.features();
-    let mut mesh =
-        Triangulation::coarse(&features, FIRST_LEVEL).map_err(crate::discretization::DiscretizationError::from)?;
-    loop {
-        let (fine, parents) = mesh.refined();
-        let pair = Pair { coarse: model_on(&scene, &mesh)?, fine: model_on(&scene, &fine)?, parents };
-        let (certified, parts) = pair.certify()?;
-        if enough(&certified) {
-            return Ok((certified, true));
-        }
-        let (next, _) = mesh.bisected(&largest(&parts, CUT));
-        // Quadratic triangles have about twice as many nodes as there are triangles, and the fine ones four times that.
-        if 8 * next.triangles.len() > MAX_NODES {
-            return Ok((certified, false));
-        }
-        mesh = next;
+/// A refinement on its way: it can be asked for more.
+#[derive(Debug)]
+pub(super) struct Refinement {
+    scene: Scene,
+    mesh: Triangulation,
+    /// What the present mesh says, and every triangle's part of what is missing.
+    last: Option<(Certified, Vec<f64>)>,
+}
+
+impl Refinement {
+    /// The coarsest mesh, not solved yet.
+    ///
+    /// # Errors
+    /// [`ModelError`] where the scene has no triangulation.
+    pub(super) fn new(scene: &Scene) -> Result<Self, ModelError> {
+        let mut scene = scene.clone();
+        scene.discretization.essential = crate::discretization::Essential::Transformation;
+        scene.discretization.method = Method::new(Integration::FemT6);
+        let features = scene.features();
+        let mesh =
+            Triangulation::coarse(&features, FIRST_LEVEL).map_err(crate::discretization::DiscretizationError::from)?;
+        Ok(Self { scene, mesh, last: None })
     }
+
+    /// Refines until `enough` says so; the last pair of meshes, enough or not, when more nodes would be too many.
+    ///
+    /// # Errors
+    /// [`ModelError`] as for any model.
+    pub(super) fn until(
+        &mut self,
+        mut enough: impl FnMut(&Certified) -> bool,
+    ) -> Result<(&Certified, bool), ModelError> {
+        let mut last = match self.last.take() {
+            Some(last) => last,
+            None => certified(&self.scene, &self.mesh)?,
+        };
+        let mut is_enough = enough(&last.0);
+        while !is_enough {
+            let (next, _) = self.mesh.bisected(&largest(&last.1, CUT));
+            // Quadratic triangles have about twice as many nodes as there are triangles, and the fine ones four times that.
+            if 8 * next.triangles.len() > MAX_NODES {
+                break;
+            }
+            last = certified(&self.scene, &next)?;
+            self.mesh = next;
+            is_enough = enough(&last.0);
+        }
+        Ok((&self.last.insert(last).0, is_enough))
+    }
+}
+
+/// A mesh certified by the one in which each of its triangles is cut into four.
+fn certified(scene: &Scene, mesh: &Triangulation) -> Result<(Certified, Vec<f64>), ModelError> {
+    let (fine, parents) = mesh.refined();
+    Pair { coarse: model_on(scene, mesh)?, fine: model_on(scene, &fine)?, parents }.certify()
 }
 
 fn model_on(scene: &Scene, mesh: &Triangulation) -> Result<TissueModel, ModelError> {

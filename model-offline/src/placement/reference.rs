@@ -1,6 +1,6 @@
 //! A solution to judge others by: quadratic triangles, refined where the answers ask for it and extrapolated.
 
-use super::goal_oriented::{self, Certified};
+use super::goal_oriented::{Certified, Refinement};
 use super::rest::RestResponse;
 use crate::model::ModelError;
 use crate::scene::Scene;
@@ -23,8 +23,16 @@ impl Reference {
     /// # Errors
     /// [`ModelError`] as for any model.
     pub fn compute(scene: &Scene, share: f64) -> Result<Self, ModelError> {
-        let (certified, _) = goal_oriented::refine(scene, |certified| certified.worst_open() <= share)?;
-        Ok(Self::from_certified(&certified))
+        Self::sharpened(&mut Refinement::new(scene)?, share)
+    }
+
+    /// The same from where a refinement has got to.
+    ///
+    /// # Errors
+    /// [`ModelError`] as for any model.
+    pub(super) fn sharpened(refinement: &mut Refinement, share: f64) -> Result<Self, ModelError> {
+        let (certified, _) = refinement.until(|certified| certified.worst_open() <= share)?;
+        Ok(Self::from_certified(certified))
     }
 
     pub(super) fn from_certified(certified: &Certified) -> Self {

@@ -173,7 +173,7 @@ pub(super) fn newton_for(resolution: Resolution) -> NewtonSettings {
     match resolution {
         Resolution::Spacing(_) => NewtonSettings::default(),
         Resolution::Tolerance(_) | Resolution::Level(_) => {
-            NewtonSettings { max_cutbacks: 3, max_iterations: 8, ..NewtonSettings::default() }
+            NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() }
         }
     }
 }

@@ -55,6 +55,8 @@ pub struct Equilibrium<const D: usize> {
     /// Whether the factor belongs to the current state.
     factor_is_current: bool,
     factor_exists: bool,
+    /// What the last indefinite tangent needed on its diagonal to become positive definite.
+    shift: f64,
     /// Coefficients where the tangent was last found positive definite.
     stable_at: Vec<f64>,
     residuals: Vec<f64>,
@@ -130,6 +132,7 @@ impl<const D: usize> Equilibrium<D> {
             at,
             factor_is_current: false,
             factor_exists: false,
+            shift: 0.0,
             stable_at: Vec::new(),
             residuals: Vec::new(),
             effort: Effort::default(),

@@ -20,6 +20,11 @@ const FEASIBLE: f64 = 1e-10;
 /// which no law here has lost what it had.
 const STABILITY_REACH: f64 = 0.05;
 
+/// From one shift of an indefinite tangent to the next.
+const SHIFT_GROWTH: f64 = 4.0;
+/// A shift of so many times the stiffness at rest makes anything positive definite that is a tangent at all.
+const MOST_SHIFTED: f64 = 1e3;
+
 /// A step of Newton's method and what it is computed from.
 struct Step {
     step: Vec<f64>,
@@ -122,15 +127,18 @@ impl<const D: usize> Equilibrium<D> {
     }
 
     /// A factor to step with when the tangent is indefinite: shifted until it is positive definite, so that the step
-    /// still goes downhill.
+    /// still goes downhill. Tangents on the way to one equilibrium need shifts of one size, so that the search begins a
+    /// step below the last one (Nocedal & Wright, Numerical Optimization, 2006, algorithm 3.3).
     fn refactorise_shifted(&mut self) -> bool {
-        let mut shift = 1e-4 * self.solver.rest_stiffness();
-        for _ in 0..12 {
+        let least = 1e-4 * self.solver.rest_stiffness();
+        let (mut there, mut shift) = (0.0, (self.shift / SHIFT_GROWTH).max(least));
+        while shift < MOST_SHIFTED * self.solver.rest_stiffness() {
             self.effort.factorisations += 1;
-            if self.solver.factorise_shifted(shift).is_ok() {
+            if self.solver.factorise_shifted(shift - there).is_ok() {
+                self.shift = shift;
                 return true;
             }
-            shift *= 4.0;
+            (there, shift) = (shift, shift * SHIFT_GROWTH);
         }
         false
     }
