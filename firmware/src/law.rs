@@ -72,6 +72,11 @@ mod tests {
     }
 
     #[test]
+    fn a_paddle_that_does_nothing_has_no_direction() {
+        assert_eq!(Direction::MinimumNorm.solve(&Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
+    }
+
+    #[test]
     fn the_minimum_norm_is_shorter() {
         let n = Vector2::x();
         let shortest = Direction::MinimumNorm.solve(&jacobian(), &n);

@@ -1,7 +1,7 @@
 //! The stability study: depths of an independent implementation, typed reasons, and the files as a user gets them.
 
 use assert_cmd::Command;
-use model_offline::discretization::{Integration, Method, Resolution};
+use model_offline::discretization::{Integration, Method};
 use model_offline::model::ModelFailure;
 use model_offline::model::TissueModel;
 use model_offline::scene::Scene;

@@ -235,6 +235,13 @@ mod tests {
 
     use super::*;
 
+    #[test]
+    fn the_largest_content_fits_into_the_largest_frame_with_next_to_nothing_to_spare() {
+        // COBS without a zero in the content: one byte, and one more for every 254.
+        let encoded = MAX_CONTENT_BYTES + 1 + MAX_CONTENT_BYTES / 254;
+        assert!((encoded + 2..encoded + 4).contains(&MAX_FRAME_BYTES), "{MAX_FRAME_BYTES}");
+    }
+
     fn frames(count: u32) -> Vec<Vec<u8>> {
         let mut writer = FrameWriter::new();
         (0..count).map(|i| writer.encode(&(i, 0u8, 1.5f64)).unwrap().to_vec()).collect()

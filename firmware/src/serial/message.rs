@@ -183,3 +183,16 @@ pub struct Account {
     /// Deepest use of the stack since the start, bytes.
     pub stack_bytes: u32,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::ResetCause;
+
+    #[test]
+    fn every_cause_of_a_reset_is_told_by_its_number() {
+        for cause in [ResetCause::PowerOn, ResetCause::Watchdog, ResetCause::HardFault] {
+            assert_eq!(ResetCause::from_number(cause as u32), Some(cause));
+        }
+        assert_eq!(ResetCause::from_number(3), None);
+    }
+}

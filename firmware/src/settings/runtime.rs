@@ -213,6 +213,8 @@ mod tests {
         let ten_s = 10_000 * MS;
         for (settings, holds) in [
             (Settings { loop_period_ns: ten_s, target_period_ns: ten_s, ..good }, true),
+            (Settings { target_latency_ns: ten_s, ..Settings::new(ten_s, ten_s, 0) }, true),
+            (Settings { target_latency_ns: ten_s + 1, ..Settings::new(ten_s, ten_s, 0) }, false),
             (Settings { loop_period_ns: ten_s + 1, target_period_ns: ten_s + 1, ..good }, false),
             (Settings { target_period_ns: ten_s + 1, ..good }, false),
             (Settings { target_period_ns: MS, target_latency_ns: 0, ..good }, true),

@@ -289,6 +289,34 @@ fn no_request_ends_or_resets_a_run_in_run() {
     }
 }
 
+/// A step that was asked for too late is not made: its time has passed.
+#[test]
+fn a_request_to_step_that_comes_after_the_next_frame_is_no_step() {
+    let bytes = encoded(&table());
+    let expected = insertion::<f64>(200);
+    let mut writer = FrameWriter::new();
+    let mut frames: Vec<Vec<u8>> = Vec::new();
+    let mut late = 0;
+    for request in [HELLO].into_iter().chain(loading(&bytes, ClockSource::Frames)) {
+        frames.push(writer.encode(&request).unwrap().to_vec());
+    }
+    for (i, (inputs, _)) in expected.iter().enumerate() {
+        for request in requests_of(inputs) {
+            frames.push(writer.encode(&request).unwrap().to_vec());
+        }
+        if i == 100 {
+            late = frames.len() - 1;
+        }
+    }
+    frames.swap(late, late + 1);
+    let mut bench = Bench { to_device: frames.concat().into(), ..Bench::default() };
+    let ticks = answers_of::<f64>(&mut bench).into_iter().filter_map(|reply| match reply {
+        Reply::Command { command, .. } => Some(command.tick),
+        _ => None,
+    });
+    assert!(ticks.eq((0..200).filter(|tick| *tick != 100)));
+}
+
 #[test]
 fn the_watchdog_is_not_tested_and_nothing_rearmed_in_run() {
     let bytes = encoded(&table());

@@ -97,6 +97,14 @@ fn proportions_are_refused_at_their_limits() {
     // From (0.5, 0.5) to (0.1, 0.4) it is 0.412: ten times that and the depth are 5.12.
     assert_eq!(refused(|t| t.validity.paddle_displacement = 5.12), Ok(()));
     assert_eq!(refused(|t| t.validity.paddle_displacement = 5.13), field(Field::ValidPaddleDisplacement));
+    // A depth is a difference: where it is counted from does not matter.
+    let deeper = |t: &mut Table<f64, 2>| {
+        t.knots.iter_mut().for_each(|knot| knot.depth += 1000.0);
+        (t.validity.depth_start, t.validity.depth_end) = (1000.0, 1000.1);
+        let last = t.knots.len() - 1;
+        t.knots[last].depth = 1000.1;
+    };
+    assert_eq!(refused(deeper), Ok(()));
     let far = |t: &mut Table<f64, 2>| t.target_position.x = 100.3;
     assert_eq!(refused(far), field(Field::DistanceFromPaddleToTarget));
     let near = |t: &mut Table<f64, 2>| t.paddle.segment = [t.target_position.add_scalar(5e-5); 2];
