@@ -181,3 +181,15 @@ fn usage_errors_exit_2() {
     model_offline().args(["solve", "paper", "--paddle", "3", "--depth", "nan"]).assert().code(2);
     model_offline().args(["schema"]).assert().success();
 }
+
+#[test]
+fn what_a_study_varies_itself_is_refused_with_the_reason() {
+    for (command, option) in
+        [("sweep", "--tolerance=0.1"), ("pareto", "--support=2"), ("stability", "--integration=scni")]
+    {
+        let assert = model_offline().args([command, "paper", "--out", "unused", option]).assert().code(2);
+        let said = String::from_utf8_lossy(&assert.get_output().stderr).into_owned();
+        assert!(said.contains("studies vary this themselves"), "{said}");
+    }
+    assert!(!Path::new("unused").exists());
+}

@@ -129,12 +129,13 @@ pub struct PlacementResult {
     /// Nodes of the model.
     pub nodes: usize,
     /// Its integration rule.
+    #[schemars(with = "String")]
     pub integration: Integration,
     /// Duration of the study, s.
     pub wall_s: f64,
     /// Best static paddle.
     pub best_static: u32,
-    /// Best dynamic paddle; none where no paddle controls the target.
+    /// Best dynamic paddle; none where no paddle has a finite controllability measure.
     pub best_dynamic: Option<u32>,
     /// All paddles.
     pub paddles: Vec<PaddlePlacement>,

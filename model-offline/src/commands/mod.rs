@@ -50,7 +50,7 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Error against time for every method there is: pareto.csv and pareto.svg.
     #[command(
-        after_help = "Example:\n  model-offline pareto paper --out charts --quick\n\nTimes are those of one thread; leave the machine alone meanwhile. About five minutes without --quick."
+        after_help = "Example:\n  model-offline pareto paper --out charts --quick\n\nTimes are those of one thread, whatever --threads says; leave the machine alone meanwhile. About five minutes without --quick."
     )]
     Pareto(pareto::ParetoArgs),
     /// What the mesh does to the choice of a paddle: both rankings along a refinement, sweep.csv and sweep.svg.
@@ -102,11 +102,18 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
 const ELSEWHERE: [&str; 11] =
     ["run", "controller", "plant", "rearm", "timing", "faults", "tables", "replay", "board", "export", "report"];
 
+/// Options of the discretization that studies do not take.
+const VARIED: [&str; 4] = ["--integration", "--support", "--basis", "--tolerance"];
+
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
 pub(crate) fn parse() -> Cli {
     Cli::try_parse().unwrap_or_else(|error| {
         let word = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
+        let argument = error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string);
         let _ = error.print();
+        if argument.is_some_and(|argument| VARIED.iter().any(|option| argument.starts_with(option))) {
+            eprintln!("\n  tip: studies vary this themselves: leave it out");
+        }
         if let Some(word) = word {
             if ELSEWHERE.contains(&word.as_str()) {
                 eprintln!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help");

@@ -14,7 +14,7 @@ pub(super) struct ParetoArgs {
     /// Folder for the charts, made if need be.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Fewer settings.
+    /// Fewer discretizations.
     #[arg(long)]
     quick: bool,
     #[command(flatten)]

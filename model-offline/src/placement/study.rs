@@ -167,8 +167,9 @@ pub fn place(model: &TissueModel, options: &PlacementOptions<'_>) -> Result<Plac
     Ok(Placement { paddles, no_paddle, optimum, profile_nodes: profile.nodes() })
 }
 
-/// Newton's settings for the static study. On nodes refined to a tolerance the law loses stability under the needle's
-/// edge long before the full depth; finding that depth to an eighth of an increment is enough there.
+/// Newton's settings for the static study. On nodes refined to a tolerance a law may lose stability under the needle's
+/// edge before the full depth; finding that depth to an eighth of an increment is enough there. Iterations are not saved:
+/// an increment that takes many is no increment that fails.
 pub(super) fn newton_for(resolution: Resolution) -> NewtonSettings {
     match resolution {
         Resolution::Spacing(_) => NewtonSettings::default(),

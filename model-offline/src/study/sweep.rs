@@ -88,16 +88,23 @@ const COLUMNS: [&str; 8] = [
     "best_dynamic",
 ];
 
+/// Best static and best dynamic paddle, where there is one.
+pub type Optima = (Option<u32>, Option<u32>);
+
+fn named(paddle: Option<u32>) -> String {
+    paddle.map_or_else(|| "none".to_owned(), |index| index.to_string())
+}
+
 impl Sweep {
     fn orthogonal(&self, response: &RestResponse) -> f64 {
         response.target_per_depth.dot(&self.scene.needle.orthogonal())
     }
 
-    /// Best static paddle for small depths, and best dynamic one.
-    pub fn optima(&self, responses: &[RestResponse]) -> (u32, u32) {
+    /// Best static paddle for small depths, and best dynamic one; none where no paddle has a finite measure.
+    pub fn optima(&self, responses: &[RestResponse]) -> Optima {
         let best = |key: &dyn Fn(&RestResponse) -> f64| {
-            let paddles = self.scene.paddles.iter().zip(responses);
-            paddles.min_by(|a, b| key(a.1).total_cmp(&key(b.1))).map_or(0, |best| best.0.index)
+            let paddles = self.scene.paddles.iter().zip(responses).filter(|paddle| key(paddle.1).is_finite());
+            paddles.min_by(|a, b| key(a.1).total_cmp(&key(b.1))).map(|best| best.0.index)
         };
         (best(&|r| self.orthogonal(r).abs()), best(&|r| r.controllability_measure))
     }
@@ -132,8 +139,8 @@ impl Sweep {
                 paddle.to_string(),
                 format!("{:.6}", response.controllability_measure),
                 format!("{:.6}", self.orthogonal(response)),
-                (paddle == best_static).to_string(),
-                (paddle == best_dynamic).to_string(),
+                (Some(paddle) == best_static).to_string(),
+                (Some(paddle) == best_dynamic).to_string(),
             ]
         })
     }
@@ -144,6 +151,7 @@ impl Sweep {
             format!("{:<8} {:<16} {:>7} {:>13} {:>14}\n", "method", "mesh", "nodes", "best static", "best dynamic");
         for Row { rule, mesh, nodes, responses } in self.rows() {
             let (best_static, best_dynamic) = self.optima(responses);
+            let (best_static, best_dynamic) = (named(best_static), named(best_dynamic));
             let _ = writeln!(out, "{rule:<8} {mesh:<16} {nodes:>7} {best_static:>13} {best_dynamic:>14}");
         }
         let _ = writeln!(
@@ -155,10 +163,11 @@ impl Sweep {
     }
 
     /// Best paddles on the coarsest and on the finest mesh of a rule, and in the limit.
-    fn moves(&self, rule: Integration) -> [(u32, u32); 3] {
+    fn moves(&self, rule: Integration) -> [Optima; 3] {
         let of_rule = || self.steps.iter().filter(|step| step.discretization.method.integration == rule);
         let optima = |step: Option<&SweepStep>| {
-            step.and_then(|step| step.responses.as_deref().ok()).map_or((0, 0), |responses| self.optima(responses))
+            step.and_then(|step| step.responses.as_deref().ok())
+                .map_or((None, None), |responses| self.optima(responses))
         };
         [optima(of_rule().next()), optima(of_rule().next_back()), self.optima(self.reference.responses())]
     }
@@ -166,8 +175,8 @@ impl Sweep {
     /// Both rankings against the number of nodes: one panel per approach, one line per paddle, the limit at the right.
     pub fn svg(&self) -> String {
         let moves = self.moves(Integration::Scni);
-        let says = |name: &str, of: fn((u32, u32)) -> u32| {
-            let [coarse, fine, limit] = moves.map(of);
+        let says = |name: &str, of: fn(Optima) -> Option<u32>| {
+            let [coarse, fine, limit] = moves.map(of).map(named);
             if coarse == fine && fine == limit {
                 format!("best {name} paddle {limit} on every mesh")
             } else {
@@ -175,7 +184,7 @@ impl Sweep {
             }
         };
         let (fixed, moved) = (says("static", |o| o.0), says("dynamic", |o| o.1));
-        let changes = |of: fn((u32, u32)) -> u32| moves.map(of).windows(2).any(|pair| pair[0] != pair[1]);
+        let changes = |of: fn(Optima) -> Option<u32>| moves.map(of).windows(2).any(|pair| pair[0] != pair[1]);
         let decides = match (changes(|o| o.0), changes(|o| o.1)) {
             (true, true) => "The mesh decides which paddle is best",
             (true, false) => "The mesh decides which static paddle is best, not which dynamic one",
@@ -234,16 +243,16 @@ mod tests {
     fn the_static_optimum_of_the_paper_moves_with_the_mesh_and_the_dynamic_one_does_not() {
         let scene = Scene::bundled("paper").unwrap().without_inclusions();
         let sweep = sweep(&scene, 2, &|| {}).unwrap();
-        assert_eq!(sweep.optima(sweep.reference.responses()), (2, 3));
+        assert_eq!(sweep.optima(sweep.reference.responses()), (Some(2), Some(3)));
         for (rule, coarsest) in [(Integration::Dni, 4), (Integration::Scni, 3), (Integration::FemT3, 4)] {
-            let optima: Vec<(u32, u32)> = sweep
+            let optima: Vec<Optima> = sweep
                 .steps
                 .iter()
                 .filter(|s| s.discretization.method.integration == rule)
                 .map(|s| sweep.optima(s.responses.as_ref().unwrap()))
                 .collect();
-            assert_eq!((optima[0].0, optima[optima.len() - 1].0), (coarsest, 2), "{rule:?}: {optima:?}");
-            assert!(optima.iter().all(|o| o.1 == 3), "{rule:?}: {optima:?}");
+            assert_eq!((optima[0].0, optima[optima.len() - 1].0), (Some(coarsest), Some(2)), "{rule:?}: {optima:?}");
+            assert!(optima.iter().all(|o| o.1 == Some(3)), "{rule:?}: {optima:?}");
         }
         assert_eq!(sweep.steps.len() as u64, STEPS);
         assert_eq!(sweep.csv().iter().filter(|&&byte| byte == b'\n').count(), 1 + 5 * (sweep.steps.len() + 1));

@@ -49,7 +49,8 @@ const PARTS: [(&str, &str); 7] = [
 fn sentence(run: &RunResult) -> String {
     let paddles = |placement: &PlacementResult| Some((placement.best_static, placement.best_dynamic?));
     let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, p.tissue)).collect();
-    let all_agree = paper.iter().zip(&run.placements).all(|(paper, placement)| *paper == paddles(placement));
+    let all_agree =
+        paper.iter().zip(&run.placements).all(|(paper, placement)| paper.is_some() && *paper == paddles(placement));
     let placements: Vec<String> = run
         .placements
         .iter()

@@ -96,7 +96,7 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
         .map(|placement| {
             let title = match placement.best_dynamic {
                 Some(index) => format!("Tissue {}: paddle {index} needs the least travel", placement.tissue),
-                None => format!("Tissue {}: no paddle controls the target", placement.tissue),
+                None => format!("Tissue {}: no paddle moves the target sideways", placement.tissue),
             };
             let mut panel = Panel::new(
                 &title,

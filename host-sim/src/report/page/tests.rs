@@ -229,6 +229,24 @@ fn every_part_and_every_chart_is_there() {
     assert!(!render(&run("mine")).contains("The geometry is inferred."));
 }
 
+/// Of a scene that the paper knows nothing of, nothing is as in the paper, least of all where there is no optimum.
+#[test]
+fn a_scene_without_a_dynamic_paddle_says_so_and_agrees_with_nothing() {
+    for scene in ["mine", "paper"] {
+        let mut run = run(scene);
+        assert!(!render(&run).contains("best dynamic paddle none"));
+        for placement in &mut run.placements {
+            placement.best_dynamic = None;
+        }
+        let page = render(&run);
+        assert!(page.contains("best dynamic paddle none") && !page.contains("as in the paper"), "{scene}");
+        assert!(page.contains("no paddle moves"), "{scene}");
+        assert!(!page.contains("★"), "{scene}: nothing is best");
+        let text = crate::report::terminal::summary::summary(&run, "out".as_ref());
+        assert_eq!(text.matches("DIFFERENT").count(), if scene == "paper" { 2 } else { 0 }, "{text}");
+    }
+}
+
 #[test]
 fn strings_of_the_result_are_text() {
     let page = render(&run(EVIL));
