@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use iceoryx2::config::Config;
-use iceoryx2::node::{Node, NodeState};
+use iceoryx2::node::{Node, NodeState, NodeView as _};
 use iceoryx2::prelude::CallbackProgression;
 use iceoryx2::service::Service;
 
@@ -230,14 +230,22 @@ impl Space {
         files::in_shared_memory(&self.name).iter().try_for_each(|path| files::secure(path))
     }
 
-    /// Whether a node of this space belongs to a process that has died.
+    /// Whether the peer has died: the dead have left a node, and nobody but this process is alive. The node of somebody
+    /// who was refused looks dead for a moment while he goes, and the peer lives.
     pub fn has_dead_peer<S: Service>(&self) -> bool {
-        let mut dead = false;
+        let own = std::process::id();
+        let (mut dead, mut others) = (false, false);
         let _ = Node::<S>::list(&self.config, |node| {
-            dead |= matches!(node, NodeState::Dead(_));
+            match node {
+                NodeState::Dead(_) => dead = true,
+                NodeState::Alive(view) => {
+                    others |= view.id().pid::<S>().map_or(true, |pid| pid.value().cast_unsigned() != own)
+                }
+                NodeState::Inaccessible(_) | NodeState::Undefined(_) => {}
+            }
             CallbackProgression::Continue
         });
-        dead
+        dead && !others
     }
 }
 

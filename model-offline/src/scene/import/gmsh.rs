@@ -108,7 +108,7 @@ impl Mesh {
             let element = lines.at_least(3)?;
             let tags = element[2] as usize;
             let surface = if tags > 0 { element.get(3).copied().unwrap_or(0.0) } else { 0.0 };
-            self.add(element[1] as u32, surface as i64, element.get(3 + tags..).unwrap_or_default());
+            self.add(element[1] as u32, surface as i64, element.get(tags.saturating_add(3)..).unwrap_or_default());
         }
         Ok(())
     }
@@ -223,5 +223,10 @@ mod tests {
         assert!(matches!(read(&V4.replace("4 4 1\n", "4 4 9\n"), None), Err(ImportError::Syntax { .. })));
         assert!(matches!(read("", None), Err(ImportError::NoOutline(_))));
         assert!(read(&V2[..150], None).is_err());
+        // A number of tags beyond any that a computer counts: an element without nodes.
+        assert!(
+            read(&V2.replace("5 2 2 7 1 2 6 5", "5 2 1e300 7 1 2 6 5"), None)
+                .is_ok_and(|found| found.outline.area() > 0.0)
+        );
     }
 }
