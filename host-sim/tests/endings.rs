@@ -90,8 +90,8 @@ fn signals_are_obeyed_at_once_everywhere() {
     // Random schedules, and rows that wait for processes.
     obeys(&["faults", "--only", "1", "--seeds", "1000000"], millis(2500));
     obeys(&["faults", "--only", "38"], millis(1200));
-    for row in ["33", "34", "35", "36"] {
-        obeys(&["faults", "--only", row], millis(2500));
+    for (row, after) in [("33", 2500), ("34", 2500), ("35", 600), ("36", 2500)] {
+        obeys(&["faults", "--only", row], millis(after));
     }
     obeys(&["run", "--out", out, "--quiet", "--mode", "free-run", "--insertion-time", "60"], millis(4000));
     let link = format!("test-signals-{}", std::process::id());
