@@ -33,7 +33,7 @@ pub(crate) struct FaultsArgs {
     /// Random schedules of several faults at once [default: 1000, none with --only]
     #[arg(long, value_name = "N")]
     pub(crate) seeds: Option<u64>,
-    /// Part of the repetitions of rows 33, 35 and 36 (200 kills, 100 kills, 100 cycles)
+    /// Part of the repetitions of rows 33, 35, 36 and 37 (200 kills, 100 kills, 100 cycles, 200 visits)
     #[arg(long, default_value_t = 1.0, value_name = "PART")]
     pub(crate) effort: f64,
     /// Instead, switch off one monitor of the controller after the other, and show which rows of 1 to 32 notice
