@@ -23,7 +23,8 @@
 //! 8. [`output`]: JSON, VTU, SVG, tables; every file whole or not at all. [`study`]: which method is fast, which is
 //!    accurate, and where each stops working.
 //!
-//! Beside them stand small things that all may use: [`parallel`] (threads), `random` (seeded numbers), `choice` (enums that
+//! Beside them stand small things that all may use: [`parallel`] (threads), [`number`] (lengths for people), `random` (seeded
+//! numbers), `choice` (enums that
 //! files and command lines call by the same names).
 //!
 //! Where to begin: [precompute tables](guide::precompute), [how it works](guide::how_it_works), a
@@ -45,6 +46,7 @@
 
 // In the order of use: a module uses only what stands above its group, or beside it.
 mod choice;
+pub mod number;
 pub mod parallel;
 mod random;
 

@@ -6,10 +6,13 @@ use model_offline::geometry::Point2;
 use model_offline::linalg::Pattern;
 use model_offline::material::Law;
 use model_offline::mechanics::Tissue;
-use model_offline::mechanics::assembly::{AssemblyState, BlockPositions, internal_force, tangent};
+use model_offline::mechanics::assembly::{AssemblyState, internal_force, tangent};
+use model_offline::mechanics::blocks::BlockPositions;
+use model_offline::mechanics::stabilisation::Stabilisation;
 use model_offline::model::TissueModel;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::Scene;
+use std::sync::Arc;
 use tests::continuum::{errors, limits};
 use tests::{jittered_rectangle, rectangle};
 
@@ -66,9 +69,19 @@ fn wavy(planar: &Planar) -> Vec<f64> {
     planar.positions().iter().flat_map(wave).collect()
 }
 
+/// Sparsity of a body's tangent, and where its blocks go.
+fn laid_out(planar: &Planar) -> (Arc<Pattern>, BlockPositions) {
+    let lists: Vec<_> = planar.rule().points().map(|p| p.nodes).collect();
+    let pattern = Arc::new(Pattern::new(2, planar.positions().len(), lists.into_iter()));
+    let blocks = BlockPositions::new(planar.rule(), &pattern);
+    (pattern, blocks)
+}
+
 fn energy_and_force(planar: &Planar, tissue: &Tissue, d: &[f64]) -> (f64, Vec<f64>, AssemblyState<2>) {
     let (mut state, mut force) = (AssemblyState::default(), vec![0.0; d.len()]);
-    let energy = internal_force(planar.rule(), tissue, d, &mut state, &mut force).unwrap();
+    let (pattern, blocks) = laid_out(planar);
+    let stabilisation = Stabilisation::new(planar.rule(), tissue, &blocks, &pattern);
+    let energy = internal_force((planar.rule(), &stabilisation), tissue, d, &mut state, &mut force).unwrap();
     (energy, force, state)
 }
 
@@ -78,13 +91,10 @@ fn force_and_tangent_are_the_derivatives_of_the_energy() {
         let (planar, tissue) = body(integration);
         let d = wavy(&planar);
         let (_, force, state) = energy_and_force(&planar, &tissue, &d);
-        let pattern = Pattern::new(
-            2,
-            planar.positions().len(),
-            planar.rule().points().map(|p| p.nodes).collect::<Vec<_>>().into_iter(),
-        );
+        let (pattern, blocks) = laid_out(&planar);
+        let stabilisation = Stabilisation::new(planar.rule(), &tissue, &blocks, &pattern);
         let mut values = vec![0.0; pattern.entries()];
-        tangent(planar.rule(), &tissue, &state, &BlockPositions::new(planar.rule(), &pattern), &mut values);
+        tangent((planar.rule(), &stabilisation), &tissue, &state, &blocks, &mut values);
         // One node of the interior against all others.
         let (node, step) = (24_u32, 1e-6);
         for axis in 0..2 {

@@ -1,6 +1,7 @@
 //! Why a world cannot be simulated.
 
 use model_offline::model::ModelError;
+use model_offline::number::length;
 use model_offline::reduction::train::TrainingError;
 use model_offline::solver::equilibrium::Failure;
 
@@ -15,7 +16,11 @@ pub enum WorldError {
         index: u32,
     },
     /// The tissue has no equilibrium any more.
-    #[error("the simulated tissue failed at depth {depth:.4}")]
+    #[error("the simulated tissue failed at depth {}", length(*depth))]
+    #[diagnostic(help(
+        "insert less deep ([needle] depth), or widen the contact: a short one squeezes the tissue at its ends until the \
+         law has no answer"
+    ))]
     Tissue {
         /// Needle depth, length.
         depth: f64,
@@ -31,7 +36,7 @@ pub enum WorldError {
         "lower --rate, try --plant reduced or --plant condensed, or use --mode lockstep, which has no clock"
     ))]
     TooSlow {
-        /// Median duration of a step, µs.
+        /// Mean duration of a step, µs.
         step_us: f64,
         /// Period of the loop, µs.
         period_us: f64,

@@ -1,5 +1,9 @@
 //! What answers for the tissue at every tick: the full model, a reduced one with the full one behind it, or the
 //! condensed linear one.
+//!
+//! Where time is simulated, the full model is solved as often as an error of [`EXTRAPOLATION`] asks, and extrapolated
+//! between; a loop that the machine's clock drives solves at every tick, because a solve must never take longer than
+//! the last.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -7,7 +11,7 @@ use clap::ValueEnum;
 use model_offline::model::{Body, TissueModel};
 use model_offline::parallel;
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
-use model_offline::reduction::{Condensed, TrainingError, TrainingOptions, TrainingReport, train};
+use model_offline::reduction::{Condensed, Extrapolated, TrainingError, TrainingOptions, TrainingReport, train};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
@@ -16,10 +20,14 @@ use serde::{Deserialize, Serialize};
 
 use super::error::WorldError;
 
+/// Error of an extrapolated target displacement, over the depth that the scene inserts to: a thousandth of the noise
+/// that the target is seen with.
+pub const EXTRAPOLATION: f64 = 1e-7;
+
 /// Which model is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum WantedPlant {
-    /// The full nonlinear model at every tick
+    /// The full nonlinear model: solved at every tick in free-run, else as often as an error of 1e-7 of the depth asks
     #[default]
     Full,
     /// A reduced nonlinear model, trained before the run; the full one where it does not hold
@@ -53,6 +61,12 @@ pub struct PlantAccount {
     /// Largest error of the target displacement that the reduced model estimated of itself, length.
     #[serde(default)]
     pub largest_estimate: Option<f64>,
+    /// States that the full model was solved for, where it was extrapolated between.
+    #[serde(default)]
+    pub solves: Option<u64>,
+    /// Largest distance of an extrapolated target displacement from the one solved for in its place, length.
+    #[serde(default)]
+    pub extrapolation_error: Option<f64>,
     /// Distance from the full model's target displacement at the end of the run, length; computed after it.
     #[serde(default)]
     pub error_at_end: Option<f64>,
@@ -69,6 +83,8 @@ impl Default for PlantAccount {
             first_fallback: None,
             full_step_us: None,
             largest_estimate: None,
+            solves: None,
+            extrapolation_error: None,
             error_at_end: None,
         }
     }
@@ -146,6 +162,7 @@ pub struct TissuePlant<'m> {
 #[derive(Debug)]
 enum Kind<'m> {
     Full(Box<Body<'m>>),
+    Extrapolated(Box<Extrapolated<'m>>),
     Reduced {
         body: Box<ReducedBody>,
         /// Made when it is first needed.
@@ -185,7 +202,7 @@ impl<'m> TissuePlant<'m> {
             (WantedPlant::Auto, Some(fit)) => fit.plant,
         };
         let kind = match wanted {
-            PlantModel::Full => Kind::Full(full(model, paddle)?),
+            PlantModel::Full => extrapolated(model, paddle)?,
             PlantModel::Condensed => {
                 account.model = PlantModel::Condensed;
                 let condensed = Condensed::new(model, paddle).map_err(WorldError::Condensation)?;
@@ -200,7 +217,7 @@ impl<'m> TissuePlant<'m> {
                 }
                 Err(error) if choice == WantedPlant::Auto => {
                     account.first_fallback = Some(error.to_string());
-                    Kind::Full(full(model, paddle)?)
+                    extrapolated(model, paddle)?
                 }
                 Err(error) => return Err(WorldError::Training(error)),
             },
@@ -214,6 +231,17 @@ impl<'m> TissuePlant<'m> {
         let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
         let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
         Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account }
+    }
+
+    /// Solves the full model at every step from now on, where it answers: no step then takes much longer than another.
+    ///
+    /// # Errors
+    /// [`WorldError::Tissue`].
+    pub fn solve_every_step(&mut self) -> Result<(), WorldError> {
+        if matches!(self.kind, Kind::Extrapolated(_)) {
+            self.kind = Kind::Full(self.solved_in_full()?);
+        }
+        Ok(())
     }
 
     /// Notes that this model answers because the full one takes so long, µs a step.
@@ -238,6 +266,7 @@ impl<'m> TissuePlant<'m> {
         into.clear();
         match &self.kind {
             Kind::Full(body) => into.extend_from_slice(body.equilibrium().coefficients()),
+            Kind::Extrapolated(body) => into.extend(body.coefficients()),
             Kind::Reduced { full: Some(body), full_answers: true, .. } => {
                 into.extend_from_slice(body.equilibrium().coefficients());
             }
@@ -250,6 +279,7 @@ impl<'m> TissuePlant<'m> {
     pub fn deformed_nodes(&self) -> Vec<[f64; 2]> {
         let coefficients = match &self.kind {
             Kind::Full(body) => body.equilibrium().coefficients().to_vec(),
+            Kind::Extrapolated(body) => body.coefficients(),
             Kind::Reduced { full: Some(body), full_answers: true, .. } => body.equilibrium().coefficients().to_vec(),
             Kind::Reduced { body, .. } => body.coefficients(),
             // The linear model has condensed the nodes out; the picture is the full model's.
@@ -270,7 +300,10 @@ impl<'m> TissuePlant<'m> {
     /// The account, with the distance from the full model at the present state.
     pub fn account(&mut self) -> PlantAccount {
         let mut account = self.account.clone();
-        if !matches!(self.kind, Kind::Full(_)) {
+        if let Kind::Extrapolated(body) = &self.kind {
+            account.solves = Some(body.account().solves);
+            account.extrapolation_error = Some(body.account().largest_error);
+        } else if !matches!(self.kind, Kind::Full(_)) {
             let (depth, paddle) = self.at;
             let full = self.solved_in_full().map(|body| body.target_displacement());
             if let (Ok(full), Ok(own)) = (full, self.step(depth, paddle)) {
@@ -292,6 +325,11 @@ impl TissueResponse for TissuePlant<'_> {
         self.at = (depth, paddle);
         match &mut self.kind {
             Kind::Full(body) => drive(body, depth, paddle),
+            Kind::Extrapolated(body) => {
+                let driven = body.drive(depth, paddle);
+                driven.map_err(|source| WorldError::Tissue { depth: body.depth(), source })?;
+                Ok(body.target_displacement())
+            }
             Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
             Kind::Reduced { body, full: behind, full_answers } => match body.drive(depth, paddle) {
                 Ok(()) => {
@@ -322,9 +360,16 @@ fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, Wor
         .map_err(|source| WorldError::Tissue { depth: 0.0, source })
 }
 
+fn extrapolated<'m>(model: &'m TissueModel, paddle: Option<usize>) -> Result<Kind<'m>, WorldError> {
+    let tolerance = EXTRAPOLATION * model.scene().needle.depth;
+    let body = Extrapolated::at_rest(model, paddle, tolerance);
+    body.map(|body| Kind::Extrapolated(Box::new(body))).map_err(|source| WorldError::Tissue { depth: 0.0, source })
+}
+
 fn drive(body: &mut Body<'_>, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
     if depth != body.depth() || paddle != body.paddle() {
-        body.drive(depth, paddle).map_err(|source| WorldError::Tissue { depth, source })?;
+        let driven = body.drive(depth, paddle);
+        driven.map_err(|source| WorldError::Tissue { depth: body.depth(), source })?;
     }
     Ok(body.target_displacement())
 }

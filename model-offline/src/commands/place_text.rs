@@ -1,6 +1,7 @@
 //! A placement study as text: a row per paddle and one without, with the error of every number beside it.
 
 use model_offline::model::ModelError;
+use model_offline::number::{decimals, length};
 use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};
 use model_offline::placement::study::{Optimum, StaticStudy};
 use model_offline::placement::workflow::StudyAccuracy;
@@ -25,19 +26,22 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
         study.model.nodes(),
         1e3 * study.wall_s
     );
+    let studies = study.placement.paddles.iter().map(|paddle| &paddle.static_study);
+    let smallest = studies.chain([&study.placement.no_paddle.static_study]).map(|study| study.max_orthogonal);
+    let digits = decimals(smallest.fold(f64::INFINITY, f64::min), 6);
     for (i, paddle) in study.placement.paddles.iter().enumerate() {
         let errors = known.map(|known| &known.errors.paddles[i]);
-        let _ = writeln!(out, "{}", paddle_row(paddle, errors, optimum));
+        let _ = writeln!(out, "{}", paddle_row(paddle, errors, optimum, digits));
     }
     let none = &study.placement.no_paddle.static_study;
     let errors = known.map(|known| &known.errors.no_paddle);
-    let none = static_part(none, errors, NOT_BEST, Some(1.0));
+    let none = static_part((none, errors), NOT_BEST, Some(1.0), digits);
     let _ = writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {none}");
     out.push_str(&notes(study, accuracy));
     out
 }
 
-fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, optimum: Optimum) -> String {
+fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, optimum: Optimum, digits: usize) -> String {
     let measure = match paddle.best_direction {
         Some(_) => format!("{:8.4}", paddle.controllability_measure),
         None => format!("{NONE:>8}"),
@@ -48,18 +52,25 @@ fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, optimum: Opt
     let mark = if optimum.dynamic_paddle == Some(paddle.index) { BEST } else { NOT_BEST };
     let mark_static = if optimum.static_paddle == paddle.index { BEST } else { NOT_BEST };
     let errors = errors.map(|e| &e.static_study);
-    let rest = static_part(&paddle.static_study, errors, mark_static, paddle.static_over_no_paddle);
+    let rest = static_part((&paddle.static_study, errors), mark_static, paddle.static_over_no_paddle, digits);
     format!("{:>7}  {measure}{mark} {error:>8}   {direction:<20}  {rest}", paddle.index)
 }
 
 /// Largest orthogonal displacement with its mark, its error, its share of that without a paddle, and why the insertion ended
-/// early.
-fn static_part(study: &StaticStudy, errors: Option<&StaticErrors>, mark: char, share: Option<f64>) -> String {
-    let error = errors.and_then(|e| e.max_orthogonal).map_or(NONE.to_owned(), |e| format!("{e:.6}"));
+/// early; lengths with so many decimals.
+fn static_part(
+    (study, errors): (&StaticStudy, Option<&StaticErrors>),
+    mark: char,
+    share: Option<f64>,
+    digits: usize,
+) -> String {
+    let error = errors.and_then(|e| e.max_orthogonal).map_or(NONE.to_owned(), |e| format!("{e:.digits$}"));
     let share = share.map_or(NONE.to_owned(), |share| format!("{share:.3}"));
-    let stopped =
-        study.failure.as_ref().map_or(String::new(), |f| format!("  stopped at depth {:.4}: {}", f.depth, f.reason));
-    format!("{:23.6}{mark} {error:>8}   {share:>12}{stopped}", study.max_orthogonal)
+    let stopped = study
+        .failure
+        .as_ref()
+        .map_or(String::new(), |f| format!("  stopped at depth {}: {}", length(f.depth), f.reason));
+    format!("{:23.digits$}{mark} {error:>8}   {share:>12}{stopped}", study.max_orthogonal)
 }
 
 fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {

@@ -90,6 +90,17 @@ impl Pattern {
         Some(self.column_starts[j as usize * self.dimension] as usize + rank * self.dimension)
     }
 
+    /// Number of stored blocks.
+    pub fn stored_blocks(&self) -> usize {
+        self.block_rows.len()
+    }
+
+    /// Which of the stored blocks it is that begins at this entry, in the column of node j.
+    pub(crate) fn block_at(&self, j: u32, entry: usize) -> usize {
+        let first = self.column_starts[j as usize * self.dimension] as usize;
+        self.block_starts[j as usize] as usize + (entry - first) / self.dimension
+    }
+
     /// Number of block columns: nodes.
     pub fn blocks(&self) -> usize {
         self.block_starts.len() - 1
@@ -163,6 +174,45 @@ impl Pattern {
                     }
                 }
                 out[u] += sum;
+            }
+        }
+    }
+
+    /// Adds `S x` to `out` for the symmetric matrix whose blocks are these multiples of the identity, one for each stored
+    /// block; returns `xᵀ S x`.
+    pub(crate) fn add_scalar_product<const D: usize>(&self, weights: &[f64], x: &[f64], out: &mut [f64]) -> f64 {
+        let mut product = 0.0;
+        for j in 0..self.blocks() {
+            let range = self.block_starts[j] as usize..self.block_starts[j + 1] as usize;
+            let column: [f64; D] = std::array::from_fn(|k| x[j * D + k]);
+            // The diagonal block is the first of its column.
+            let mut sum = [0.0; D];
+            for (&i, &weight) in self.block_rows[range.clone()].iter().zip(&weights[range.clone()]).skip(1) {
+                let at = i as usize * D;
+                for (k, (out, x_i)) in out[at..at + D].iter_mut().zip(&x[at..at + D]).enumerate() {
+                    *out += weight * column[k];
+                    sum[k] += weight * x_i;
+                }
+            }
+            let diagonal = weights[range.start];
+            for k in 0..D {
+                product += column[k] * (2.0 * sum[k] + diagonal * column[k]);
+                out[j * D + k] += sum[k] + diagonal * column[k];
+            }
+        }
+        product
+    }
+
+    /// Adds these multiples of the identity, one for each stored block, to a matrix.
+    pub(crate) fn add_scalar_blocks(&self, weights: &[f64], values: &mut [f64]) {
+        for j in 0..self.blocks() {
+            let stride = self.column_length(j as u32);
+            let first = self.column_starts[j * self.dimension] as usize;
+            let weights = &weights[self.block_starts[j] as usize..self.block_starts[j + 1] as usize];
+            for (rank, weight) in weights.iter().enumerate() {
+                for k in 0..self.dimension {
+                    values[first + rank * self.dimension + k * stride + k] += weight;
+                }
             }
         }
     }

@@ -4,10 +4,10 @@
 //! `(K_IJ)_ik = Σ_q w_q g_I,j A_ijkl(F_q) g_J,l`, total Lagrangian throughout; rules with a constant
 //! [`stabilisation`] add theirs.
 
-use super::stabilisation;
+use super::blocks::BlockPositions;
+use super::stabilisation::Stabilisation;
 use super::tissue::Tissue;
 use crate::discretization::Quadrature;
-use crate::linalg::Pattern;
 use crate::material::{Material, Matrix, determinant};
 
 /// A configuration that the model does not admit.
@@ -65,13 +65,14 @@ pub fn displacement_gradient<const D: usize>(rule: &Quadrature<D>, q: usize, coe
     h
 }
 
-/// Internal force and strain energy at the given coefficients; fills `state` for [`tangent`].
+/// Internal force and strain energy at the given coefficients, with those of the rule's stabilisation; fills `state` for
+/// [`tangent`].
 ///
 /// # Errors
 /// [`Inverted`] when det F ≤ 0 or not a number, or the stress not finite, at an integration point; `force` is then not
 /// meaningful.
 pub fn internal_force<const D: usize>(
-    rule: &Quadrature<D>,
+    (rule, stabilisation): (&Quadrature<D>, &Stabilisation),
     tissue: &Tissue,
     coefficients: &[f64],
     state: &mut AssemblyState<D>,
@@ -105,47 +106,14 @@ pub fn internal_force<const D: usize>(
                 }
             }
         }
-        if !point.stabilisation.is_empty() {
-            let shear = tissue.rest_shear_modulus(point.cell);
-            energy += stabilisation::add_force::<D>(point.nodes, point.stabilisation, shear, coefficients, force);
-        }
     }
-    Ok(energy)
-}
-
-/// Where every (point, node, node) block of the tangent goes: computed once per pattern, so that assembly is a plain
-/// loop without searches.
-#[derive(Debug, Clone)]
-pub struct BlockPositions {
-    /// For every point and every ordered pair (row ≥ column) of its nodes: first entry of the block's first column.
-    positions: Vec<u32>,
-    /// Per node: entries between the columns of its blocks.
-    strides: Vec<u32>,
-}
-
-impl BlockPositions {
-    /// Finds the place of every block of `rule` in `pattern`.
-    ///
-    /// # Panics
-    /// When the pattern misses a block that the rule produces.
-    pub fn new<const D: usize>(rule: &Quadrature<D>, pattern: &Pattern) -> Self {
-        let mut positions = Vec::with_capacity(rule.pairs() * 13);
-        for point in rule.points() {
-            for (column, &j) in point.nodes.iter().enumerate() {
-                for &i in &point.nodes[column..] {
-                    positions.push(pattern.block_position(i, j).expect("the pattern covers the rule") as u32);
-                }
-            }
-        }
-        let strides = (0..pattern.blocks() as u32).map(|j| pattern.column_length(j) as u32).collect();
-        Self { positions, strides }
-    }
+    Ok(energy + stabilisation.add_force::<D>(coefficients, force))
 }
 
 /// Tangent stiffness at the state that [`internal_force`] left, added into `values` (lower triangle of blocks, laid
 /// out by the pattern of `blocks`).
 pub fn tangent<const D: usize>(
-    rule: &Quadrature<D>,
+    (rule, stabilisation): (&Quadrature<D>, &Stabilisation),
     tissue: &Tissue,
     state: &AssemblyState<D>,
     blocks: &BlockPositions,
@@ -162,8 +130,6 @@ pub fn tangent<const D: usize>(
                 *sum += scale * row;
             }
         }
-        let shear = if point.stabilisation.is_empty() { 0.0 } else { tissue.rest_shear_modulus(point.cell) };
-        let mut packed = 0;
         for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {
             // t[k][i][m] = A_imkl g_J,l: shared by all rows of this column.
             let t: [[[f64; D]; D]; D] = std::array::from_fn(|k| {
@@ -171,14 +137,6 @@ pub fn tangent<const D: usize>(
             });
             let stride = blocks.strides[j as usize] as usize;
             let rows = &point.gradients[column..];
-            if let Some(stabilisation) = point.stabilisation.get(packed..packed + rows.len()) {
-                for (b, &at) in stabilisation.iter().zip(&blocks.positions[next..next + rows.len()]) {
-                    for k in 0..D {
-                        values[at as usize + k * stride + k] += shear * b;
-                    }
-                }
-                packed += rows.len();
-            }
             for (gi, &at) in rows.iter().zip(&blocks.positions[next..next + rows.len()]) {
                 for (k, t) in t.iter().enumerate() {
                     let start = at as usize + k * stride;
@@ -190,4 +148,5 @@ pub fn tangent<const D: usize>(
             next += rows.len();
         }
     }
+    stabilisation.add_tangent(values);
 }

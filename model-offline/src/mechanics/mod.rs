@@ -1,6 +1,7 @@
 //! Internal force and tangent stiffness of a body, and the essential boundary conditions on it.
 
 pub mod assembly;
+pub mod blocks;
 pub mod constraints;
 pub mod nitsche;
 pub mod stabilisation;

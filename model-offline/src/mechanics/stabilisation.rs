@@ -1,52 +1,75 @@
 //! The constant stabilisation of an integration rule: energy `½ Σ_q μ₀(cell) Σ_IJ B_IJ(q) d_I·d_J`, with the packed
 //! matrices B of the [rule](crate::discretization::Quadrature) and the shear modulus at rest μ₀ of the cell's tissue.
 
+use super::blocks::BlockPositions;
 use super::tissue::Tissue;
 use crate::discretization::Quadrature;
+use crate::linalg::Pattern;
 use nalgebra::{DMatrix, DVector};
+use std::sync::Arc;
 
-/// Adds the force `μ₀ B d` of one point, component by component; returns its energy `½ μ₀ dᵀ B d`.
-pub(super) fn add_force<const D: usize>(
-    nodes: &[u32],
-    matrix: &[f64],
-    shear: f64,
-    coefficients: &[f64],
-    force: &mut [f64],
-) -> f64 {
-    let (mut energy, mut next) = (0.0, 0);
-    for (column, &j) in nodes.iter().enumerate() {
-        for &i in &nodes[column..] {
-            let (i, j, b) = (i as usize * D, j as usize * D, shear * matrix[next]);
-            next += 1;
-            for k in 0..D {
-                let (di, dj) = (coefficients[i + k], coefficients[j + k]);
-                force[i + k] += b * dj;
-                if i == j {
-                    energy += 0.5 * b * di * dj;
-                } else {
-                    force[j + k] += b * di;
-                    energy += b * di * dj;
+/// The stabilisation of a tissue, summed over all points once: it does not depend on the state, and couples equal
+/// components alone, so that a number per pair of nodes is all of it.
+#[derive(Debug, Clone)]
+pub struct Stabilisation {
+    pattern: Arc<Pattern>,
+    /// A number per block of the pattern; empty where the rule has no stabilisation.
+    weights: Vec<f64>,
+}
+
+impl Stabilisation {
+    /// That of a rule on a tissue; `blocks` are the rule's in the pattern.
+    pub fn new<const D: usize>(
+        rule: &Quadrature<D>,
+        tissue: &Tissue,
+        blocks: &BlockPositions,
+        pattern: &Arc<Pattern>,
+    ) -> Self {
+        let mut weights = Vec::new();
+        if rule.points().any(|point| !point.stabilisation.is_empty()) {
+            weights.resize(pattern.stored_blocks(), 0.0);
+        }
+        let mut positions = blocks.in_order();
+        for point in rule.points() {
+            let shear = if point.stabilisation.is_empty() { 0.0 } else { tissue.rest_shear_modulus(point.cell) };
+            let mut packed = point.stabilisation.iter();
+            for (column, &j) in point.nodes.iter().enumerate() {
+                for at in positions.by_ref().take(point.nodes.len() - column) {
+                    if let Some(b) = packed.next() {
+                        weights[pattern.block_at(j, at)] += shear * b;
+                    }
                 }
             }
         }
+        Self { pattern: Arc::clone(pattern), weights }
     }
-    energy
-}
 
-/// The stabilisation between some columns of coefficients, `S_mn = c_mᵀ (μ₀ B) c_n`: what is left of it in a reduced
-/// basis, exactly, because it does not depend on the state.
-pub fn project<const D: usize>(rule: &Quadrature<D>, tissue: &Tissue, columns: &[&[f64]]) -> DMatrix<f64> {
-    let mut projected = DMatrix::zeros(columns.len(), columns.len());
-    for (n, column) in columns.iter().enumerate() {
-        let mut force = vec![0.0; column.len()];
-        for point in rule.points().filter(|p| !p.stabilisation.is_empty()) {
-            let shear = tissue.rest_shear_modulus(point.cell);
-            add_force::<D>(point.nodes, point.stabilisation, shear, column, &mut force);
+    /// Adds its force; returns its energy.
+    pub(super) fn add_force<const D: usize>(&self, coefficients: &[f64], force: &mut [f64]) -> f64 {
+        if self.weights.is_empty() {
+            return 0.0;
         }
-        let force = DVector::from_vec(force);
-        for (m, other) in columns.iter().enumerate() {
-            projected[(m, n)] = force.dot(&nalgebra::DVectorView::from_slice(other, other.len()));
+        0.5 * self.pattern.add_scalar_product::<D>(&self.weights, coefficients, force)
+    }
+
+    /// Adds its tangent, laid out by its pattern.
+    pub(super) fn add_tangent(&self, values: &mut [f64]) {
+        if !self.weights.is_empty() {
+            self.pattern.add_scalar_blocks(&self.weights, values);
         }
     }
-    projected
+
+    /// Between some columns of coefficients, `S_mn = c_mᵀ S c_n`: what is left of it in a reduced basis, exactly.
+    pub fn project<const D: usize>(&self, columns: &[&[f64]]) -> DMatrix<f64> {
+        let mut projected = DMatrix::zeros(columns.len(), columns.len());
+        for (n, column) in columns.iter().enumerate() {
+            let mut force = vec![0.0; column.len()];
+            self.add_force::<D>(column, &mut force);
+            let force = DVector::from_vec(force);
+            for (m, other) in columns.iter().enumerate() {
+                projected[(m, n)] = force.dot(&nalgebra::DVectorView::from_slice(other, other.len()));
+            }
+        }
+        projected
+    }
 }

@@ -368,19 +368,32 @@ impl Body<'_> {
         self.model.target.interpolate(self.equilibrium.coefficients())
     }
 
+    /// Coefficients' responses to unit rates of the depth, then of the paddle's displacement x and y where one is
+    /// attached, one after the other: the exact linearisation of the present state.
+    ///
+    /// # Errors
+    /// [`Failure`] when the current state is not stable.
+    pub fn responses(&mut self) -> Result<Vec<f64>, Failure> {
+        let mut rates = self.model.prescribed_values(self.attached, 1.0, Vector2::zeros());
+        if self.attached.is_some() {
+            for axis in 0..2 {
+                rates.extend(self.model.prescribed_values(self.attached, 0.0, Vector2::ith(axis, 1.0)));
+            }
+        }
+        self.equilibrium.sensitivities(&rates)
+    }
+
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle still, by exact linearisation.
     /// Rows target x, y; columns paddle x, y.
     ///
     /// # Errors
     /// [`Failure`] when the current state is not stable.
     pub fn actuation_jacobian(&mut self) -> Result<Matrix2<f64>, Failure> {
-        let mut jacobian = Matrix2::zeros();
-        for axis in 0..2 {
-            let rates = self.model.prescribed_values(self.attached, 0.0, Vector2::ith(axis, 1.0));
-            let response = self.equilibrium.sensitivity(&rates)?;
-            jacobian.set_column(axis, &self.model.target.interpolate(&response));
-        }
-        Ok(jacobian)
+        let rates: Vec<f64> =
+            (0..2).flat_map(|axis| self.model.prescribed_values(self.attached, 0.0, Vector2::ith(axis, 1.0))).collect();
+        let responses = self.equilibrium.sensitivities(&rates)?;
+        let columns = responses.chunks_exact(self.model.dofs()).map(|response| self.model.target.interpolate(response));
+        Ok(Matrix2::from_columns(&columns.collect::<Vec<_>>()))
     }
 
     /// d(target displacement)/d(depth) with the paddle held, by exact linearisation.
@@ -389,7 +402,7 @@ impl Body<'_> {
     /// [`Failure`] when the current state is not stable.
     pub fn depth_sensitivity(&mut self) -> Result<Vector2<f64>, Failure> {
         let rates = self.model.prescribed_values(self.attached, 1.0, Vector2::zeros());
-        let response = self.equilibrium.sensitivity(&rates)?;
+        let response = self.equilibrium.sensitivities(&rates)?;
         Ok(self.model.target.interpolate(&response))
     }
 }

@@ -83,6 +83,8 @@ pub(super) fn for_each_paddle(
         .collect::<Option<_>>()
         .ok_or(ModelError::ImposedWeakly)?;
     let analysis = model.analysis();
+    let stabilisation = analysis.stabilisation(rule, model.tissue());
+    let rule = (&**rule, &stabilisation);
     let (mut state, mut force) = (AssemblyState::default(), vec![0.0; unknowns]);
     internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)
         .map_err(|_| singular("at rest"))?;

@@ -2,6 +2,7 @@
 
 use super::hindrance::Hindrance;
 use super::study::Placement;
+use crate::number::length;
 use firmware::contract::CONDITION_LIMIT;
 
 /// Lines for people about paddles that cannot hold the target; empty when all can.
@@ -19,8 +20,10 @@ pub fn verdict(placement: &Placement) -> Vec<String> {
                  (condition number {condition:.3e}, limit {CONDITION_LIMIT:.0e})"
             ),
             Hindrance::OutOfReach { needed, available, condition } => format!(
-                "paddle {index} cannot hold the target: that takes {needed:.4} of paddle displacement, the actuator \
-                 has {available:.4} (condition number of its Jacobian {condition:.3e})"
+                "paddle {index} cannot hold the target: that takes {} of paddle displacement, the actuator has {} \
+                 (condition number of its Jacobian {condition:.3e})",
+                length(*needed),
+                length(*available)
             ),
         })
         .collect();

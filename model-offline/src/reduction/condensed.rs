@@ -4,7 +4,6 @@
 use super::lifting::{control_values, controls, flat, tangent_at_rest};
 use crate::mechanics::ConstrainedRows;
 use crate::mechanics::assembly::displacement_gradient;
-use crate::mechanics::stabilisation;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::equilibrium::{Equilibrium, Failure, FailureReason, NewtonSettings};
 use nalgebra::{DMatrix, Matrix2, Vector2};
@@ -30,7 +29,7 @@ impl Condensed {
         let rows = model.constrained_rows_with_target(paddle).ok_or(ModelError::ImposedWeakly)?;
         let shapes = retained_responses(model, paddle, rows)?;
         let columns: Vec<&[f64]> = shapes.iter().map(Vec::as_slice).collect();
-        let mut stiffness = stabilisation::project(model.rule(), model.tissue(), &columns);
+        let mut stiffness = model.analysis().stabilisation(model.rule(), model.tissue()).project::<2>(&columns);
         for (q, point) in model.rule().points().enumerate() {
             let a = tangent_at_rest(model.tissue(), point.cell, point.weight);
             let strains: Vec<_> = shapes.iter().map(|d| flat(&displacement_gradient(model.rule(), q, d))).collect();
@@ -101,7 +100,7 @@ fn retained_responses(
             }
             let mut rates = model.prescribed_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
             rates.extend(target);
-            Ok(body.sensitivity(&rates)?)
+            Ok(body.sensitivities(&rates)?)
         })
         .collect()
 }

@@ -34,7 +34,7 @@ pub(super) fn lifting(
             let mut unit = [0.0; 3];
             unit[control] = 1.0;
             let rates = model.prescribed_values(paddle, unit[0], Vector2::new(unit[1], unit[2]));
-            Ok(at_rest.equilibrium_mut().sensitivity(&rates)?)
+            Ok(at_rest.equilibrium_mut().sensitivities(&rates)?)
         })
         .collect()
 }

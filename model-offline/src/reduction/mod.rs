@@ -1,7 +1,8 @@
-//! Reduced models of a body whose only moving parts are the needle and one paddle: what a simulator can afford at every
-//! tick.
+//! What a simulator can afford at every tick: reduced models of a body whose only moving parts are the needle and one
+//! paddle.
 //!
 //! - [`condensed`]: the linear model, statically condensed onto needle, paddle and target. Exact for small depths.
+//! - [`extrapolated`]: the full model, solved now and then: for simulated time, which can wait for a solve.
 //! - [`online`]: the nonlinear model on a few displacement modes (proper orthogonal decomposition), its energy summed
 //!   over a few weighted integration points (energy-conserving sampling and weighting, Farhat, Avery, Chapman & Cortial
 //!   2014), with an error estimate at every step and a domain that it knows.
@@ -9,6 +10,7 @@
 
 pub mod condensed;
 mod error;
+pub mod extrapolated;
 mod lifting;
 mod nnls;
 pub mod online;
@@ -17,5 +19,6 @@ mod space;
 pub mod train;
 
 pub use condensed::Condensed;
+pub use extrapolated::Extrapolated;
 pub use online::{Invalid, ReducedModel};
 pub use train::{TrainingError, TrainingOptions, TrainingReport, train};

@@ -2,22 +2,43 @@
 //! fewer positive weights, the better.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use std::collections::HashMap;
 
 /// Columns that were tried and would have got a negative weight are skipped until another one has changed the set.
 const FEASIBLE: f64 = 1e-12;
 
+/// Columns `A` that are to be added up to `b`, with what is known of their products: every column's with one that was
+/// ever taken. One product with all columns is a pass over the whole matrix, which is what a fit would else cost at every
+/// step.
+#[derive(Debug)]
+pub(super) struct Columns {
+    a: DMatrix<f64>,
+    b: DVector<f64>,
+    /// Aᵀ b.
+    with_b: DVector<f64>,
+    norms: Vec<f64>,
+    /// Aᵀ a for columns a.
+    known: HashMap<usize, DVector<f64>>,
+}
+
+impl Columns {
+    /// The columns of `a`, and what they are to be added up to.
+    pub(super) fn new(a: DMatrix<f64>, b: DVector<f64>) -> Self {
+        let norms = (0..a.ncols()).map(|c| a.column(c).norm()).collect();
+        Self { with_b: a.tr_mul(&b), norms, known: HashMap::new(), a, b }
+    }
+}
+
 /// Weights `x ≥ 0` that bring `A x` near `b`, better and better.
 #[derive(Debug)]
 pub(super) struct NonNegativeFit<'a> {
-    a: &'a DMatrix<f64>,
-    b: &'a DVector<f64>,
+    of: &'a mut Columns,
     active: Vec<usize>,
     weights: Vec<f64>,
     /// Products of the active columns with each other, and with `b`.
     gram: DMatrix<f64>,
     right: Vec<f64>,
     residual: DVector<f64>,
-    scale: Vec<f64>,
     /// Columns that are never taken, and those that cannot be taken now.
     excluded: Vec<bool>,
     refused: Vec<bool>,
@@ -25,19 +46,17 @@ pub(super) struct NonNegativeFit<'a> {
 
 impl<'a> NonNegativeFit<'a> {
     /// No weight yet; the columns `excluded` never get one.
-    pub(super) fn new(a: &'a DMatrix<f64>, b: &'a DVector<f64>, excluded: impl Iterator<Item = usize>) -> Self {
-        let columns = a.ncols();
+    pub(super) fn new(of: &'a mut Columns, excluded: impl Iterator<Item = usize>) -> Self {
+        let columns = of.a.ncols();
         let mut fit = Self {
-            a,
-            b,
             active: Vec::new(),
             weights: Vec::new(),
             gram: DMatrix::zeros(0, 0),
             right: Vec::new(),
-            residual: b.clone(),
-            scale: (0..columns).map(|c| a.column(c).norm()).collect(),
+            residual: of.b.clone(),
             excluded: vec![false; columns],
             refused: vec![false; columns],
+            of,
         };
         excluded.for_each(|c| fit.excluded[c] = true);
         fit
@@ -61,8 +80,8 @@ impl<'a> NonNegativeFit<'a> {
 
     /// Takes more columns until `‖A x − b‖ ≤ tolerance ‖b‖`, or as close as non-negative weights come.
     pub(super) fn improve(&mut self, tolerance: f64) {
-        let goal = tolerance * self.b.norm();
-        let most = self.a.ncols().min(self.a.nrows());
+        let goal = tolerance * self.of.b.norm();
+        let most = self.of.a.ncols().min(self.of.a.nrows());
         while self.residual.norm() > goal && self.active.len() < most {
             let Some(entering) = self.best_column() else {
                 break;
@@ -80,33 +99,36 @@ impl<'a> NonNegativeFit<'a> {
     }
 
     fn update_residual(&mut self) {
-        self.residual.copy_from(self.b);
+        self.residual.copy_from(&self.of.b);
         for (&c, w) in self.active.iter().zip(&self.weights) {
-            self.residual.axpy(-w, &self.a.column(c), 1.0);
+            self.residual.axpy(-w, &self.of.a.column(c), 1.0);
         }
     }
 
     /// The column best aligned with what is left.
     fn best_column(&self) -> Option<usize> {
-        let descent = |c: usize| {
-            if self.scale[c] > 0.0 { self.a.column(c).dot(&self.residual) / self.scale[c] } else { 0.0 }
-        };
-        let best = (0..self.a.ncols())
+        let mut descent = self.of.with_b.clone();
+        for (c, w) in self.active.iter().zip(&self.weights) {
+            descent.axpy(-w, &self.of.known[c], 1.0);
+        }
+        let scaled = |c: usize| if self.of.norms[c] > 0.0 { descent[c] / self.of.norms[c] } else { 0.0 };
+        let best = (0..descent.len())
             .filter(|c| !self.excluded[*c] && !self.refused[*c] && !self.active.contains(c))
-            .map(|c| (c, descent(c)))
+            .map(|c| (c, scaled(c)))
             .max_by(|x, y| x.1.total_cmp(&y.1));
-        best.filter(|(_, d)| *d > FEASIBLE * self.b.norm()).map(|(c, _)| c)
+        best.filter(|(_, d)| *d > FEASIBLE * self.of.b.norm()).map(|(c, _)| c)
     }
 
     fn enter(&mut self, column: usize) {
+        let Columns { a, with_b, known, .. } = &mut *self.of;
+        let products = known.entry(column).or_insert_with(|| a.tr_mul(&a.column(column)));
         let n = self.active.len();
         self.active.push(column);
         self.weights.push(0.0);
-        self.right.push(self.a.column(column).dot(self.b));
+        self.right.push(with_b[column]);
         self.gram.resize_mut(n + 1, n + 1, 0.0);
-        for i in 0..=n {
-            let product = self.a.column(self.active[i]).dot(&self.a.column(column));
-            (self.gram[(i, n)], self.gram[(n, i)]) = (product, product);
+        for (i, active) in self.active.iter().enumerate() {
+            (self.gram[(i, n)], self.gram[(n, i)]) = (products[*active], products[*active]);
         }
     }
 
@@ -170,7 +192,8 @@ mod tests {
     use super::*;
 
     fn non_negative_fit(a: &DMatrix<f64>, b: &DVector<f64>, tolerance: f64) -> Vec<(usize, f64)> {
-        let mut fit = NonNegativeFit::new(a, b, std::iter::empty());
+        let mut columns = Columns::new(a.clone(), b.clone());
+        let mut fit = NonNegativeFit::new(&mut columns, std::iter::empty());
         // By way of a looser one, which must not matter.
         fit.improve(0.5);
         fit.improve(tolerance);
@@ -181,7 +204,8 @@ mod tests {
     fn excluded_columns_get_no_weight() {
         let a = DMatrix::from_fn(60, 30, |i, k| (k as f64 * (i as f64 + 0.5) * std::f64::consts::PI / 60.0).cos());
         let b = a.column(2) * 3.0 + a.column(7) * 0.5;
-        let mut fit = NonNegativeFit::new(&a, &b, [7].into_iter());
+        let mut columns = Columns::new(a.clone(), b);
+        let mut fit = NonNegativeFit::new(&mut columns, [7].into_iter());
         fit.improve(1e-10);
         assert!(fit.weights().iter().all(|(c, _)| *c != 7));
         // What the excluded column is needed for stays: the others are orthogonal to it.

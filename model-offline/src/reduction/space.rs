@@ -3,13 +3,12 @@
 
 use super::error::TrainingError;
 use super::lifting::{flat, tangent_at_rest};
-use super::nnls::NonNegativeFit;
+use super::nnls::{Columns, NonNegativeFit};
 use super::online::{Domain, ReducedModel, Sample, SampledPoint};
 use super::snapshots::Snapshot;
 
 use crate::material::Material as _;
 use crate::mechanics::assembly::displacement_gradient;
-use crate::mechanics::stabilisation;
 use crate::model::TissueModel;
 use nalgebra::{DMatrix, DVector, Matrix2, SymmetricEigen, Vector2};
 
@@ -43,9 +42,8 @@ type Weights = Vec<(usize, f64)>;
 
 /// Points that give the same sums as all, in two samples that have none in common, better and better.
 pub(super) struct Sampling {
-    /// Forces of every point, row by row, and their sums.
-    forces: DMatrix<f64>,
-    sums: DVector<f64>,
+    /// Forces of every point, which are to be added up to those of all.
+    forces: Columns,
     /// What the first sample has so far.
     taken: Weights,
 }
@@ -53,11 +51,11 @@ pub(super) struct Sampling {
 impl Sampling {
     /// Samples within a misfit, the second made of points that the first does not have.
     pub(super) fn next(&mut self, misfit: f64) -> [Weights; 2] {
-        let mut first = NonNegativeFit::new(&self.forces, &self.sums, std::iter::empty());
+        let mut first = NonNegativeFit::new(&mut self.forces, std::iter::empty());
         first.start_from(&self.taken);
         first.improve(misfit);
         self.taken = first.weights();
-        let mut second = NonNegativeFit::new(&self.forces, &self.sums, self.taken.iter().map(|(q, _)| *q));
+        let mut second = NonNegativeFit::new(&mut self.forces, self.taken.iter().map(|(q, _)| *q));
         second.improve(CONTROL_SHARE * misfit);
         [self.taken.clone(), second.weights()]
     }
@@ -195,7 +193,7 @@ impl ModalSpace {
     /// The constant stabilisation between lifts and modes; it is projected once, and not part of the sample.
     fn stabilisation(&self, model: &TissueModel, modes: usize) -> DMatrix<f64> {
         let columns: Vec<&[f64]> = self.lifts.iter().chain(&self.modes[..modes]).map(Vec::as_slice).collect();
-        stabilisation::project(model.rule(), model.tissue(), &columns)
+        model.analysis().stabilisation(model.rule(), model.tissue()).project::<2>(&columns)
     }
 
     /// `K_mn = Σ_q w_q H_m · A(0) · H_n` over all points.
@@ -250,7 +248,7 @@ impl ModalSpace {
         }
         let sums = DVector::from_iterator(rows.len(), rows.iter().map(|row| row.sum()));
         let forces = DMatrix::from_fn(rows.len(), rule.len(), |i, q| rows[i][q]);
-        Sampling { forces, sums, taken: Vec::new() }
+        Sampling { forces: Columns::new(forces, sums), taken: Vec::new() }
     }
 
     /// The smallest det F of all points.

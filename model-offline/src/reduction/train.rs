@@ -28,11 +28,10 @@ const FLOOR: f64 = 0.25;
 /// Modes onto which the states cannot be projected within this multiple of the tolerance are not tried: the equilibrium
 /// on them may be nearer than the projection, but not by more.
 const HOPELESS: f64 = 2.0;
-/// The paddle's range over what it takes to hold the target: along both axes what the longer takes, or, where that is not to
-/// be had, little more than the way and little across it.
-const WIDE: f64 = 2.0;
-const NARROW: f64 = 1.25;
-/// The shorter side of the narrow range over the longer, at least.
+/// The paddle's range over the way that it takes to hold the target: the first, and a shorter one where that cannot be had.
+/// A range beyond what any insertion needs costs modes, and states that no insertion comes to have no equilibrium.
+const RANGES: [f64; 2] = [1.5, 1.25];
+/// The shorter side of the range over the longer, at least.
 const ASPECT: f64 = 0.5;
 
 /// What the model is trained for.
@@ -42,8 +41,8 @@ pub struct TrainingOptions {
     pub tolerance: f64,
     /// Largest needle depth, length units (default: the scene's).
     pub depth: Option<f64>,
-    /// Largest paddle displacement along either axis, length units; 0 for one that is held where it rests (default: twice what
-    /// holding the target takes, or a little more than that where no more can be had; never more than the actuator has).
+    /// Largest paddle displacement along either axis, length units; 0 for one that is held where it rests (default: half as
+    /// much again as holding the target takes, or a quarter where no more can be had; never more than the actuator has).
     pub paddle: Option<f64>,
     /// Threads that solve snapshots.
     pub threads: usize,
@@ -195,7 +194,7 @@ fn smallest(
     }
 }
 
-/// Displacements that a paddle holding the target needs, with a margin: the wider first.
+/// Displacements that a paddle holding the target needs, with a margin: the larger first.
 fn workspaces(model: &TissueModel, paddle: Option<usize>) -> Result<Vec<Vector2<f64>>, ModelError> {
     let scene = model.scene();
     let condensed = Condensed::new(model, paddle)?;
@@ -203,10 +202,10 @@ fn workspaces(model: &TissueModel, paddle: Option<usize>) -> Result<Vec<Vector2<
     let to_hold = condensed.target_displacement(scene.needle.depth, Vector2::zeros()).dot(&normal);
     let direction = best_direction(&condensed.actuation_jacobian(), normal).unwrap_or_default();
     let way = (direction * to_hold).abs();
-    let both = Vector2::repeat(way.amax());
     let least = 0.02 * scene.needle.depth;
     let within = |side: f64| f64::min(side.max(least), scene.actuator.max_displacement);
-    let mut ranges = vec![(both * WIDE).map(within), (way.sup(&(both * ASPECT)) * NARROW).map(within)];
+    let sides = way.sup(&Vector2::repeat(ASPECT * way.amax()));
+    let mut ranges: Vec<_> = RANGES.into_iter().map(|over| (sides * over).map(within)).collect();
     ranges.dedup();
     Ok(ranges)
 }
@@ -262,7 +261,7 @@ mod tests {
             let paddle = model.paddle_position(3);
             let (reduced, report) = train(&model, paddle, &TrainingOptions::default()).unwrap();
             println!("{report:?}");
-            assert!(report.worst_error < 0.005);
+            assert!(report.worst_error <= TrainingOptions::default().tolerance);
             assert!(report.points < report.full_points);
             // An insertion with a moving paddle that is in no snapshot.
             let mut full = model.body(paddle, NewtonSettings::default()).unwrap();
@@ -318,16 +317,18 @@ mod tests {
         }
     }
 
-    /// Where the corners of the wide range, which no insertion goes to, cannot be had, the way to the target can.
+    /// A paddle on a stiff band, whose far corners have no equilibrium: the way to the target can be had.
     #[test]
     fn a_paddle_that_cannot_go_everywhere_can_hold_the_target() {
         let scene = Scene::bundled("tethered").unwrap();
         let (model, _) = crate::placement::adaptive::discretise(&scene).unwrap();
         let paddle = model.paddle_position(2);
-        let [wide, narrow] = workspaces(&model, paddle).unwrap()[..] else { panic!("two ranges") };
-        assert!(wide.x == wide.y && narrow.amax() < wide.amax() && narrow.amin() < narrow.amax());
+        let ranges = workspaces(&model, paddle).unwrap();
+        let [first, second] = ranges[..] else { panic!("two ranges") };
+        assert!(second.amax() < first.amax() && first.amin() < first.amax());
         let (_, report) = train(&model, paddle, &TrainingOptions::of(&scene)).unwrap();
-        assert_eq!((report.domain.depth, report.domain.paddle), (scene.needle.depth, narrow));
+        assert_eq!(report.domain.depth, scene.needle.depth);
+        assert!(ranges.contains(&report.domain.paddle), "{:?} of {ranges:?}", report.domain);
         assert!(report.worst_error <= 0.01);
     }
 

@@ -3,7 +3,9 @@
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::linalg::{Pattern, SymbolicFactor};
-use crate::mechanics::assembly::BlockPositions;
+use crate::mechanics::Tissue;
+use crate::mechanics::blocks::BlockPositions;
+use crate::mechanics::stabilisation::Stabilisation;
 use std::sync::Arc;
 
 /// Made once for the nodes and the rule of a body, with whatever may be constrained on it. Cheap to clone.
@@ -39,6 +41,11 @@ impl Analysis {
     /// Elimination order and size of the factor.
     pub fn symbolic(&self) -> &SymbolicFactor {
         &self.symbolic
+    }
+
+    /// The stabilisation of the analysed rule on a tissue.
+    pub fn stabilisation<const D: usize>(&self, rule: &Quadrature<D>, tissue: &Tissue) -> Stabilisation {
+        Stabilisation::new(rule, tissue, &self.blocks, &self.pattern)
     }
 
     /// Where the rule's blocks go.

@@ -244,16 +244,23 @@ impl<'p> Comparison<'p> {
         found.expect("the tissues of all cases are studied")
     }
 
-    /// A table for every case.
+    /// A table for every case; those that are not given are computed on all threads, one for each tissue.
     fn compute_tables(&self, given: Option<&EncodedTable>) -> Result<Vec<EncodedTable>, SimError> {
         let loop_settings = &self.simulation.loop_settings;
+        let needed = |tissue: &TissueVariant| given.is_none() && self.cases.iter().any(|c| c.table_tissue == *tissue);
+        let tissues: Vec<TissueVariant> = TissueVariant::ALL.into_iter().filter(needed).collect();
+        if !tissues.is_empty() {
+            self.progress.say("controller tables");
+        }
+        let computed = parallel::map(tissues.len(), self.options.threads, |i| self.compute_table(tissues[i]));
+        let computed: Vec<EncodedTable> = computed.into_iter().collect::<Result<_, _>>()?;
+        let computed_for =
+            |wanted| tissues.iter().zip(&computed).find_map(|(t, table)| (*t == wanted).then_some(table));
         self.cases
             .iter()
             .map(|case| {
-                let EncodedTable { table, bytes } = match given {
-                    Some(given) => given.clone(),
-                    None => self.compute_table(case.table_tissue)?,
-                };
+                let known = given.or_else(|| computed_for(case.table_tissue));
+                let EncodedTable { table, bytes } = known.expect("given, or computed for every tissue").clone();
                 // Refused settings are bad input: found before anything runs.
                 Controller::new(&table, &loop_settings.settings(table.validity.depth_end))?;
                 let scalar = self.options.scalar;
@@ -265,7 +272,6 @@ impl<'p> Comparison<'p> {
     }
 
     fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
-        self.progress.say(&format!("{tissue}: controller table"));
         let studied = &self.studied(tissue).study;
         let paddle = studied.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
         let table = build(&studied.model, paddle, &TableOptions::default())?;
@@ -286,10 +292,13 @@ impl<'p> Comparison<'p> {
                 none.into_iter().chain([(i, Some(paddle), Strategy::Static)])
             })
             .collect();
-        let outcomes = parallel::map(jobs.len(), self.options.threads, |job| {
-            let (i, paddle, strategy) = jobs[job];
-            let label = self.cases[i].label(strategy);
-            self.insertion(&self.cases[i], label, &|| self.progress.step()).uncontrolled(paddle)
+        // What is written at the end of a long insertion takes long too, and there is nothing to tidy up.
+        let outcomes = signals::ends_at_once(|| {
+            parallel::map(jobs.len(), self.options.threads, |job| {
+                let (i, paddle, strategy) = jobs[job];
+                let label = self.cases[i].label(strategy);
+                self.insertion(&self.cases[i], label, &|| self.progress.step()).uncontrolled(paddle)
+            })
         });
         let mut results: Vec<_> = self.cases.iter().map(|_| (None, None)).collect();
         for ((i, paddle, _), outcome) in jobs.iter().zip(outcomes) {

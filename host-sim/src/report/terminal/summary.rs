@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use model_offline::number::decimals;
 use model_offline::scene::PlantModel;
 
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
@@ -45,48 +46,58 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
          target seen at {} Hz, {} ms late, noise {:.1e}; paddle in brackets",
         settings.depth, settings.insertion_s, settings.target_rate_hz, settings.target_latency_ms, settings.noise
     )?;
-    writeln!(text, "  {:<13} {:<13} {:>10} {:>13} {:>13}", "tissue", "table", "none", "static", "dynamic")?;
+    writeln!(text, "  {:<13} {:<13} {:>12} {:>16} {:>16}", "tissue", "table", "none", "static", "dynamic")?;
+    let results = run.cases.iter().flat_map(|case| case.strategies.iter());
+    let smallest = results.map(|(_, result)| result.max_orthogonal_error).filter(|error| *error > 0.0);
+    let digits = decimals(smallest.fold(f64::INFINITY, f64::min), 6);
     for case in &run.cases {
-        write_case(text, case)?;
+        write_case(text, case, digits)?;
     }
     write_plant(text, run)?;
     write_loop(text, run)?;
     writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
 }
 
-fn error(strategy: Option<&StrategyResult>) -> String {
+/// The largest orthogonal error and the paddle.
+fn error(strategy: Option<&StrategyResult>, digits: usize) -> String {
     let Some(strategy) = strategy else {
         return "–".to_owned();
     };
     let paddle = strategy.paddle.map_or_else(String::new, |index| format!(" ({index})"));
-    format!("{:.6}{paddle}", strategy.max_orthogonal_error)
+    format!("{:.digits$}{paddle}", strategy.max_orthogonal_error)
 }
 
-fn write_case(text: &mut String, case: &CaseResult) -> std::fmt::Result {
+fn write_case(text: &mut String, case: &CaseResult, digits: usize) -> std::fmt::Result {
     let strategies = &case.strategies;
     let dynamic = strategies.controlled();
     write!(
         text,
-        "  {:<13} {:<13} {:>10} {:>13} {:>13}",
+        "  {:<13} {:<13} {:>12} {:>16} {:>16}",
         case.tissue.name(),
         case.table_tissue,
-        error(strategies.none.as_ref()),
-        error(strategies.static_paddle.as_ref()),
-        error(dynamic),
+        error(strategies.none.as_ref(), digits),
+        error(strategies.static_paddle.as_ref(), digits),
+        error(dynamic, digits),
     )?;
     match (case.improvement, dynamic) {
         (Some(factor), Some(dynamic)) => {
             let none =
-                case.improvement_over_none.map_or_else(String::new, |factor| format!("{} of none, ", share(factor)));
-            writeln!(text, "   {} of static, {none}{}", share(factor), names::mode::name(dynamic.final_state))
+                case.improvement_over_none.map_or_else(String::new, |factor| format!("{}, ", share(factor, "none")));
+            writeln!(text, "   {}, {none}{}", share(factor, "static"), names::mode::name(dynamic.final_state))
         }
         _ => writeln!(text),
     }
 }
 
-/// An error over another one, by how many times it is smaller; a digit more where that is few.
-fn share(factor: f64) -> String {
-    if factor < 10.0 { format!("1/{factor:.1}") } else { format!("1/{factor:.0}") }
+/// An error over another one, of which it is this many times smaller; a digit more where that is few.
+fn share(factor: f64, other: &str) -> String {
+    if factor < 1.0 {
+        format!("{:.1} times {other}", 1.0 / factor)
+    } else if factor < 10.0 {
+        format!("1/{factor:.1} of {other}")
+    } else {
+        format!("1/{factor:.0} of {other}")
+    }
 }
 
 /// What answered for the tissue, where it was not the full model: how far off it was, and how often it could not.
@@ -95,6 +106,14 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
         let strategies = &case.strategies;
         for strategy in [&strategies.dynamic, &strategies.dynamic_free_run].into_iter().flatten() {
             let plant = &strategy.plant;
+            if let (Some(solves), Some(error)) = (plant.solves, plant.extrapolation_error) {
+                writeln!(
+                    text,
+                    "  {}, {}: tissue solved for {solves} times, extrapolated between, {error:.1e} off at most where it \
+                     was solved for next",
+                    case.tissue, strategy.mode
+                )?;
+            }
             if plant.fallbacks == 0 && plant.first_fallback.is_none() && plant.model == PlantModel::Full {
                 continue;
             }

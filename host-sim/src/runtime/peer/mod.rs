@@ -17,9 +17,9 @@ use crate::runtime::signals;
 const SPINS: u32 = 200;
 /// Polls between two looks at signals and at the peer.
 const POLLS_PER_LOOK: u32 = 512;
-/// Silence after which polling may be slow: nobody is in a hurry any more.
-const NAP_AFTER: Duration = Duration::from_millis(50);
-const NAP: Duration = Duration::from_micros(500);
+/// Silence after which polling may be slow: the other side is busy, perhaps with a solve, and may need this processor.
+const NAP_AFTER: Duration = Duration::from_millis(2);
+const NAP: Duration = Duration::from_micros(100);
 
 /// Who the peer is, as far as its death can be noticed.
 #[derive(Debug)]

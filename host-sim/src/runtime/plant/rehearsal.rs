@@ -13,7 +13,8 @@ use crate::world::tissue::{Attachment, Reductions, TissuePlant, TissueResponse a
 
 /// Steps that are timed.
 const STEPS: usize = 101;
-/// Part of the period that the median step may take: the rest is for samples, the machine, and slower steps.
+/// Part of the period that a step may take on average: the rest is for samples and the machine. The average and not the
+/// median: some steps take a new factor, and a step that takes ten times as long as the others makes the loop late too.
 const PART_OF_PERIOD: f64 = 0.8;
 /// Sideways motion of the paddle per motion of the needle: steps as large as those of a run.
 const PADDLE_PER_DEPTH: f64 = 0.1;
@@ -21,7 +22,7 @@ const PADDLE_PER_DEPTH: f64 = 0.1;
 /// What a step takes, against the period.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rehearsal {
-    /// Median of a step, µs.
+    /// Mean of a step, µs.
     pub step_us: f64,
     /// Period of the loop, µs.
     pub period_us: f64,
@@ -54,6 +55,7 @@ pub fn world_in_time<'m>(
     let at_rest =
         |simulation: &Simulation| World::sharing(model, paddle_index, Attachment::moved, simulation, reductions);
     let mut world = at_rest(simulation)?;
+    world.tissue.solve_every_step()?;
     let full = rehearse(&mut world.tissue, simulation)?;
     if full.keeps_the_period() {
         return Ok(world);
@@ -79,7 +81,7 @@ pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result
     let trajectory = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
     let period_us = simulation.loop_settings.period_ns() as f64 * 1e-3;
     let middle_s = 0.5 * simulation.insertion_s;
-    let mut times_us = Vec::with_capacity(STEPS);
+    let mut total_us = 0.0;
     tissue.aside(|tissue| {
         for step in 0..=STEPS {
             let depth = trajectory.at(middle_s + step as f64 * period_us * 1e-6).depth;
@@ -87,13 +89,12 @@ pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result
             tissue.step(depth, Vector2::new(0.0, PADDLE_PER_DEPTH * (depth - trajectory.at(middle_s).depth)))?;
             // The first one comes from rest.
             if step > 0 {
-                times_us.push(before.elapsed().as_secs_f64() * 1e6);
+                total_us += before.elapsed().as_secs_f64() * 1e6;
             }
         }
         Ok(())
     })?;
-    times_us.sort_by(f64::total_cmp);
-    Ok(Rehearsal { step_us: times_us[STEPS / 2], period_us })
+    Ok(Rehearsal { step_us: total_us / STEPS as f64, period_us })
 }
 
 #[cfg(test)]
@@ -102,6 +103,7 @@ mod tests {
 
     use super::*;
     use crate::world::loop_settings::LoopSettings;
+    use crate::world::tissue::PlantAccount;
 
     #[test]
     fn the_rule_of_the_period() {
@@ -126,8 +128,7 @@ mod tests {
             assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
         }
         let mut world = world_in_time(&model, Some(2), &at(0.02, None), &Reductions::default()).unwrap();
-        let fresh = World::new(&model, Some(2), &at(0.02, None)).unwrap().plant_account();
-        assert_eq!(world.plant_account(), fresh, "a rehearsal leaves no trace");
+        assert_eq!(world.plant_account(), PlantAccount::default(), "a rehearsal leaves no trace");
         assert!(world.advance(0, 0).unwrap().target.iter().all(|x| x.abs() < 1e-9), "at rest again");
     }
 }

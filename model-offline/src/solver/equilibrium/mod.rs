@@ -21,7 +21,9 @@ use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::mechanics::Tissue;
-use crate::mechanics::assembly::{self, AssemblyState, BlockPositions, Inverted};
+use crate::mechanics::assembly::{self, AssemblyState, Inverted};
+use crate::mechanics::blocks::BlockPositions;
+use crate::mechanics::stabilisation::Stabilisation;
 use crate::mechanics::{Constraints, WeaklyImposed};
 use std::sync::Arc;
 
@@ -43,6 +45,7 @@ pub struct DiscreteBody<'a, const D: usize> {
 pub struct Equilibrium<const D: usize> {
     rule: Arc<Quadrature<D>>,
     tissue: Tissue,
+    stabilisation: Stabilisation,
     blocks: Arc<BlockPositions>,
     solver: ConstrainedSolver<D>,
     weak: Option<Arc<dyn WeaklyImposed>>,
@@ -121,6 +124,7 @@ impl<const D: usize> Equilibrium<D> {
             state: AssemblyState::default(),
         };
         let mut body = Self {
+            stabilisation: analysis.stabilisation(&rule, &tissue),
             rule,
             tissue,
             blocks: Arc::clone(&analysis.blocks),
@@ -247,22 +251,32 @@ impl<const D: usize> Equilibrium<D> {
         Ok(())
     }
 
-    /// Response of the coefficients to unit rates of the prescribed values at the current state: solves
-    /// `K x + Λᵀ μ = 0, Λ x = rates`. This is the exact linearisation of the equilibrium.
+    /// Responses of the coefficients to rates of the prescribed values at the current state, one after the other for as
+    /// many rates as `rates` holds one after the other: solves `K x + Λᵀ μ = 0, Λ x = rate`. This is the exact
+    /// linearisation of the equilibrium; all rates pass through the factor together.
     ///
     /// # Errors
     /// [`Failure`] when the tangent at the current state is not positive definite.
-    pub fn sensitivity(&mut self, rates: &[f64]) -> Result<Vec<f64>, Failure> {
+    ///
+    /// # Panics
+    /// When `rates` is no whole number of rates.
+    pub fn sensitivities(&mut self, rates: &[f64]) -> Result<Vec<f64>, Failure> {
         if !self.factor_is_current && !self.refactorise() {
             return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
         }
-        let n = self.at.coefficients.len();
-        let (strong, weak) = rates.split_at(self.at.multipliers.len());
-        let (mut x, mut mu, mut rhs) = (vec![0.0; n], vec![0.0; strong.len()], vec![0.0; n]);
-        if let Some(imposed) = &self.weak {
-            imposed.add_response(&self.tissue, &self.at.coefficients, weak, &mut rhs);
+        let (unknowns, rows, length) = (self.at.force.len(), self.at.multipliers.len(), self.at.prescribed.len());
+        assert!(length > 0 && rates.len().is_multiple_of(length), "a whole number of rates");
+        let columns = rates.len() / length;
+        let (mut rhs, mut strong) = (vec![0.0; columns * unknowns], Vec::with_capacity(columns * rows));
+        for (rate, rhs) in rates.chunks_exact(length).zip(rhs.chunks_exact_mut(unknowns)) {
+            let (met, weakly) = rate.split_at(rows);
+            strong.extend_from_slice(met);
+            if let Some(imposed) = &self.weak {
+                imposed.add_response(&self.tissue, &self.at.coefficients, weakly, rhs);
+            }
         }
-        self.solver.solve(&rhs, strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
+        let (mut x, mut mu) = (vec![0.0; columns * unknowns], vec![0.0; columns * rows]);
+        self.solver.solve(&rhs, &strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
         Ok(x)
     }
 
@@ -273,7 +287,8 @@ impl<const D: usize> Equilibrium<D> {
     /// Potential energy and its gradient at the current coefficients.
     fn evaluate(&mut self) -> Result<(), Inverted> {
         let at = &mut self.at;
-        at.energy = assembly::internal_force(&self.rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
+        let rule = (&*self.rule, &self.stabilisation);
+        at.energy = assembly::internal_force(rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
         if let Some(weak) = &self.weak {
             let values = &at.prescribed[at.multipliers.len()..];
             at.energy += weak.add_force(&self.tissue, &at.coefficients, values, &mut at.force);
@@ -287,7 +302,8 @@ impl<const D: usize> Equilibrium<D> {
 
     /// Assembles the tangent at the current state.
     fn assemble(&mut self) {
-        let (rule, tissue, at, blocks, weak) = (&self.rule, &self.tissue, &self.at, &self.blocks, &self.weak);
+        let rule = (&*self.rule, &self.stabilisation);
+        let (tissue, at, blocks, weak) = (&self.tissue, &self.at, &self.blocks, &self.weak);
         self.solver.assemble(|pattern, values| {
             assembly::tangent(rule, tissue, &at.state, blocks, values);
             if let Some(weak) = weak {
