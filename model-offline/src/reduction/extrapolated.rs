@@ -54,6 +54,7 @@ pub struct Extrapolated<'m> {
 #[derive(Debug, Clone)]
 struct Known {
     at: Vector3<f64>,
+    coefficients: Vec<f64>,
     target: Vector2<f64>,
     /// d(target)/d(depth, paddle x, paddle y).
     slope: Matrix2x3<f64>,
@@ -97,12 +98,17 @@ impl<'m> Extrapolated<'m> {
 
     fn solve(&mut self, distance: f64) -> Result<(), Failure> {
         let foretold = self.target_displacement();
-        let driven = self.body.drive(self.at.x, self.at.yz()).and_then(|()| Known::of(self.model, &mut self.body));
-        let known = match driven {
-            Ok(known) => known,
-            Err(failure) => {
-                self.at = place(&self.body);
+        let driven = self.body.drive(self.at.x, self.at.yz());
+        let known = Known::of(self.model, &mut self.body);
+        let known = match (driven, known) {
+            (Ok(()), Ok(known)) => known,
+            (Err(failure), Ok(reached)) => {
+                (self.at, self.known) = (reached.at, reached);
                 return Err(failure);
+            }
+            (driven, Err(unstable)) => {
+                self.at = self.known.at;
+                return Err(driven.err().unwrap_or(unstable));
             }
         };
         let error = (foretold - known.target).norm();
@@ -133,7 +139,7 @@ impl<'m> Extrapolated<'m> {
 
     /// Nodal coefficients, to first order from the last solve: good for a picture.
     pub fn coefficients(&self) -> Vec<f64> {
-        let mut out = self.body.equilibrium().coefficients().to_vec();
+        let mut out = self.known.coefficients.clone();
         let step = self.at - self.known.at;
         for (response, by) in self.known.responses.chunks_exact(out.len()).zip(step.iter()) {
             out.iter_mut().zip(response).for_each(|(d, r)| *d += by * r);
@@ -155,12 +161,10 @@ impl Known {
         for (column, response) in responses.chunks_exact(model.dofs()).enumerate() {
             slope.set_column(column, &model.target_row().interpolate(response));
         }
-        Ok(Self { at: place(body), target: body.target_displacement(), slope, responses })
+        let at = Vector3::new(body.depth(), body.paddle().x, body.paddle().y);
+        let coefficients = body.equilibrium().coefficients().to_vec();
+        Ok(Self { at, coefficients, target: body.target_displacement(), slope, responses })
     }
-}
-
-fn place(body: &Body<'_>) -> Vector3<f64> {
-    Vector3::new(body.depth(), body.paddle().x, body.paddle().y)
 }
 
 /// Second derivatives that explain how the first have changed over `step`, and are else as close to the old ones as
@@ -248,6 +252,13 @@ mod tests {
 
             let far = body.drive(50.0 * depth, place).unwrap_err();
             assert!(far.reached < 1.0 && body.depth() < 50.0 * depth, "{far}");
+            let (depth_reached, place_reached) = (body.at.x, body.at.yz());
+            let mut there = model.body(Some(1), NewtonSettings::default()).unwrap();
+            there.drive(depth_reached, place_reached).unwrap();
+            assert!(off(&body, &there) < 1e-6, "{} after {far}", off(&body, &there));
+            let pictured = body.coefficients();
+            let furthest = pictured.iter().zip(there.equilibrium().coefficients()).map(|(a, b)| (a - b).abs());
+            assert!(furthest.fold(0.0, f64::max) < 1e-5 * depth);
             // It is still there, and goes on from where it got to.
             body.drive(0.5 * depth, place).unwrap();
             exact.drive(0.5 * depth, place).unwrap();
