@@ -2,8 +2,8 @@
 //! condensed linear one.
 //!
 //! Where time is simulated, the full model is solved as often as an error of [`EXTRAPOLATION`] asks, and extrapolated
-//! between; a loop that the machine's clock drives solves at every tick, because a solve must never take longer than
-//! the last.
+//! between; a loop that the machine's clock drives solves at every tick, because it has no time for one tick's solve
+//! after many without.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -20,8 +20,8 @@ use serde::{Deserialize, Serialize};
 
 use super::error::WorldError;
 
-/// Error of an extrapolated target displacement, over the depth that the scene inserts to: a thousandth of the noise
-/// that the target is seen with.
+/// Error of an extrapolated target displacement that is aimed at, over the depth that the scene inserts to: a thousandth of
+/// the noise that the target is seen with.
 pub const EXTRAPOLATION: f64 = 1e-7;
 
 /// Which model is asked for.
@@ -233,7 +233,7 @@ impl<'m> TissuePlant<'m> {
         Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account }
     }
 
-    /// Solves the full model at every step from now on, where it answers: no step then takes much longer than another.
+    /// Solves the full model at every step from now on, where it answers.
     ///
     /// # Errors
     /// [`WorldError::Tissue`].

@@ -2,7 +2,7 @@
 //!
 //! With F_q = I + Σ_I d_I ⊗ g_I(q): internal force `f_I = Σ_q w_q P(F_q) g_I` and tangent stiffness
 //! `(K_IJ)_ik = Σ_q w_q g_I,j A_ijkl(F_q) g_J,l`, total Lagrangian throughout; rules with a constant
-//! [`stabilisation`] add theirs.
+//! [`Stabilisation`] add theirs.
 
 use super::blocks::BlockPositions;
 use super::stabilisation::Stabilisation;

@@ -9,7 +9,9 @@
 //!
 //! with second derivatives H that learn from the change of A between solves (Powell's symmetric form of Broyden's update:
 //! Powell, in Nonlinear Programming, Academic Press 1970). The next solve shows how far off that was, which sets the
-//! distance to the one after: the error is measured where it is largest, not estimated. (Keeping exact states with their
+//! distance to the one after. On the way that the body has come the error grows up to the next solve, so that what is
+//! measured there is the largest. Aside of that way H is not known: a body that turns aside by less than the distance to
+//! the next solve, and stays or comes back, is off by more than anything shows. (Keeping exact states with their
 //! derivatives, and answering from them within a controlled error, is the idea of in situ adaptive tabulation: Pope,
 //! Combustion Theory and Modelling 1, 1997.)
 
@@ -19,7 +21,7 @@ use nalgebra::{Matrix2x3, Matrix3, Vector2, Vector3};
 
 /// First distance between solves, over the depth that the scene inserts to: nothing is known of the error yet.
 const FIRST: f64 = 1e-3;
-/// Longest distance between solves, over that depth: a body that loses its stability is found out no later.
+/// Longest distance between solves, over that depth: a body that loses its stability for good is found out no later.
 const LONGEST: f64 = 0.03;
 /// Each distance is no longer than this times the last.
 const GROWTH: f64 = 1.5;
@@ -67,14 +69,14 @@ struct Known {
 pub struct Extrapolation {
     /// States that were solved for.
     pub solves: u64,
-    /// Largest distance between an extrapolated target displacement and the one solved for in its place, length: where
-    /// the next solve was due, that is where extrapolation had gone furthest.
+    /// Largest distance between an extrapolated target displacement and the one solved for in its place, length. States
+    /// aside of the way between two solves may be further off.
     pub largest_error: f64,
 }
 
 impl<'m> Extrapolated<'m> {
-    /// A body at rest with the paddle at this place of the scene's list attached, or none; target displacements may be
-    /// off by `tolerance` (length).
+    /// A body at rest with the paddle at this place of the scene's list attached, or none; an error of `tolerance` (length)
+    /// of the target displacement is aimed at.
     ///
     /// # Errors
     /// [`Failure`] when the tangent at rest is singular.
