@@ -4,6 +4,8 @@
 const DIGITS: i32 = 4;
 /// More decimals than this are zeros before the first digit of something that is zero but for rounding.
 const MOST: i32 = 12;
+/// Numbers this much smaller than the largest of their column are zero but for rounding.
+const ROUNDING: f64 = 1e-9;
 
 /// Decimals that show four digits of a number of this size, and no fewer than `least`: a scene in metres needs more of
 /// them than one in millimetres.
@@ -14,6 +16,14 @@ pub fn decimals(size: f64, least: usize) -> usize {
     }
     // At most 12: no loss.
     least.max((DIGITS - 1 - size.log10().floor() as i32).clamp(0, MOST) as usize)
+}
+
+/// The smallest size among numbers of one column, whose digits are shown of all of them; what is zero but for rounding
+/// does not count.
+pub fn smallest_told(column: impl Iterator<Item = f64>) -> f64 {
+    let sizes: Vec<f64> = column.map(f64::abs).filter(|size| size.is_finite()).collect();
+    let rounding = ROUNDING * sizes.iter().copied().fold(0.0, f64::max);
+    sizes.into_iter().filter(|size| *size > rounding).min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
 /// A length with four digits or more.
@@ -36,5 +46,14 @@ mod tests {
         assert_eq!(decimals(3.1e-6, 6), 9);
         assert_eq!(decimals(1e-300, 6), 12);
         assert_eq!(decimals(f64::NAN, 6), 6);
+    }
+
+    #[test]
+    fn a_zero_does_not_decide_for_its_column() {
+        let smallest = |column: &[f64]| smallest_told(column.iter().copied());
+        assert_eq!(smallest(&[0.0, 3.0, -0.2, f64::INFINITY, 1e-17]), 0.2);
+        assert_eq!(smallest(&[0.0, 0.0]), 0.0);
+        assert_eq!(smallest(&[]), 0.0);
+        assert_eq!(smallest(&[2e-12, 5e-13]), 5e-13);
     }
 }

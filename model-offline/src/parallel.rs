@@ -9,15 +9,18 @@ use rayon::iter::{IndexedParallelIterator as _, IntoParallelIterator as _, Paral
 /// assert_eq!(model_offline::parallel::map(4, 2, |i| i * i), [0, 1, 4, 9]);
 /// ```
 pub fn map<T: Send>(count: usize, threads: usize, work: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-    let in_order = || (0..count).map(&work).collect();
-    if threads.min(count) <= 1 {
-        return in_order();
-    }
-    match rayon::ThreadPoolBuilder::new().num_threads(threads.min(count)).build() {
+    map_each((0..count).collect(), threads, work)
+}
+
+/// The same for things that the work takes and keeps.
+pub fn map_each<I: Send, T: Send>(things: Vec<I>, threads: usize, work: impl Fn(I) -> T + Sync + Send) -> Vec<T> {
+    let threads = threads.min(things.len());
+    // Where no threads are to be had, the result is the same without.
+    let pool = if threads > 1 { rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok() } else { None };
+    match pool {
         // One by one: pieces of work differ in size.
-        Ok(pool) => pool.install(|| (0..count).into_par_iter().with_max_len(1).map(&work).collect()),
-        // No threads to be had: the result is the same without.
-        Err(_) => in_order(),
+        Some(pool) => pool.install(|| things.into_par_iter().with_max_len(1).map(&work).collect()),
+        None => things.into_iter().map(work).collect(),
     }
 }
 

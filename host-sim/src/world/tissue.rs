@@ -64,7 +64,7 @@ pub struct PlantAccount {
     /// States that the full model was solved for, where it was extrapolated between.
     #[serde(default)]
     pub solves: Option<u64>,
-    /// Largest distance of an extrapolated target displacement from the one solved for in its place, length.
+    /// Largest error of an extrapolated target displacement that solving found, the end of the run included, length.
     #[serde(default)]
     pub extrapolation_error: Option<f64>,
     /// Distance from the full model's target displacement at the end of the run, length; computed after it.
@@ -202,7 +202,7 @@ impl<'m> TissuePlant<'m> {
             (WantedPlant::Auto, Some(fit)) => fit.plant,
         };
         let kind = match wanted {
-            PlantModel::Full => extrapolated(model, paddle)?,
+            PlantModel::Full => in_simulated_time(model, paddle)?,
             PlantModel::Condensed => {
                 account.model = PlantModel::Condensed;
                 let condensed = Condensed::new(model, paddle).map_err(WorldError::Condensation)?;
@@ -217,7 +217,7 @@ impl<'m> TissuePlant<'m> {
                 }
                 Err(error) if choice == WantedPlant::Auto => {
                     account.first_fallback = Some(error.to_string());
-                    extrapolated(model, paddle)?
+                    in_simulated_time(model, paddle)?
                 }
                 Err(error) => return Err(WorldError::Training(error)),
             },
@@ -249,7 +249,8 @@ impl<'m> TissuePlant<'m> {
         self.account.full_step_us = Some(full_step_us);
     }
 
-    /// Does something with the tissue that is no part of the run: its account is as before, and it is at rest.
+    /// Does something with the tissue that is no part of the run: it is at rest afterwards, and its account is as before,
+    /// but for the solves of a full model that is extrapolated.
     ///
     /// # Errors
     /// [`WorldError::Tissue`].
@@ -297,10 +298,13 @@ impl<'m> TissuePlant<'m> {
             .collect()
     }
 
-    /// The account, with the distance from the full model at the present state.
+    /// The account, with the distance from the full model at the present state. A full model that was extrapolated to
+    /// there is solved for it: it is the state of a picture, too.
     pub fn account(&mut self) -> PlantAccount {
         let mut account = self.account.clone();
-        if let Kind::Extrapolated(body) = &self.kind {
+        if let Kind::Extrapolated(body) = &mut self.kind {
+            // Where there is no equilibrium any more the next step says so.
+            let _ = body.settle();
             account.solves = Some(body.account().solves);
             account.extrapolation_error = Some(body.account().largest_error);
         } else if !matches!(self.kind, Kind::Full(_)) {
@@ -360,7 +364,11 @@ fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, Wor
         .map_err(|source| WorldError::Tissue { depth: 0.0, source })
 }
 
-fn extrapolated<'m>(model: &'m TissueModel, paddle: Option<usize>) -> Result<Kind<'m>, WorldError> {
+/// The full model for a loop without a clock: extrapolated between solves, unless its states depend on those before.
+fn in_simulated_time<'m>(model: &'m TissueModel, paddle: Option<usize>) -> Result<Kind<'m>, WorldError> {
+    if model.is_held_weakly() {
+        return full(model, paddle).map(Kind::Full);
+    }
     let tolerance = EXTRAPOLATION * model.scene().needle.depth;
     let body = Extrapolated::at_rest(model, paddle, tolerance);
     body.map(|body| Kind::Extrapolated(Box::new(body))).map_err(|source| WorldError::Tissue { depth: 0.0, source })

@@ -1,7 +1,7 @@
 //! A placement study as text: a row per paddle and one without, with the error of every number beside it.
 
 use model_offline::model::ModelError;
-use model_offline::number::{decimals, length};
+use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};
 use model_offline::placement::study::{Optimum, StaticStudy};
 use model_offline::placement::workflow::StudyAccuracy;
@@ -27,8 +27,8 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
         1e3 * study.wall_s
     );
     let studies = study.placement.paddles.iter().map(|paddle| &paddle.static_study);
-    let smallest = studies.chain([&study.placement.no_paddle.static_study]).map(|study| study.max_orthogonal);
-    let digits = decimals(smallest.fold(f64::INFINITY, f64::min), 6);
+    let largest = studies.chain([&study.placement.no_paddle.static_study]).map(|study| study.max_orthogonal);
+    let digits = decimals(smallest_told(largest), 6);
     for (i, paddle) in study.placement.paddles.iter().enumerate() {
         let errors = known.map(|known| &known.errors.paddles[i]);
         let _ = writeln!(out, "{}", paddle_row(paddle, errors, optimum, digits));

@@ -180,7 +180,11 @@ impl Pattern {
 
     /// Adds `S x` to `out` for the symmetric matrix whose blocks are these multiples of the identity, one for each stored
     /// block; returns `xᵀ S x`.
+    ///
+    /// # Panics
+    /// When D is not the pattern's dimension.
     pub(crate) fn add_scalar_product<const D: usize>(&self, weights: &[f64], x: &[f64], out: &mut [f64]) -> f64 {
+        assert_eq!(D, self.dimension, "blocks of the pattern's own size");
         let mut product = 0.0;
         for j in 0..self.blocks() {
             let range = self.block_starts[j] as usize..self.block_starts[j + 1] as usize;

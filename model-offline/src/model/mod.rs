@@ -1,9 +1,11 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
+mod derivatives;
 mod error;
 mod graded;
 mod tissue;
 
+pub use derivatives::Derivatives;
 pub use error::{BoundaryPart, ModelError, ModelFailure};
 pub use graded::graded_model;
 
@@ -225,6 +227,12 @@ impl TissueModel {
         self.scene.paddles.iter().position(|p| p.index == index)
     }
 
+    /// Whether Nitsche's method imposes the prescribed values: with a penalty that only grows, so that a state depends on
+    /// those before.
+    pub fn is_held_weakly(&self) -> bool {
+        matches!(self.essential, EssentialBoundary::Points(_))
+    }
+
     /// Rows of the constrained nodes when a paddle is attached; none where Nitsche's method imposes the values.
     pub(crate) fn constrained_rows(&self, paddle: Option<usize>) -> Option<ConstrainedRows> {
         match &self.essential {
@@ -366,21 +374,6 @@ impl Body<'_> {
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector2<f64> {
         self.model.target.interpolate(self.equilibrium.coefficients())
-    }
-
-    /// Coefficients' responses to unit rates of the depth, then of the paddle's displacement x and y where one is
-    /// attached, one after the other: the exact linearisation of the present state.
-    ///
-    /// # Errors
-    /// [`Failure`] when the current state is not stable.
-    pub fn responses(&mut self) -> Result<Vec<f64>, Failure> {
-        let mut rates = self.model.prescribed_values(self.attached, 1.0, Vector2::zeros());
-        if self.attached.is_some() {
-            for axis in 0..2 {
-                rates.extend(self.model.prescribed_values(self.attached, 0.0, Vector2::ith(axis, 1.0)));
-            }
-        }
-        self.equilibrium.sensitivities(&rates)
     }
 
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle still, by exact linearisation.

@@ -7,8 +7,8 @@ use std::collections::HashMap;
 /// Columns that were tried and would have got a negative weight are skipped until another one has changed the set.
 const FEASIBLE: f64 = 1e-12;
 
-/// Columns `A` that are to be added up to `b`, with what is known of their products: every column's with one that was
-/// ever taken. One product with all columns is a pass over the whole matrix, which is what a fit would else cost at every
+/// Columns `A` that are to be added up to `b`, with what is known of their products: every column's with those
+/// that were taken. One product with all columns is a pass over the whole matrix, which is what a fit would else cost at every
 /// step.
 #[derive(Debug)]
 pub(super) struct Columns {
@@ -17,7 +17,7 @@ pub(super) struct Columns {
     /// Aᵀ b.
     with_b: DVector<f64>,
     norms: Vec<f64>,
-    /// Aᵀ a for columns a.
+    /// Aᵀ a for columns a that were taken.
     known: HashMap<usize, DVector<f64>>,
 }
 
@@ -90,10 +90,14 @@ impl<'a> NonNegativeFit<'a> {
             self.enter(entering);
             self.settle();
             self.update_residual();
-            if self.active.contains(&entering) && self.residual.norm() < before {
+            let taken = self.active.contains(&entering);
+            if taken && self.residual.norm() < before {
                 self.refused.fill(false);
             } else {
                 self.refused[entering] = true;
+            }
+            if !taken {
+                self.of.known.remove(&entering);
             }
         }
     }

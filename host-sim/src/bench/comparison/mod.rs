@@ -2,6 +2,7 @@
 
 mod cases;
 mod encoded_table;
+mod lockstep;
 mod progress;
 
 use std::path::PathBuf;
@@ -192,8 +193,12 @@ impl<'p> Comparison<'p> {
     pub fn run(&self, spectator: Option<&dyn Spectator>) -> Result<Compared, SimError> {
         let mut artifacts = Vec::new();
         let mut results = Vec::new();
-        for ((case, uncontrolled), table) in self.cases.iter().zip(self.uncontrolled()?).zip(&self.tables) {
-            let (strategies, files) = self.strategies(case, uncontrolled, table, spectator)?;
+        let uncontrolled = self.uncontrolled()?;
+        let in_lockstep = self.in_lockstep(spectator)?;
+        for (i, ((none, static_paddle), dynamic)) in uncontrolled.into_iter().zip(in_lockstep).enumerate() {
+            let (case, table) = (&self.cases[i], &self.tables[i]);
+            let known = [none, static_paddle, dynamic];
+            let (strategies, files) = self.strategies(case, known, table, spectator)?;
             artifacts.extend(files);
             results.push(self.case_result(case, table, strategies)?);
         }
@@ -323,11 +328,11 @@ impl<'p> Comparison<'p> {
         }
     }
 
-    /// Everything about one case.
+    /// Everything about one case; what runs without a clock is known.
     fn strategies(
         &self,
         case: &Case,
-        (none, static_paddle): Uncontrolled,
+        [none, static_paddle, dynamic]: [Option<MeasuredInsertion>; 3],
         table: &EncodedTable,
         spectator: Option<&dyn Spectator>,
     ) -> Result<(Strategies, Vec<Artifact>), SimError> {
@@ -339,39 +344,37 @@ impl<'p> Comparison<'p> {
         let mut strategies = Strategies {
             none: none.map(&mut keep),
             static_paddle: static_paddle.map(&mut keep),
-            ..Strategies::default()
+            dynamic: dynamic.map(&mut keep),
+            dynamic_free_run: None,
         };
-        if self.options.mode != Some(RunMode::FreeRun) {
-            strategies.dynamic = Some(keep(self.dynamic(case, table, RunMode::Lockstep, spectator)?));
-        }
         let free_run = match self.options.mode {
             None => !case.is_mismatch && self.options.hardware == Hardware::Native,
             Some(mode) => mode == RunMode::FreeRun,
         };
         if free_run {
-            strategies.dynamic_free_run = Some(keep(self.dynamic(case, table, RunMode::FreeRun, spectator)?));
+            self.progress.say(&format!("{}: dynamic, {}", case.tissue, RunMode::FreeRun));
+            let step = || self.progress.step();
+            let insertion = self.insertion(case, case.label(Strategy::dynamic(RunMode::FreeRun)), &step);
+            let controlled = insertion.controlled(&self.controller(table, RunMode::FreeRun, spectator))?;
+            strategies.dynamic_free_run = Some(keep(controlled));
         }
         Ok((strategies, artifacts))
     }
 
-    fn dynamic(
-        &self,
-        case: &Case,
-        table: &EncodedTable,
+    fn controller<'a>(
+        &'a self,
+        table: &'a EncodedTable,
         mode: RunMode,
-        spectator: Option<&dyn Spectator>,
-    ) -> Result<MeasuredInsertion, SimError> {
-        let label = case.label(Strategy::dynamic(mode));
-        self.progress.say(&format!("{}: dynamic, {mode}", case.tissue));
-        let controller = ControllerSetup {
+        spectator: Option<&'a dyn Spectator>,
+    ) -> ControllerSetup<'a> {
+        ControllerSetup {
             program: &self.options.program,
             table: &table.table,
             table_bytes: &table.bytes,
             mode,
             hardware: self.options.hardware,
             spectator,
-        };
-        self.insertion(case, label, &|| self.progress.step()).controlled(&controller)
+        }
     }
 
     fn case_result(&self, case: &Case, encoded: &EncodedTable, strategies: Strategies) -> Result<CaseResult, SimError> {

@@ -160,7 +160,7 @@ impl std::fmt::Debug for SimulatedInsertion<'_> {
 }
 
 /// A controlled insertion that is over.
-struct FinishedInsertion<'m> {
+pub(super) struct FinishedInsertion<'m> {
     plant: PlantLoop<'m>,
     accounts: ControllerAccounts,
     ticks: Vec<ControllerTick>,
@@ -211,14 +211,37 @@ impl<'a> SimulatedInsertion<'a> {
     /// # Errors
     /// [`SimError`].
     pub fn controlled(&self, controller: &ControllerSetup<'_>) -> Result<MeasuredInsertion, SimError> {
-        let Self { model, simulation, label, .. } = *self;
         // Before there is anything to tidy up: a reduced model is trained here, which looks at no signal.
         let plant = signals::ends_at_once(|| self.plant(controller))?;
+        let finished = self.with_controller(controller, plant)?;
+        signals::ends_at_once(|| self.measured(controller, finished))
+    }
+
+    /// Runs the controller on the plant, in a space of their own that is tidied up whatever happens.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub(super) fn with_controller(
+        &self,
+        controller: &ControllerSetup<'_>,
+        plant: PlantLoop<'a>,
+    ) -> Result<FinishedInsertion<'a>, SimError> {
         let space = Space::unique()?;
         let outcome = self.in_space(controller, &space, plant);
         space.leave::<ipc::Service>(Departure::Last);
-        let mut run = outcome?;
+        outcome
+    }
 
+    /// What the insertion amounts to, with its files.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub(super) fn measured(
+        &self,
+        controller: &ControllerSetup<'_>,
+        mut run: FinishedInsertion<'a>,
+    ) -> Result<MeasuredInsertion, SimError> {
+        let Self { model, simulation, label, .. } = *self;
         let paddle = controller.table.paddle.index;
         let mut result = measure(model, &mut run.plant, controller.mode, Some(paddle), simulation.seed);
         let recording = self.recording(controller, &run);
@@ -278,7 +301,10 @@ impl<'a> SimulatedInsertion<'a> {
     }
 
     /// The simulated world before its first tick.
-    fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<'a>, SimError> {
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub(super) fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<'a>, SimError> {
         let Self { model, simulation, reductions, .. } = *self;
         let paddle = Some(controller.table.paddle.index);
         let own = Reductions::default();

@@ -68,24 +68,38 @@ fn sentence(run: &RunResult) -> String {
         })
         .collect();
     let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
-    let reduction = reduction(run, |case| case.improvement).map_or_else(String::new, |range| {
+    let reduction = reduction(run, |case| case.improvement).map_or_else(String::new, |change| {
         let none = reduction(run, |case| case.improvement_over_none)
-            .map_or_else(String::new, |range| format!(" and {range} times smaller than without a paddle"));
-        format!("; the dynamic paddle's largest error is {range} times smaller than the static one's{none}")
+            .map_or_else(String::new, |change| format!(" and {change} than without a paddle"));
+        format!("; the dynamic paddle's largest error is {change} than the static one's{none}")
     });
     let text = format!("{}{agreement}{reduction}.", placements.join("; "));
     text.replacen("tissue", "Tissue", 1)
 }
 
-/// How many times smaller the dynamic paddle's largest error is than another one, over all cases.
+/// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.
 fn reduction(run: &RunResult, factor: impl Fn(&CaseResult) -> Option<f64>) -> Option<String> {
     let factors: Vec<f64> = run.cases.iter().filter_map(factor).filter(|factor| factor.is_finite()).collect();
+    (!factors.is_empty()).then(|| change(&factors))
+}
+
+/// "2.5 to 40 times smaller", "3 times larger" for errors that are so many times smaller.
+fn change(factors: &[f64]) -> String {
+    // Small factors with a digit behind the point: "1 times smaller" says nothing.
+    let times = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
     let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let high = factors.iter().copied().fold(0.0, f64::max);
-    // Small factors with a digit behind the point: "1 times smaller" says nothing.
-    let factor = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
-    let range = if factor(low) == factor(high) { factor(low) } else { format!("{} to {}", factor(low), factor(high)) };
-    (!factors.is_empty()).then_some(range)
+    let range = |from: f64, to: f64| {
+        let (from, to) = (times(from), times(to));
+        if from == to { from } else { format!("{from} to {to}") }
+    };
+    if low >= 1.0 {
+        format!("{} times smaller", range(low, high))
+    } else if high < 1.0 {
+        format!("{} times larger", range(high.recip(), low.recip()))
+    } else {
+        format!("between {} times larger and {} times smaller", times(low.recip()), times(high))
+    }
 }
 
 fn head(run: &RunResult) -> Markup {
@@ -292,7 +306,7 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
     let reduction = reduction(run, |case| case.improvement).map_or_else(
         || "Error along the insertion".to_owned(),
-        |range| format!("The dynamic paddle's largest error is {range} times smaller than the static one's"),
+        |change| format!("The dynamic paddle's largest error is {change} than the static one's"),
     );
     let static_title = format!("Best static paddle: {}", best(run, |placement| placement.best_static.to_string()));
     let dynamic_title = format!("Best dynamic paddle: {}", best(run, PlacementResult::dynamic_name));

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use model_offline::number::decimals;
+use model_offline::number::{decimals, smallest_told};
 use model_offline::scene::PlantModel;
 
 use crate::bench::result::{CaseResult, RunResult, StrategyResult};
@@ -48,8 +48,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     )?;
     writeln!(text, "  {:<13} {:<13} {:>12} {:>16} {:>16}", "tissue", "table", "none", "static", "dynamic")?;
     let results = run.cases.iter().flat_map(|case| case.strategies.iter());
-    let smallest = results.map(|(_, result)| result.max_orthogonal_error).filter(|error| *error > 0.0);
-    let digits = decimals(smallest.fold(f64::INFINITY, f64::min), 6);
+    let digits = decimals(smallest_told(results.map(|(_, result)| result.max_orthogonal_error)), 6);
     for case in &run.cases {
         write_case(text, case, digits)?;
     }

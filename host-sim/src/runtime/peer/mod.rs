@@ -20,6 +20,8 @@ const POLLS_PER_LOOK: u32 = 512;
 /// Silence after which polling may be slow: the other side is busy, perhaps with a solve, and may need this processor.
 const NAP_AFTER: Duration = Duration::from_millis(2);
 const NAP: Duration = Duration::from_micros(100);
+/// Naps between two looks: every few ms.
+const NAPS_PER_LOOK: u32 = 32;
 
 /// Who the peer is, as far as its death can be noticed.
 #[derive(Debug)]
@@ -67,6 +69,7 @@ impl Peer {
 #[derive(Debug)]
 pub struct Patience {
     polls: u32,
+    naps: u32,
     since: Option<Instant>,
     timeout: Duration,
 }
@@ -74,7 +77,7 @@ pub struct Patience {
 impl Patience {
     /// Gives up after `timeout`.
     pub fn new(timeout: Duration) -> Self {
-        Self { polls: 0, since: None, timeout }
+        Self { polls: 0, naps: 0, since: None, timeout }
     }
 
     /// Nothing came at this poll. Looks at signals, the peer and the time now and then.
@@ -88,13 +91,16 @@ impl Patience {
             return Ok(());
         }
         let silent = self.since.get_or_insert_with(Instant::now).elapsed();
-        if silent > NAP_AFTER {
+        let look = if silent > NAP_AFTER {
             std::thread::sleep(NAP);
+            self.naps += 1;
+            self.naps.is_multiple_of(NAPS_PER_LOOK)
         } else {
             std::thread::yield_now();
-            if !self.polls.is_multiple_of(POLLS_PER_LOOK) {
-                return Ok(());
-            }
+            self.polls.is_multiple_of(POLLS_PER_LOOK)
+        };
+        if !look {
+            return Ok(());
         }
         signals::check()?;
         peer.check::<S>()?;

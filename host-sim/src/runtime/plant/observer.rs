@@ -18,7 +18,7 @@ pub struct Moment {
 }
 
 /// Looks on.
-pub trait Observer: std::fmt::Debug {
+pub trait Observer: std::fmt::Debug + Send {
     /// A moment that may be looked at; must not wait.
     fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment);
 

@@ -17,6 +17,7 @@ pub use settings::{Effort, Failure, FailureReason, LinearSolver, NewtonSettings}
 
 use self::newton::Attempt;
 use super::analysis::Analysis;
+use super::conjugate_gradients::dot;
 use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
@@ -261,13 +262,26 @@ impl<const D: usize> Equilibrium<D> {
     /// # Panics
     /// When `rates` is no whole number of rates.
     pub fn sensitivities(&mut self, rates: &[f64]) -> Result<Vec<f64>, Failure> {
+        self.linear_responses(rates, &[])
+    }
+
+    /// The same, and behind them the responses to loads (D numbers per node each) with the prescribed values held:
+    /// `K x + Λᵀ μ = load, Λ x = 0`.
+    ///
+    /// # Errors
+    /// [`Failure`] when the tangent at the current state is not positive definite.
+    ///
+    /// # Panics
+    /// When there is no whole number of rates or of loads.
+    pub(crate) fn linear_responses(&mut self, rates: &[f64], loads: &[f64]) -> Result<Vec<f64>, Failure> {
         if !self.factor_is_current && !self.refactorise() {
             return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
         }
         let (unknowns, rows, length) = (self.at.force.len(), self.at.multipliers.len(), self.at.prescribed.len());
-        assert!(length > 0 && rates.len().is_multiple_of(length), "a whole number of rates");
-        let columns = rates.len() / length;
-        let (mut rhs, mut strong) = (vec![0.0; columns * unknowns], Vec::with_capacity(columns * rows));
+        let whole = rates.len().is_multiple_of(length) && loads.len().is_multiple_of(unknowns);
+        assert!(length > 0 && whole, "a whole number of rates and loads");
+        let columns = rates.len() / length + loads.len() / unknowns;
+        let (mut rhs, mut strong) = (vec![0.0; rates.len() / length * unknowns], Vec::with_capacity(columns * rows));
         for (rate, rhs) in rates.chunks_exact(length).zip(rhs.chunks_exact_mut(unknowns)) {
             let (met, weakly) = rate.split_at(rows);
             strong.extend_from_slice(met);
@@ -275,9 +289,40 @@ impl<const D: usize> Equilibrium<D> {
                 imposed.add_response(&self.tissue, &self.at.coefficients, weakly, rhs);
             }
         }
+        rhs.extend_from_slice(loads);
+        strong.resize(columns * rows, 0.0);
         let (mut x, mut mu) = (vec![0.0; columns * unknowns], vec![0.0; columns * rows]);
         self.solver.solve(&rhs, &strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
         Ok(x)
+    }
+
+    /// How the internal force curves along a direction of the coefficients, by second differences over a way of `length`
+    /// along it: `[f(d + v) − 2 f(d) + f(d − v)] · w` for every w of `onto`, `v = length · direction`, over length². For bodies
+    /// whose prescribed values are imposed exactly.
+    ///
+    /// # Errors
+    /// [`Inverted`] when the body does not admit the way.
+    pub(crate) fn force_curvature(
+        &self,
+        direction: &[f64],
+        length: f64,
+        onto: &[&[f64]],
+    ) -> Result<Vec<f64>, Inverted> {
+        let mut sums = vec![0.0; onto.len()];
+        let (mut state, mut force) = (AssemblyState::default(), vec![0.0; direction.len()]);
+        for (sum, onto) in sums.iter_mut().zip(onto) {
+            *sum = -2.0 * (dot(&self.at.force, onto) + dot(&self.at.external, onto));
+        }
+        for step in [-length, length] {
+            let moved: Vec<f64> = self.at.coefficients.iter().zip(direction).map(|(d, v)| d + step * v).collect();
+            let rule = (&*self.rule, &self.stabilisation);
+            assembly::internal_force(rule, &self.tissue, &moved, &mut state, &mut force)?;
+            for (sum, onto) in sums.iter_mut().zip(onto) {
+                *sum += dot(&force, onto);
+            }
+        }
+        sums.iter_mut().for_each(|sum| *sum /= length * length);
+        Ok(sums)
     }
 
     fn failure(&self, reason: FailureReason, reached: f64, detail: String) -> Failure {
