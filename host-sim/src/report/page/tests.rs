@@ -331,6 +331,6 @@ fn a_paddle_that_makes_it_worse_is_said_to() {
     assert_eq!(change(&[277.3]), "277 times smaller");
     assert_eq!(change(&[2.5, 40.2]), "2.5 to 40 times smaller");
     assert_eq!(change(&[0.02]), "50 times larger");
-    assert_eq!(change(&[0.5, 0.02]), "2 to 50 times larger");
-    assert_eq!(change(&[0.5, 4.0]), "between 2 times larger and 4 times smaller");
+    assert_eq!(change(&[0.5, 0.02]), "2.0 to 50 times larger");
+    assert_eq!(change(&[0.5, 4.0]), "between 2.0 times larger and 4.0 times smaller");
 }
