@@ -16,7 +16,7 @@
 //! 5. [`solver`]: minimise the energy over the coefficients d subject to prescribed nodal values `Λ d = g`, by Newton's method
 //!    with line search and cutback; every way to fail is typed and keeps the last converged state.
 //! 6. [`scene`]: the scene file, validated, with errors that point at line and column. [`model`]: a scene turned into a
-//!    discrete body.
+//!    discrete body. [`needle`]: a needle that punctures, cuts and slips in it.
 //! 7. [`placement`]: actuation Jacobian J = d(target)/d(paddle) by exact linearisation, controllability measure ‖J⁻¹n‖,
 //!    static study, refinement to a tolerance. [`table`]: what the controller gets. [`reduction`]: what a simulator can
 //!    afford at every tick.
@@ -64,6 +64,8 @@ pub mod solver;
 pub mod scene;
 
 pub mod model;
+
+pub mod needle;
 
 pub mod placement;
 

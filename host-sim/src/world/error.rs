@@ -43,6 +43,9 @@ pub enum WorldError {
         /// Highest rate that this tissue keeps, Hz.
         rate_hz: f64,
     },
+    /// The scene asks for more than the simulated world has.
+    #[error(transparent)]
+    Scene(ModelError),
     /// The reduced model that was asked for cannot be trained.
     #[error("no reduced model of the tissue: {0}")]
     #[diagnostic(help("use --plant full, or --plant auto to have the full model where no reduced one can be made"))]

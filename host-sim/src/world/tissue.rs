@@ -177,7 +177,7 @@ impl<'m> TissuePlant<'m> {
     /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
     ///
     /// # Errors
-    /// [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
+    /// [`WorldError::Scene`] where the needle slips; [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
     /// the reduced model that was asked for cannot be made (with [`WantedPlant::Auto`] the full one answers, and the account says why).
     pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: WantedPlant) -> Result<Self, WorldError> {
         Self::sharing(model, Attachment::moved(paddle), choice, &Reductions::default())
@@ -193,6 +193,7 @@ impl<'m> TissuePlant<'m> {
         choice: WantedPlant,
         reductions: &Reductions,
     ) -> Result<Self, WorldError> {
+        model.needs_a_patch().map_err(WorldError::Scene)?;
         let paddle = attachment.paddle;
         let mut account = PlantAccount::default();
         let wanted = match (choice, model.scene().fit) {

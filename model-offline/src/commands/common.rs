@@ -4,6 +4,7 @@ use super::error::CliError;
 use clap::Args;
 use indicatif::ProgressBar;
 use model_offline::discretization::{Basis, Essential, Integration, Resolution};
+use model_offline::model::ModelError;
 use model_offline::output::terminal;
 use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
@@ -20,8 +21,14 @@ pub(super) struct SceneArgs {
 }
 
 impl SceneArgs {
-    /// The scene as its file has it.
+    /// The scene, whose needle may not slip.
     pub(super) fn read(&self) -> Result<Scene, CliError> {
+        let scene = self.read_any()?;
+        if scene.needle.shaft.is_some() { Err(ModelError::NeedleSlips.into()) } else { Ok(scene) }
+    }
+
+    /// The scene as its file has it.
+    pub(super) fn read_any(&self) -> Result<Scene, CliError> {
         let scene = Scene::read(&self.scene)?;
         Ok(if self.without_inclusion { scene.without_inclusions() } else { scene })
     }

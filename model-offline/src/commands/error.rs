@@ -2,6 +2,7 @@
 
 use super::json;
 use model_offline::model::ModelError;
+use model_offline::needle::NeedleError;
 use model_offline::output::{OutputError, OutputRefused};
 use model_offline::scene::{LimitError, Scene, SceneError};
 use model_offline::solver::equilibrium::Failure;
@@ -52,6 +53,10 @@ pub(crate) enum CliError {
         /// Depth of the last converged state.
         depth: f64,
     },
+    /// The needle cannot go on.
+    #[error(transparent)]
+    #[diagnostic(help("insert less deep or in more increments, or with less cutting force and friction"))]
+    Needle(#[from] NeedleError),
     /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -83,6 +88,7 @@ impl CliError {
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
             Self::Model(error) if error.is_usage() => 2,
             Self::Table(TableBuildError::Knots(_)) => 2,
+            Self::Needle(NeedleError::HeldWeakly) => 2,
             _ => 1,
         }
     }
@@ -91,6 +97,8 @@ impl CliError {
         match self {
             Self::Solve { failure, .. } => failure.reason.to_string(),
             Self::Model(error) => error.kind().to_string(),
+            Self::Needle(NeedleError::Equilibrium { source, .. }) => source.reason.to_string(),
+            Self::Needle(_) => "no-shaft-forces".into(),
             Self::Table(_) => "no-table".into(),
             Self::Output(_) => "not-written".into(),
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => "bad-input".into(),

@@ -4,12 +4,14 @@ use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::model::{Body, ModelError, TissueModel};
+use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
+use model_offline::number::length;
 use model_offline::output;
 use model_offline::output::check_outputs;
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
-use model_offline::solver::equilibrium::NewtonSettings;
-use nalgebra::Vector2;
+use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
+use nalgebra::{Matrix2, Vector2};
 use std::path::PathBuf;
 
 /// Options of `solve`.
@@ -17,14 +19,21 @@ use std::path::PathBuf;
 pub(super) struct SolveArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Index of the paddle that is attached.
+    /// Index of the paddle that is attached [default: none]
     #[arg(long)]
-    paddle: u32,
+    paddle: Option<u32>,
     /// Needle depth, length units.
     #[arg(long)]
     depth: f64,
     /// Paddle displacement, length units.
-    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 1, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        requires = "paddle",
+        value_name = "X,Y",
+        value_delimiter = ',',
+        num_args = 1,
+        allow_hyphen_values = true
+    )]
     paddle_displacement: Option<Vec<f64>>,
     /// Write the result as JSON.
     #[arg(long, value_name = "FILE")]
@@ -42,7 +51,7 @@ pub(super) struct SolveArgs {
 }
 
 pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
-    let scene = args.discretization.over(args.scene.read()?)?;
+    let scene = args.discretization.over(args.scene.read_any()?)?;
     let displacement = match args.paddle_displacement.as_deref() {
         None => Vector2::zeros(),
         Some([x, y]) if x.is_finite() && y.is_finite() => Vector2::new(*x, *y),
@@ -63,65 +72,163 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
 
 fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<(), CliError> {
     let (model, _) = discretise(scene)?;
-    let position = scene.paddle_position(args.paddle).map_err(ModelError::from)?;
-    let mut body = model.body(Some(position), NewtonSettings::default()).map_err(ModelError::from)?;
-    // In pieces of the scene's increment: the path matters near the limits of stability.
-    let pieces = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0);
-    for piece in 1..=pieces as u32 {
-        let share = f64::from(piece) / pieces;
-        if let Err(failure) = body.drive(args.depth * share, displacement * share) {
-            return Err(CliError::Solve { failure, depth: body.depth() });
+    let position = args.paddle.map(|index| scene.paddle_position(index)).transpose().map_err(ModelError::from)?;
+    // In pieces of the scene's increment: the path matters near the limits of stability, and to a needle that slips.
+    let increments = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
+    let way = Way { depth: args.depth, paddle: displacement, increments };
+    let mut solved = match scene.needle.shaft {
+        Some(_) => match insert(&model, position, way)? {
+            Inserted::Pushing(body) => Solved::Pushing(body),
+            Inserted::Within { needle, punctured_at } => Solved::Within(needle, punctured_at),
+        },
+        None => {
+            let mut body = model.body(position, NewtonSettings::default()).map_err(ModelError::from)?;
+            for increment in 1..=increments {
+                let share = f64::from(increment) / f64::from(increments);
+                if let Err(failure) = body.drive(args.depth * share, displacement * share) {
+                    return Err(CliError::Solve { failure, depth: body.depth() });
+                }
+            }
+            Solved::Pushing(Box::new(body))
         }
-    }
-    write(&model, &mut body, displacement, args)?;
+    };
+    write(&model, &mut solved, displacement, args)?;
     if !args.run.quiet {
-        let target = body.target_displacement();
-        println!(
-            "{} · {} tissue · paddle {} at ({}, {}) · depth {}\ntarget displacement ({:.8}, {:.8}), orthogonal {:.8}",
-            scene.name,
-            scene.tissue(),
-            args.paddle,
-            displacement.x,
-            displacement.y,
-            args.depth,
-            target.x,
-            target.y,
-            target.dot(&scene.needle.orthogonal())
-        );
+        print(scene, &solved, displacement, args);
     }
     Ok(())
+}
+
+/// What the needle has come to.
+enum Solved<'m> {
+    /// It pushes the contact.
+    Pushing(Box<Body<'m>>),
+    /// It is in, and punctured the skin at this depth.
+    Within(Box<SlippingNeedle<'m>>, f64),
+}
+
+impl Solved<'_> {
+    fn target_displacement(&self) -> Vector2<f64> {
+        match self {
+            Self::Pushing(body) => body.target_displacement(),
+            Self::Within(needle, _) => needle.target_displacement(),
+        }
+    }
+
+    fn coefficients(&self) -> &[f64] {
+        match self {
+            Self::Pushing(body) => body.equilibrium().coefficients(),
+            Self::Within(needle, _) => needle.equilibrium().coefficients(),
+        }
+    }
+
+    fn equilibrium(&self) -> &Equilibrium<2> {
+        match self {
+            Self::Pushing(body) => body.equilibrium(),
+            Self::Within(needle, _) => needle.equilibrium(),
+        }
+    }
+
+    fn jacobian(&mut self) -> Result<Matrix2<f64>, CliError> {
+        match self {
+            Self::Pushing(body) => {
+                body.actuation_jacobian().map_err(|failure| CliError::Solve { failure, depth: body.depth() })
+            }
+            Self::Within(needle, _) => Ok(needle.actuation_jacobian()?),
+        }
+    }
+
+    /// What is told of the needle.
+    fn needle(&self, scene: &Scene, depth: f64) -> serde_json::Value {
+        let tip = |at: Vector2<f64>| [at.x, at.y];
+        match self {
+            Self::Pushing(body) => {
+                let (entry, force) = (scene.needle.entry(), body.contact_force());
+                serde_json::json!({
+                    "base_force": force, "tip_force": force, "cut_length": 0.0, "punctured_at": null,
+                    "tip_position": tip(entry + scene.needle.axis * depth), "shaft": [], "energy": null,
+                    "depth_of_target": scene.needle.axis.dot(&(scene.target + self.target_displacement() - entry)),
+                })
+            }
+            Self::Within(needle, punctured_at) => serde_json::json!({
+                "base_force": needle.base_force(), "tip_force": needle.tip_force(), "cut_length": needle.cut_length(),
+                "punctured_at": punctured_at, "tip_position": tip(needle.tip_position()), "shaft": needle.stations(),
+                "energy": needle.energy(), "depth_of_target": needle.depth_of_target(),
+            }),
+        }
+    }
+}
+
+fn print(scene: &Scene, solved: &Solved<'_>, displacement: Vector2<f64>, args: &SolveArgs) {
+    let target = solved.target_displacement();
+    let paddle = match args.paddle {
+        Some(index) => format!("paddle {index} at ({}, {})", displacement.x, displacement.y),
+        None => "no paddle".to_owned(),
+    };
+    println!(
+        "{} · {} tissue · {paddle} · depth {}\ntarget displacement ({:.8}, {:.8}), orthogonal {:.8}, axial {:.8}",
+        scene.name,
+        scene.tissue(),
+        args.depth,
+        target.x,
+        target.y,
+        target.dot(&scene.needle.orthogonal()),
+        target.dot(&scene.needle.axis)
+    );
+    match solved {
+        Solved::Pushing(body) => println!("base force {:.6}", body.contact_force()),
+        Solved::Within(needle, punctured_at) => println!(
+            "punctured at depth {}; base force {:.6}, of it at the tip {:.6}; cut {}; the target is at depth {} now",
+            length(*punctured_at),
+            needle.base_force(),
+            needle.tip_force(),
+            length(needle.cut_length()),
+            length(needle.depth_of_target())
+        ),
+    }
 }
 
 /// Writes the files that are asked for.
 fn write(
     model: &TissueModel,
-    body: &mut Body<'_>,
+    solved: &mut Solved<'_>,
     displacement: Vector2<f64>,
     args: &SolveArgs,
 ) -> Result<(), CliError> {
     let scene = model.scene();
-    let target = body.target_displacement();
-    let jacobian = body.actuation_jacobian().map_err(|failure| CliError::Solve { failure, depth: body.depth() })?;
-    let nodal = model.nodal_displacements(body.equilibrium().coefficients()).map_err(ModelError::from)?;
+    let target = solved.target_displacement();
+    let jacobian = args.paddle.map(|_| solved.jacobian()).transpose()?;
+    let nodal = model.nodal_displacements(solved.coefficients()).map_err(ModelError::from)?;
     let point = |p: &Vector2<f64>| [p.x, p.y];
-    let document = serde_json::json!({
+    let mut document = serde_json::json!({
         "scene": scene.name, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
         "integration": scene.discretization.method.integration,
         "paddle": args.paddle, "depth": args.depth, "paddle_displacement": point(&displacement),
         "target_displacement": point(&target), "orthogonal": target.dot(&scene.needle.orthogonal()),
-        "jacobian": controllability::rows(&jacobian),
-        "strain_energy": body.equilibrium().energy(),
-        "newton_iterations": body.equilibrium().effort().iterations,
+        "axial": target.dot(&scene.needle.axis),
+        "jacobian": jacobian.as_ref().map(controllability::rows),
+        "strain_energy": solved.equilibrium().energy(),
+        "newton_iterations": solved.equilibrium().effort().iterations,
         "node_positions": model.positions().iter().map(point).collect::<Vec<_>>(),
         "node_displacements": nodal.iter().map(point).collect::<Vec<_>>(),
         "failure": null,
     });
+    if let (serde_json::Value::Object(needle), Some(document)) =
+        (solved.needle(scene, args.depth), document.as_object_mut())
+    {
+        document.extend(needle);
+    }
+    if let Solved::Within(needle, _) = solved {
+        document["strain_energy"] = needle.energy().stored.into();
+    }
     write_json(args.json.as_deref(), &document)?;
     if let Some(path) = &args.vtu {
-        output::write_whole(path, output::vtu::vtu(model, body).as_bytes())?;
+        output::write_whole(path, output::vtu::vtu(model, solved.coefficients()).as_bytes())?;
     }
     if let Some(path) = &args.svg {
-        output::write_whole(path, output::body::svg(model, body).as_bytes())?;
+        let within = matches!(solved, Solved::Within(..));
+        let state = output::body::State { coefficients: solved.coefficients(), depth: args.depth, within };
+        output::write_whole(path, output::body::svg(model, state).as_bytes())?;
     }
     Ok(())
 }

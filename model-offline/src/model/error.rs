@@ -70,6 +70,12 @@ pub enum ModelError {
         "this needs nodal values that are imposed exactly, and the scene imposes them weakly: use essential = \"transformation\""
     )]
     ImposedWeakly,
+    /// What is asked for is not known of a needle that slips.
+    #[error(
+        "this needle slips (mechanics = \"shaft\"), and placements, tables and simulations are of a contact that moves with the \
+         needle so far: use `model-offline solve`, or mechanics = \"patch\""
+    )]
+    NeedleSlips,
     /// A law that was changed on the way is none.
     #[error(transparent)]
     Material(#[from] MaterialError),
@@ -124,6 +130,7 @@ impl ModelError {
                 | Self::NoSuchPaddle(_)
                 | Self::NitscheInside
                 | Self::ImposedWeakly
+                | Self::NeedleSlips
                 | Self::Material(_)
         )
     }

@@ -91,6 +91,11 @@ impl<T> Groups<T> {
         self.immobile.iter().chain(&self.needle).chain(self.paddles.iter().flatten())
     }
 
+    /// The same of a body whose contact is free.
+    fn without_needle(&self, paddle: Option<usize>) -> impl Iterator<Item = &T> {
+        self.immobile.iter().chain(paddle.map_or(&[][..], |p| &self.paddles[p]))
+    }
+
     /// Two prescribed numbers per member, in the same order.
     fn values(&self, paddle: Option<usize>, needle_value: Vector2<f64>, paddle_value: Vector2<f64>) -> Vec<f64> {
         let repeat = |value: Vector2<f64>, count: usize| std::iter::repeat_n([value.x, value.y], count).flatten();
@@ -227,6 +232,14 @@ impl TissueModel {
         self.scene.paddles.iter().position(|p| p.index == index)
     }
 
+    /// Refuses a needle that slips, for what is of a contact that moves with the needle.
+    ///
+    /// # Errors
+    /// [`ModelError::NeedleSlips`].
+    pub fn needs_a_patch(&self) -> Result<(), ModelError> {
+        if self.scene.needle.shaft.is_some() { Err(ModelError::NeedleSlips) } else { Ok(()) }
+    }
+
     /// Whether Nitsche's method imposes the prescribed values: with a penalty that only grows, so that a state depends on
     /// those before.
     pub fn is_held_weakly(&self) -> bool {
@@ -237,6 +250,17 @@ impl TissueModel {
     pub(crate) fn constrained_rows(&self, paddle: Option<usize>) -> Option<ConstrainedRows> {
         match &self.essential {
             EssentialBoundary::Nodes(groups) => Some(ConstrainedRows::new(groups.with_paddle(paddle))),
+            EssentialBoundary::Points(_) => None,
+        }
+    }
+
+    /// What is constrained where the contact is free, and the number of rows of the immobile part, which come first; none
+    /// where Nitsche's method imposes the values.
+    pub(crate) fn rows_without_needle(&self, paddle: Option<usize>) -> Option<(ConstrainedRows, usize)> {
+        match &self.essential {
+            EssentialBoundary::Nodes(groups) => {
+                Some((ConstrainedRows::new(groups.without_needle(paddle)), groups.immobile.len()))
+            }
             EssentialBoundary::Points(_) => None,
         }
     }
@@ -374,6 +398,15 @@ impl Body<'_> {
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector2<f64> {
         self.model.target.interpolate(self.equilibrium.coefficients())
+    }
+
+    /// Force that pushes the contact along the needle's axis, where its values are imposed exactly.
+    pub fn contact_force(&self) -> f64 {
+        let EssentialBoundary::Nodes(groups) = &self.model.essential else { return f64::NAN };
+        let axis = self.model.scene.needle.axis;
+        let forces: Vec<f64> = self.equilibrium.reactions().collect();
+        let contact = forces.chunks_exact(2).skip(groups.immobile.len()).take(groups.needle.len());
+        contact.map(|force| force[0] * axis.x + force[1] * axis.y).sum()
     }
 
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle still, by exact linearisation.

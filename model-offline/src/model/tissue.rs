@@ -195,7 +195,7 @@ mod tests {
     fn inclusion(low: [f64; 2], high: [f64; 2], stiffness: f64) -> Inclusion {
         let corners = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]];
         let outline = Polygon::new(corners.map(Point2::from).to_vec()).unwrap();
-        Inclusion { outline, stiffness, material: None }
+        Inclusion { outline, stiffness, material: None, resistance: None }
     }
 
     fn factor(inclusions: Vec<Inclusion>, mixing: Mixing) -> f64 {

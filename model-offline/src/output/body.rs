@@ -6,15 +6,26 @@ use super::chart::{Drawing, Marker, Plane, Px, colour_bar, heading, sheet};
 use super::vtu::cell_gradients;
 use crate::geometry::Point2;
 use crate::material::green_lagrange;
-use crate::model::{Body, TissueModel};
+use crate::model::TissueModel;
 
 /// Width of the picture, and room around the body as a part of its size.
 const WIDTH: f64 = 640.0;
 const MARGIN: f64 = 0.06;
 
-/// A picture of a body in its present state, self-contained.
-pub fn svg(model: &TissueModel, body: &Body<'_>) -> String {
-    let coefficients = body.equilibrium().coefficients();
+/// A state of a body and its needle.
+#[derive(Debug, Clone, Copy)]
+pub struct State<'a> {
+    /// Nodal coefficients, two numbers per node.
+    pub coefficients: &'a [f64],
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Whether the needle is in the tissue, and not pushing it.
+    pub within: bool,
+}
+
+/// A picture of a body, self-contained.
+pub fn svg(model: &TissueModel, state: State<'_>) -> String {
+    let State { coefficients, depth, within } = state;
     let strains: Vec<f64> = cell_gradients(model, coefficients).iter().map(|h| green_lagrange(h).norm()).collect();
     let largest = strains.iter().copied().fold(1e-12, f64::max);
     let picture = Picture::new(model, coefficients);
@@ -25,10 +36,16 @@ pub fn svg(model: &TissueModel, body: &Body<'_>) -> String {
     }
     drawing.close_group();
     picture.parts(&mut drawing);
+    if within {
+        picture.shaft(&mut drawing, depth);
+    } else {
+        drawing.polyline("contact", &picture.moved(&model.scene().needle.contact));
+    }
     let width = drawing.size[0].max(300.0);
     let bar = colour_bar(width, "Green–Lagrange strain ‖E‖", largest);
-    let title = format!("{} at depth {}: largest strain {}", model.scene().name, plain(body.depth()), plain(largest));
-    let caption = "Grey: needle contact; blue: paddles; black: immobile; dashed: outline at rest; ring: target at rest, dot: now.";
+    let title = format!("{} at depth {}: largest strain {}", model.scene().name, plain(depth), plain(largest));
+    let caption =
+        "Grey: needle; blue: paddles; black: immobile; dashed: outline at rest; ring: target at rest, dot: now.";
     let heading = heading(&title, caption, width);
     sheet(&title, &[heading, drawing, bar], 1).file()
 }
@@ -57,7 +74,19 @@ impl<'a> Picture<'a> {
         self.rest(&points.iter().map(moved).collect::<Vec<_>>())
     }
 
-    /// Outline at rest, immobile boundary, inclusions, needle, paddles, target.
+    /// The needle in its place, a little of it outside.
+    fn shaft(&self, drawing: &mut Drawing, depth: f64) {
+        let needle = &self.model.scene().needle;
+        if let Some(shaft) = &needle.shaft {
+            let outside = 0.3 * needle.depth;
+            drawing.polyline(
+                "contact",
+                &self.rest(&[shaft.entry - needle.axis * outside, shaft.entry + needle.axis * depth]),
+            );
+        }
+    }
+
+    /// Outline at rest, immobile boundary, inclusions, paddles, target.
     fn parts(&self, drawing: &mut Drawing) {
         let scene = self.model.scene();
         drawing.polygon("rest", &self.rest(scene.outline.vertices()));
@@ -65,7 +94,6 @@ impl<'a> Picture<'a> {
         for inclusion in &scene.inclusions {
             drawing.polygon("rim", &self.moved(inclusion.outline.vertices()));
         }
-        drawing.polyline("contact", &self.moved(&scene.needle.contact));
         scene.paddles.iter().for_each(|paddle| drawing.polyline("paddle best", &self.moved(&paddle.segment)));
         let [rest, now] = [self.rest(&[scene.target])[0], self.moved(&[scene.target])[0]];
         drawing.circle("under", rest, 6.0);

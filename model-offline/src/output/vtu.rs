@@ -2,15 +2,14 @@
 
 use crate::material::{Material as _, Matrix, determinant, green_lagrange};
 use crate::mechanics::assembly::displacement_gradient;
-use crate::model::{Body, TissueModel};
+use crate::model::TissueModel;
 use std::fmt::Write as _;
 
 /// The body as a VTU file: the nodal cells as polygons over the nodes' cells, with displacement, Green–Lagrange strain,
 /// Cauchy stress and det F per node (cell data) and the displacement per polygon corner's node.
 ///
-/// ASCII, so that it can be read without ParaView too.
-pub fn vtu(model: &TissueModel, body: &Body<'_>) -> String {
-    let coefficients = body.equilibrium().coefficients();
+/// `coefficients`: two numbers per node. ASCII, so that it can be read without ParaView too.
+pub fn vtu(model: &TissueModel, coefficients: &[f64]) -> String {
     let mut points = String::new();
     let mut displacement = String::new();
     let (mut connectivity, mut offsets, mut types) = (String::new(), String::new(), String::new());

@@ -142,6 +142,7 @@ impl Default for PlacementOptions<'_> {
 /// [`ModelError`] when the body at rest cannot be solved. A static run that stops early and a paddle that cannot control
 /// the target are results, not errors.
 pub fn place(model: &TissueModel, options: &PlacementOptions<'_>) -> Result<Placement, ModelError> {
+    model.needs_a_patch()?;
     let resolution = model.scene().discretization.resolution;
     let profile = match resolution {
         Resolution::Tolerance(_) => Cow::Owned(profile_model(model)?),

@@ -4,6 +4,7 @@ mod error;
 pub mod import;
 pub mod limits;
 pub mod schema;
+mod shaft;
 pub mod starter;
 mod tissue;
 mod validate;
@@ -11,6 +12,7 @@ mod validate;
 pub use error::{NoSuchPaddle, SceneError};
 pub use limits::LimitError;
 pub use schema::{FitSection, PlantModel, TableScalar};
+pub use shaft::{Mechanics, Resistance, Shaft};
 pub use tissue::TissueVariant;
 
 use crate::discretization::{Discretization, Features};
@@ -79,6 +81,8 @@ pub struct Inclusion {
     pub stiffness: f64,
     /// A material of its own; the body's when absent.
     pub material: Option<Law>,
+    /// What it resists a needle with, where that differs from the body.
+    pub resistance: Option<Resistance>,
 }
 
 /// The needle.
@@ -92,9 +96,17 @@ pub struct Needle {
     pub depth: f64,
     /// Into how many increments the insertion is divided.
     pub increments: u32,
+    /// The shaft of a needle that slips; none where the tissue of the contact moves with it, as under skin that never gives
+    /// way.
+    pub shaft: Option<Shaft>,
 }
 
 impl Needle {
+    /// Where it meets the body: the entry of a shaft, else the middle of the contact.
+    pub fn entry(&self) -> Point2 {
+        self.shaft.map_or_else(|| middle(&self.contact), |shaft| shaft.entry)
+    }
+
     /// Unit vector orthogonal to the axis: the axis turned by 90°, signed so that its larger component is positive.
     pub fn orthogonal(&self) -> Point2 {
         let turned = Point2::new(-self.axis.y, self.axis.x);
@@ -102,6 +114,20 @@ impl Needle {
         // Adding zero turns a negative zero into a positive one: reports show it.
         (turned * larger.signum()).map(|v| v + 0.0)
     }
+}
+
+/// The point half way along a polyline.
+fn middle(path: &[Point2]) -> Point2 {
+    let length: f64 = path.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
+    let mut left = 0.5 * length;
+    for s in path.windows(2) {
+        let piece = (s[1] - s[0]).norm();
+        if left <= piece {
+            return s[0] + (s[1] - s[0]) * (left / piece);
+        }
+        left -= piece;
+    }
+    path[0]
 }
 
 /// A paddle position.
@@ -198,7 +224,14 @@ impl Scene {
             contact: self.needle.contact.clone(),
             paddles: self.paddles.iter().map(|p| p.segment).collect(),
             target: self.target,
+            shaft: self.needle.shaft.map(|shaft| [shaft.entry, shaft.entry + self.needle.axis * self.needle.depth]),
         }
+    }
+
+    /// What the tissue at a point resists a needle with: the last inclusion there that says so, else the body.
+    pub fn resistance_at(&self, x: Point2, shaft: &Shaft) -> Resistance {
+        let there = self.inclusions.iter().rev().filter(|inclusion| inclusion.outline.contains(x));
+        there.filter_map(|inclusion| inclusion.resistance).next().unwrap_or(shaft.resistance)
     }
 
     /// The same scene, discretized otherwise.
@@ -233,7 +266,7 @@ impl Scene {
     pub fn hash(&self) -> [u8; 32] {
         let point = |p: &Point2| [p.x, p.y];
         let path = |p: &[Point2]| p.iter().map(point).collect::<Vec<_>>();
-        let content = serde_json::json!({
+        let mut content = serde_json::json!({
             "outline": path(self.outline.vertices()),
             "material": self.material,
             "inclusions": self.inclusions.iter()
@@ -252,6 +285,11 @@ impl Scene {
                 "essential": self.discretization.essential,
             },
         });
+        // Scenes without a shaft keep the hashes that recordings and tables know.
+        if let Some(shaft) = &self.needle.shaft {
+            let inclusions: Vec<_> = self.inclusions.iter().map(|inclusion| inclusion.resistance).collect();
+            content["shaft"] = serde_json::json!([shaft, inclusions]);
+        }
         Sha256::digest(content.to_string()).into()
     }
 }

@@ -1,6 +1,7 @@
 //! The scene file as it is written: the public contract, field for field. Validation turns it into a
 //! [`Scene`](super::Scene).
 
+use super::shaft::Mechanics;
 use crate::choice::choice;
 use crate::discretization::{Basis, Essential, Integration};
 use crate::material::MaterialSection;
@@ -134,6 +135,14 @@ pub struct InclusionSection {
     pub stiffness: Located<f64>,
     /// A material of its own; the body's when absent.
     pub material: Option<Located<MaterialSection>>,
+    /// Force at which the tip of a shaft cuts (default, like the others: the needle's).
+    pub cutting_force: Option<Located<f64>>,
+    /// Friction per length up to which tissue sticks to a shaft.
+    pub static_friction: Option<Located<f64>>,
+    /// Friction per length of a shaft that slides infinitely slowly.
+    pub kinetic_friction: Option<Located<f64>>,
+    /// What a sliding shaft adds per length and speed.
+    pub viscous_friction: Option<Located<f64>>,
 }
 
 fn unit_stiffness() -> Located<f64> {
@@ -161,6 +170,27 @@ pub struct NeedleSection {
     /// Into how many increments the insertion is divided (default 10).
     #[serde(default = "ten")]
     pub increments: Located<u32>,
+    /// How it meets the tissue (default patch: the tissue of the contact moves with it).
+    #[serde(default)]
+    pub mechanics: Mechanics,
+    /// Where a shaft enters the body (default: the middle of the contact).
+    pub entry: Option<Located<[f64; 2]>>,
+    /// Radius of a shaft, length units (default: a hundredth of the depth).
+    pub radius: Option<Located<f64>>,
+    /// Length behind the tip that the cutting force is spread over, length units (default: twice the radius).
+    pub tip_length: Option<Located<f64>>,
+    /// Force on the contact at which a shaft punctures the skin, force (per unit thickness in the plane; default 0; inf: never).
+    pub puncture_force: Option<Located<f64>>,
+    /// Force at which a shaft's tip cuts (default 0).
+    pub cutting_force: Option<Located<f64>>,
+    /// Friction per length up to which tissue sticks to a shaft (default: what sliding takes).
+    pub static_friction: Option<Located<f64>>,
+    /// Friction per length of a shaft that slides infinitely slowly (default 0).
+    pub kinetic_friction: Option<Located<f64>>,
+    /// What a sliding shaft adds per length and speed (default 0).
+    pub viscous_friction: Option<Located<f64>>,
+    /// Speed that friction is taken at, length units per second (default: the depth in five seconds).
+    pub speed: Option<Located<f64>>,
 }
 
 fn ten() -> Located<u32> {

@@ -92,6 +92,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
     if !(2..=MAX_KNOTS).contains(&options.knots) {
         return Err(TableBuildError::Knots(options.knots));
     }
+    model.needs_a_patch()?;
     let scene = model.scene();
     let position = scene.paddle_position(paddle_index).map_err(ModelError::from)?;
     let settings = NewtonSettings::default();

@@ -36,7 +36,7 @@ pub fn series(
         let file = format!("{name}-{i:03}.vtu");
         let time_s = (truth.time_ns - started_ns) as f64 * 1e-9;
         let _ = writeln!(entries, "    <DataSet timestep=\"{time_s}\" group=\"\" part=\"0\" file=\"{file}\"/>");
-        files.push(Artifact { name: file, bytes: vtu(model, &body).into_bytes() });
+        files.push(Artifact { name: file, bytes: vtu(model, body.equilibrium().coefficients()).into_bytes() });
     }
     let collection = format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n  \

@@ -5,7 +5,7 @@
 use super::features::Features;
 use super::graded::{Grading, InterfaceFit, graded_nodes};
 use crate::discretization::cells::triangulation::{TriangulationError, triangulate_along};
-use crate::geometry::{Point2, Polygon};
+use crate::geometry::{Point2, Polygon, distance_to_segment};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Triangles with their corners counter-clockwise; the next bisection of a triangle cuts the edge from its first to its
@@ -17,6 +17,12 @@ pub struct Triangulation {
     /// Corner numbers.
     pub triangles: Vec<[u32; 3]>,
 }
+
+/// Longest edges of triangles at a shaft, over its length: along it, and at its tip.
+const ALONG_THE_SHAFT: f64 = 0.1;
+const AT_THE_TIP: f64 = 0.03;
+/// Rounds of refinement along a shaft: each halves triangles at least.
+const MOST_ROUNDS: usize = 24;
 
 /// An edge by its ends, the lower number first.
 type Edge = (u32, u32);
@@ -34,13 +40,39 @@ impl Triangulation {
         let nodes = graded_nodes(features, &Grading::level(features, level, InterfaceFit::On));
         let mut lines: Vec<(Point2, Point2)> = features.inclusions.iter().flat_map(Polygon::edges).collect();
         lines.extend(features.contact.windows(2).map(|s| (s[0], s[1])));
+        lines.extend(features.shaft.map(|[entry, tip]| (entry, tip)));
         let mut triangles = triangulate_along(&nodes, &features.outline, &lines)?;
         for t in &mut triangles {
             let length = |e: usize| (nodes[t[e] as usize] - nodes[t[(e + 1) % 3] as usize]).norm();
             let longest = (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0);
             t.rotate_left(longest);
         }
-        Ok(Self { nodes, triangles })
+        let mesh = Self { nodes, triangles };
+        Ok(match features.shaft {
+            Some(shaft) => mesh.refined_along(shaft),
+            None => mesh,
+        })
+    }
+
+    /// Triangles at a shaft become so small that its forces are resolved: what else is refined for asks nothing of it.
+    fn refined_along(mut self, [entry, tip]: [Point2; 2]) -> Self {
+        let length = (tip - entry).norm();
+        for _ in 0..MOST_ROUNDS {
+            let node = |i: u32| self.nodes[i as usize];
+            let too_large = |t: &[u32; 3]| {
+                let touches = t.iter().any(|&i| distance_to_segment(node(i), entry, tip) <= 1e-9 * length);
+                let size = (0..3).map(|e| (node(t[e]) - node(t[(e + 1) % 3])).norm()).fold(0.0, f64::max);
+                let centre = (node(t[0]) + node(t[1]) + node(t[2])) / 3.0;
+                let wanted = ((centre - tip).norm()).clamp(AT_THE_TIP * length, ALONG_THE_SHAFT * length);
+                touches && size > wanted
+            };
+            let marked: Vec<usize> = (0..self.triangles.len()).filter(|&t| too_large(&self.triangles[t])).collect();
+            if marked.is_empty() {
+                break;
+            }
+            self = self.bisected(&marked).0;
+        }
+        self
     }
 
     /// Every triangle cut into four, with the triangle that each came from.

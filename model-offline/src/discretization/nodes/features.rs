@@ -17,6 +17,8 @@ pub struct Features {
     pub paddles: Vec<[Point2; 2]>,
     /// The point whose displacement is asked for.
     pub target: Point2,
+    /// Where a needle that slips enters the body, and the deepest place of its tip.
+    pub shaft: Option<[Point2; 2]>,
 }
 
 impl Features {

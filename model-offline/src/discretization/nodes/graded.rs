@@ -23,7 +23,7 @@ pub struct Grading {
     pub finest: f64,
     /// Growth of the spacing with distance from a singular point.
     pub slope: f64,
-    /// Spacing along the edges of inclusions, length units.
+    /// Spacing along the edges of inclusions and along a shaft, length units.
     pub interface: f64,
     /// Largest spacing where the body, or a slot in it, is narrow: over the width there.
     pub narrow: f64,
@@ -57,6 +57,7 @@ impl Grading {
             .iter()
             .flat_map(Polygon::edges)
             .map(|(a, b)| (b - a).norm())
+            .chain(features.shaft.map(|[entry, tip]| 0.5 * (tip - entry).norm()))
             .fold(f64::INFINITY, f64::min);
         let coarsest = 0.2 * features.outline.area().sqrt() * halved.sqrt();
         Self {
@@ -118,6 +119,8 @@ fn singular_points(features: &Features) -> Vec<(Point2, f64)> {
     // integration answers that load with its modes of little energy, which small cells around it hold back (SCNI at 1 %
     // on `paper-hull` with the inclusion: 3,188 nodes instead of 31,189).
     points.push((features.target, 2.0));
+    // The tip of a shaft ends a line that tissue cannot leave.
+    points.extend(features.shaft.map(|[_, tip]| (tip, 1.0)));
     for path in &features.immobile {
         points.extend(path.first().map(|p| (*p, 2.0)));
         points.extend(path.last().map(|p| (*p, 2.0)));
@@ -139,11 +142,15 @@ pub fn graded_nodes(features: &Features, grading: &Grading) -> Vec<Point2> {
     let tolerance = COINCIDENT * outline.size();
     let interfaces: Vec<(Point2, Point2)> = features.inclusions.iter().flat_map(Polygon::edges).collect();
     let narrows = narrows(outline, grading.coarsest, grading.narrow);
+    // Along a shaft forces act as they do along the edge of an inclusion.
+    let shaft = features.shaft.map(|[entry, tip]| (entry, tip));
+    let interfaces = interfaces.into_iter().chain(shaft).collect();
     let field = Field { grading, singular: singular_points(features), interfaces, narrows };
 
     // Features first, then nodes along outline and needle contact between them.
     let mut positions: Vec<Point2> = Vec::new();
     let mut fixed = features.points();
+    fixed.extend(features.shaft.into_iter().flatten());
     if grading.fit == InterfaceFit::On {
         let corners = features.inclusions.iter().flat_map(Polygon::vertices).copied();
         fixed.extend(corners.filter(|v| outline.locate(*v, tolerance) != Location::Outside));
@@ -157,6 +164,7 @@ pub fn graded_nodes(features: &Features, grading: &Grading) -> Vec<Point2> {
     // A contact on the boundary is part of an outline edge already.
     let contact = features.contact.windows(2).map(|s| (s[0], s[1]));
     lines.extend(contact.filter(|(a, b)| !outline.segment_on_boundary(*a, *b, tolerance)));
+    lines.extend(features.shaft.map(|[entry, tip]| (entry, tip)));
     let fixed = positions.clone();
     for (a, b) in lines {
         for (p, q) in pieces(a, b, &fixed, tolerance) {

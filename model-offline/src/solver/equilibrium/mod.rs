@@ -231,7 +231,8 @@ impl<const D: usize> Equilibrium<D> {
             let last = self.at.clone();
             self.at.prescribed = between(&start, prescribed, next);
             self.at.external = between(&start_load, external, next);
-            match self.attempt() {
+            let load_changed = self.at.external != last.external;
+            match self.attempt(load_changed) {
                 Attempt::Converged => {
                     reached = next;
                     // Grow back after success, so that one hard spot does not slow down the rest.
@@ -294,6 +295,23 @@ impl<const D: usize> Equilibrium<D> {
         let (mut x, mut mu) = (vec![0.0; columns * unknowns], vec![0.0; columns * rows]);
         self.solver.solve(&rhs, &strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
         Ok(x)
+    }
+
+    /// Responses to loads with the last factor, whatever state it is of: good enough to step with.
+    ///
+    /// # Errors
+    /// [`Failure`] when there is no factor and the tangent at the current state is not positive definite.
+    ///
+    /// # Panics
+    /// When there is no whole number of loads.
+    pub(crate) fn rough_responses(&mut self, loads: &[f64]) -> Result<Vec<f64>, Failure> {
+        if !self.factor_exists {
+            return self.linear_responses(&[], loads);
+        }
+        let current = std::mem::replace(&mut self.factor_is_current, true);
+        let responses = self.linear_responses(&[], loads);
+        self.factor_is_current = current;
+        responses
     }
 
     /// How the internal force curves along a direction of the coefficients, by second differences over a way of `length`

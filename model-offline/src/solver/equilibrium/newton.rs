@@ -143,16 +143,17 @@ impl<const D: usize> Equilibrium<D> {
         false
     }
 
-    /// Newton's method towards the prescribed values and the load.
-    pub(super) fn attempt(&mut self) -> Attempt {
+    /// Newton's method towards the prescribed values and the load, which may have changed since the last evaluation.
+    pub(super) fn attempt(&mut self, load_changed: bool) -> Attempt {
         let n = self.at.coefficients.len();
         if let Some(adapted) = self.weak.as_ref().and_then(|weak| weak.adapted(&self.tissue, &self.at.coefficients)) {
             self.weak = Some(adapted);
             self.factor_is_current = false;
         }
         // Load and weakly imposed values are part of the energy, which has changed with them.
-        let loaded = self.weak.is_some() || self.at.external.iter().any(|f| *f != 0.0);
-        if loaded && let Err(at) = self.evaluate() {
+        if (self.weak.is_some() || load_changed)
+            && let Err(at) = self.evaluate()
+        {
             return Attempt::Failed(reason_of(&at), "before the first step".into());
         }
         let rows = self.at.multipliers.len();

@@ -177,7 +177,8 @@ pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
 }
 
 /// Row 17: single samples of something else. 5σ is noise and taken. 50σ is refused unless the motion of the needle
-/// explains as much: then it may be taken, and moves the target by no more than the gain's part of it.
+/// explains as much: then it may be taken, and moves the target by no more than the gain's part of it. At rest it is the
+/// paddle's own answer to noise that explains as much now and then: 3 of 30,000 jumps over 150 seeds.
 pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     for (name, sigmas, moving) in
         [("default σ, needle at rest", 1.0, false), ("10 × σ", 10.0, true), ("default σ", 1.0, true)]
@@ -197,12 +198,21 @@ pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Si
             setup.noise
         ));
         // With the default noise 50σ is less than what three times the table's motion explains between two samples.
-        let explained = moving && sigmas == 1.0;
-        evidence.require(wrongly_accepted == 0 || explained, || format!("{name}: 50σ accepted"));
+        let most = if !moving {
+            MOST_MISSED_AT_REST
+        } else if sigmas == 1.0 {
+            200
+        } else {
+            0
+        };
+        evidence.require(wrongly_accepted <= most, || format!("{name}: {wrongly_accepted} jumps of 50σ accepted"));
         evidence.require(wrongly_refused == 0, || format!("{name}: good samples refused"));
     }
     Ok(())
 }
+
+/// Of 200 jumps at rest: at one miss in 10,000, about one seed in a million has more.
+const MOST_MISSED_AT_REST: u64 = 2;
 
 /// 400 jumps, 5σ and 50σ in turns; how many were accepted and refused wrongly.
 fn jump_trial(

@@ -1,9 +1,11 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
+mod shaft;
+
 use super::error::{SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
-use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene};
+use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene, Shaft};
 use crate::discretization::{Discretization, Method, Resolution};
 use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
@@ -59,12 +61,17 @@ impl Validator<'_> {
         let outline = self.polygon(&file.domain.outline, "outline")?;
         let tolerance = 1e-9 * outline.size();
         let immobile = self.immobile(&outline, tolerance)?;
-        let needle = self.needle(&outline, &immobile, tolerance)?;
+        let mut needle = self.needle(&outline, &immobile, tolerance)?;
+        needle.shaft = self.shaft(&needle, &outline, tolerance)?;
         let target = self.point(file.target.position.get(), file.target.position.span(), "target")?;
         let around = Surroundings { outline: &outline, immobile: &immobile, needle: &needle, tolerance };
         self.target(target, &around)?;
         let paddles = self.paddles(&around)?;
-        let inclusions = file.inclusion.iter().map(|i| self.inclusion(i, &outline)).collect::<Checked<_>>()?;
+        let inclusions = file
+            .inclusion
+            .iter()
+            .map(|i| self.inclusion(i, &outline, needle.shaft.as_ref()))
+            .collect::<Checked<_>>()?;
         Ok(Scene {
             name: file.scene.name.clone(),
             length_unit: file.scene.units.length.clone(),
@@ -199,7 +206,7 @@ impl Validator<'_> {
                 "check the units of the depth",
             ));
         }
-        Ok(Needle { contact, axis: axis.normalize(), depth, increments })
+        Ok(Needle { contact, axis: axis.normalize(), depth, increments, shaft: None })
     }
 
     fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {
@@ -273,7 +280,12 @@ impl Validator<'_> {
         Ok(paddles)
     }
 
-    fn inclusion(&self, located: &Located<InclusionSection>, outline: &Polygon) -> Checked<Inclusion> {
+    fn inclusion(
+        &self,
+        located: &Located<InclusionSection>,
+        outline: &Polygon,
+        shaft: Option<&Shaft>,
+    ) -> Checked<Inclusion> {
         let section = located.get();
         let region = self.polygon(&section.outline, "inclusion")?;
         if overlap(&region, outline) <= 1e-12 * region.area().min(outline.area()) {
@@ -287,6 +299,7 @@ impl Validator<'_> {
             outline: region,
             stiffness: self.positive(&section.stiffness, "stiffness")?,
             material: section.material.as_ref().map(|m| self.material(m)).transpose()?,
+            resistance: self.inclusion_resistance(section, shaft)?,
         })
     }
 

@@ -1,0 +1,34 @@
+//! Why a needle cannot go on.
+
+use crate::discretization::ShapeError;
+use crate::solver::equilibrium::Failure;
+
+/// Why a needle cannot be taken to where it was asked to go; it is then where it was.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NeedleError {
+    /// The scene's needle does not slip.
+    #[error("the scene's needle does not slip: [needle] mechanics is \"patch\"")]
+    NoShaft,
+    /// Prescribed values are imposed weakly.
+    #[error("a needle that slips needs nodal values that are imposed exactly: use essential = \"transformation\"")]
+    HeldWeakly,
+    /// The tissue has no equilibrium there.
+    #[error("no equilibrium on the way to depth {depth}: {source}")]
+    Equilibrium {
+        /// Depth that was asked for, length.
+        depth: f64,
+        /// Why.
+        source: Failure,
+    },
+    /// No forces along the shaft were found that the tissue and the laws of friction agree on.
+    #[error(
+        "no forces along the shaft fit tissue and friction on the way to depth {depth}: insert in smaller increments"
+    )]
+    NoForces {
+        /// Depth that was asked for, length.
+        depth: f64,
+    },
+    /// Shape functions do not exist at a point of the shaft.
+    #[error(transparent)]
+    Shape(#[from] ShapeError),
+}

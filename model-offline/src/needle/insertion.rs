@@ -1,0 +1,93 @@
+//! An insertion from the skin on.
+
+use super::error::NeedleError;
+use super::state::SlippingNeedle;
+use crate::model::{Body, TissueModel};
+use crate::solver::equilibrium::NewtonSettings;
+use nalgebra::Vector2;
+
+/// The first increment grows by doublings, as many as this: the tip holds for a moment before it cuts, and the work at the
+/// base is summed over increments.
+const BEGINNING: i32 = 7;
+
+/// A straight way of needle and paddle from rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Way {
+    /// Depth at its end, length.
+    pub depth: f64,
+    /// Paddle displacement at its end, length.
+    pub paddle: Vector2<f64>,
+    /// Increments.
+    pub increments: u32,
+}
+
+impl Way {
+    /// Depth and paddle displacement after so many increments.
+    fn after(&self, increment: u32) -> (f64, Vector2<f64>) {
+        let share = f64::from(increment) / f64::from(self.increments.max(1));
+        // The end itself, not the end up to rounding.
+        if share >= 1.0 { (self.depth, self.paddle) } else { (self.depth * share, self.paddle * share) }
+    }
+}
+
+/// Where an insertion has got to.
+#[derive(Debug, Clone)]
+pub enum Inserted<'m> {
+    /// The skin holds: the needle pushes the contact.
+    Pushing(Box<Body<'m>>),
+    /// The needle is in.
+    Within {
+        /// The needle.
+        needle: Box<SlippingNeedle<'m>>,
+        /// Depth at which the skin was punctured, to the accuracy of an increment.
+        punctured_at: f64,
+    },
+}
+
+/// Takes a needle that slips on its way; the paddle at this place of the scene's list is attached, or none.
+///
+/// The jump at the puncture is not followed: the state within is that of a needle that has come the same way through skin
+/// that was open, which sliding friction makes the same where everything slides.
+///
+/// # Errors
+/// [`NeedleError`].
+pub fn insert<'m>(model: &'m TissueModel, paddle: Option<usize>, way: Way) -> Result<Inserted<'m>, NeedleError> {
+    let shaft = model.scene().needle.shaft.ok_or(NeedleError::NoShaft)?;
+    if model.is_held_weakly() {
+        return Err(NeedleError::HeldWeakly);
+    }
+    let mut punctured_at = 0.0;
+    if shaft.puncture_force > 0.0 {
+        let failed = |depth| move |source| NeedleError::Equilibrium { depth, source };
+        let mut body = model.body(paddle, NewtonSettings::default()).map_err(failed(0.0))?;
+        let mut before = (0.0, 0.0);
+        let punctured = (1..=way.increments.max(1)).find_map(|increment| {
+            let (depth, place) = way.after(increment);
+            if let Err(source) = body.drive(depth, place) {
+                return Some(Err(NeedleError::Equilibrium { depth, source }));
+            }
+            let force = body.contact_force();
+            if force >= shaft.puncture_force {
+                let share = (shaft.puncture_force - before.1) / (force - before.1);
+                return Some(Ok(before.0 + (depth - before.0) * share.clamp(0.0, 1.0)));
+            }
+            before = (depth, force);
+            None
+        });
+        match punctured {
+            None => return Ok(Inserted::Pushing(Box::new(body))),
+            Some(at) => punctured_at = at?,
+        }
+    }
+    let mut needle = SlippingNeedle::at_rest(model, paddle)?;
+    let (first, beside) = way.after(1);
+    for halvings in (1..=BEGINNING).rev() {
+        let share = 0.5_f64.powi(halvings);
+        needle.advance(first * share, beside * share)?;
+    }
+    for increment in 1..=way.increments.max(1) {
+        let (depth, place) = way.after(increment);
+        needle.advance(depth, place)?;
+    }
+    Ok(Inserted::Within { needle: Box::new(needle), punctured_at })
+}

@@ -1,0 +1,59 @@
+//! What a paddle does to the target while the needle is in.
+
+use super::error::NeedleError;
+use super::state::SlippingNeedle;
+use super::station::{Slide, Station};
+use crate::geometry::Point2;
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+
+impl SlippingNeedle<'_> {
+    /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle as it is: stations that stick are
+    /// held, those that slide go on sliding.
+    ///
+    /// # Errors
+    /// [`NeedleError`].
+    pub fn actuation_jacobian(&mut self) -> Result<Matrix2<f64>, NeedleError> {
+        let depth = self.depth;
+        let failed = |source| NeedleError::Equilibrium { depth, source };
+        let mut contacts: Vec<Station> = self.holding().0.into_iter().cloned().collect();
+        self.respond(&mut contacts, true).map_err(failed)?;
+        let (axis, normal) = (self.axis(), self.normal());
+        let rows = contacts.iter().flat_map(|contact| {
+            let sticks = (contact.slide == Slide::Sticks).then_some((contact, axis, 1));
+            [Some((contact, normal, 0)), sticks].into_iter().flatten()
+        });
+        let rows: Vec<(&Station, Point2, usize)> = rows.collect();
+        let felt = |response: &[f64]| {
+            DVector::from_iterator(
+                rows.len(),
+                rows.iter().map(|(at, along, _)| along.dot(&at.stencil.interpolate(response))),
+            )
+        };
+        let responses: Vec<&[f64]> =
+            rows.iter().filter_map(|(at, _, which)| Some(at.responses.as_ref()?[*which].as_slice())).collect();
+        let mut compliance = DMatrix::zeros(rows.len(), rows.len());
+        for (column, response) in responses.iter().enumerate() {
+            compliance.set_column(column, &felt(response));
+        }
+        let largest = compliance.diagonal().amax();
+        (0..rows.len()).for_each(|i| compliance[(i, i)] += 1e-13 * largest);
+        let target = self.model.target_row();
+        let mut jacobian = Matrix2::zeros();
+        for axis in 0..2 {
+            let [immobile, moved] = self.rows;
+            let by: Vector2<f64> = Vector2::ith(axis, 1.0);
+            let rates: Vec<f64> = std::iter::repeat_n([0.0; 2], immobile)
+                .chain(std::iter::repeat_n([by.x, by.y], moved))
+                .flatten()
+                .collect();
+            let free = self.equilibrium.sensitivities(&rates).map_err(failed)?;
+            let held = compliance.clone().lu().solve(&-felt(&free)).ok_or(NeedleError::NoForces { depth })?;
+            let mut moved = target.interpolate(&free);
+            for (response, force) in responses.iter().zip(held.iter()) {
+                moved += target.interpolate(response) * *force;
+            }
+            jacobian.set_column(axis, &moved);
+        }
+        Ok(jacobian)
+    }
+}

@@ -1,0 +1,227 @@
+//! A needle that is in: what it knows, and what it tells.
+
+use super::error::NeedleError;
+use super::path::{CutPath, hat_integrals};
+use super::station::{Slide, Station, StationState, spread};
+use crate::geometry::Point2;
+use crate::mechanics::Constraints;
+use crate::model::TissueModel;
+use crate::scene::Shaft;
+use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
+use nalgebra::Vector2;
+use serde::Serialize;
+
+/// Where the work at the needle's base went, since it is in.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct EnergyAccount {
+    /// Work at the base.
+    pub work: f64,
+    /// Strain energy of the tissue now.
+    pub stored: f64,
+    /// Dissipated by friction.
+    pub friction: f64,
+    /// Dissipated by cutting: the tip's force over the way that it went past tissue.
+    pub cutting: f64,
+}
+
+/// A needle in a body, with its history.
+///
+/// # Example
+/// ```
+/// use model_offline::needle::SlippingNeedle;
+/// use model_offline::{Scene, TissueModel};
+/// # let text = model_offline::scene::BUNDLED[0].1.replace("increments = 10", "increments = 10\nmechanics = \"shaft\"\n\
+/// #     cutting_force = 0.5\nkinetic_friction = 0.2");
+/// # let scene = Scene::parse(&text, "shaft.toml").expect("a scene");
+///
+/// let model = TissueModel::new(&scene)?; // mechanics = "shaft", cutting_force = 0.5, kinetic_friction = 0.2
+/// let mut needle = SlippingNeedle::at_rest(&model, None).expect("a needle that slips");
+/// for depth in [0.02, 0.04, 0.06] {
+///     needle.advance(depth, [0.0, 0.0].into()).expect("an equilibrium");
+/// }
+/// assert!((needle.base_force() - (0.5 + 0.2 * needle.engaged())).abs() < 1e-6); // cutting, and friction along the shaft
+/// # Ok::<(), model_offline::ModelError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct SlippingNeedle<'m> {
+    pub(super) model: &'m TissueModel,
+    pub(super) shaft: Shaft,
+    pub(super) equilibrium: Equilibrium<2>,
+    /// Rows of the immobile part, which come first, and of the paddle.
+    pub(super) rows: [usize; 2],
+    pub(super) paddle: Vector2<f64>,
+    pub(super) depth: f64,
+    /// The length that has been cut.
+    pub(super) cut: f64,
+    /// Arc length down to which the shaft holds tissue: less than the cut's on the way out.
+    pub(super) engaged: f64,
+    pub(super) path: CutPath,
+    pub(super) stations: Vec<Station>,
+    pub(super) tip: Option<Station>,
+    pub(super) tip_force: f64,
+    pub(super) energy: EnergyAccount,
+    /// Coefficients at the end of the last increment.
+    pub(super) last: Vec<f64>,
+}
+
+impl<'m> SlippingNeedle<'m> {
+    /// A needle whose tip touches the skin, which is punctured; the paddle at this place of the scene's list is attached, or
+    /// none.
+    ///
+    /// # Errors
+    /// [`NeedleError`].
+    pub fn at_rest(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, NeedleError> {
+        let shaft = model.scene().needle.shaft.ok_or(NeedleError::NoShaft)?;
+        let (rows, immobile) = model.rows_without_needle(paddle).ok_or(NeedleError::HeldWeakly)?;
+        let counts = [immobile, rows.len() - immobile];
+        // Equilibria follow each other closely: the last factor serves, and the body's stability is checked as it moves.
+        let settings = NewtonSettings { residual_tolerance: 1e-9, step_tolerance: 1e-8, ..NewtonSettings::SMALL_STEPS };
+        let equilibrium =
+            Equilibrium::analysed(model.discrete_body(), model.analysis(), Constraints::from(rows), settings)
+                .map_err(|source| NeedleError::Equilibrium { depth: 0.0, source })?;
+        let mut needle = Self {
+            model,
+            shaft,
+            equilibrium,
+            rows: counts,
+            paddle: Vector2::zeros(),
+            depth: 0.0,
+            cut: 0.0,
+            engaged: 0.0,
+            path: CutPath::from(shaft.entry),
+            stations: Vec::new(),
+            tip: None,
+            tip_force: 0.0,
+            energy: EnergyAccount::default(),
+            last: vec![0.0; model.dofs()],
+        };
+        let places = needle.places();
+        let stations = places.into_iter().map(|s| needle.station(s, shaft.entry + needle.axis() * s));
+        needle.stations = stations.collect::<Result<_, _>>()?;
+        Ok(needle)
+    }
+
+    /// Arc lengths of the stations: where nodes lie on the needle's way, else a spacing apart.
+    fn places(&self) -> Vec<f64> {
+        let (entry, axis, depth) = (self.shaft.entry, self.axis(), self.model.scene().needle.depth);
+        let near = 1e-6 * self.model.spacing();
+        let on = |x: &&Point2| (*x - entry - axis * (*x - entry).dot(&axis)).norm() <= near;
+        let mut places: Vec<f64> = self.model.positions().iter().filter(on).map(|x| (x - entry).dot(&axis)).collect();
+        places.retain(|s| (-near..=depth + near).contains(s));
+        places.sort_by(f64::total_cmp);
+        places.dedup_by(|a, b| *a - *b <= near);
+        if places.len() > 2 {
+            return places;
+        }
+        let count = (depth / self.model.spacing()).ceil().clamp(2.0, 1000.0) as usize;
+        (0..=count).map(|k| depth * k as f64 / count as f64).collect()
+    }
+
+    pub(super) fn station(&self, arc_length: f64, at: Point2) -> Result<Station, NeedleError> {
+        Ok(Station {
+            arc_length,
+            stencil: self.model.planar().value_stencil(&at)?,
+            at,
+            resistance: self.model.scene().resistance_at(at, &self.shaft),
+            slide: Slide::Forward,
+            known: false,
+            across: 0.0,
+            along: 0.0,
+            length: 0.0,
+            axial: 0.0,
+            slip: 0.0,
+            responses: None,
+        })
+    }
+
+    pub(super) fn axis(&self) -> Point2 {
+        self.model.scene().needle.axis
+    }
+
+    pub(super) fn normal(&self) -> Point2 {
+        self.model.scene().needle.orthogonal()
+    }
+
+    pub(super) fn is_small_strain(&self) -> bool {
+        self.model.tissue().is_linear()
+    }
+
+    /// The stations that are held, the tip last, and how its force is spread over them.
+    pub(super) fn holding(&self) -> (Vec<&Station>, Vec<f64>) {
+        let contacts: Vec<&Station> = self.stations.iter().filter(|station| station.known).chain(&self.tip).collect();
+        let places: Vec<f64> = contacts.iter().map(|contact| contact.arc_length).collect();
+        let spread = spread(&places, self.engaged, self.shaft.tip_length);
+        (contacts, spread)
+    }
+
+    /// The point of the undeformed body at an arc length of the cut.
+    pub fn cut_at(&self, arc_length: f64) -> Point2 {
+        self.path.at(arc_length, self.axis())
+    }
+
+    /// Depth of the tip.
+    pub fn depth(&self) -> f64 {
+        self.depth
+    }
+
+    /// Arc length of the cut down to which the shaft holds tissue.
+    pub fn engaged(&self) -> f64 {
+        self.engaged
+    }
+
+    /// Length of tissue that the tip has passed.
+    pub fn cut_length(&self) -> f64 {
+        self.cut
+    }
+
+    /// Where the tip is.
+    pub fn tip_position(&self) -> Point2 {
+        self.shaft.entry + self.axis() * self.depth
+    }
+
+    /// Force that pushes the tip.
+    pub fn tip_force(&self) -> f64 {
+        self.tip_force
+    }
+
+    /// Force that pushes the needle at its base: that of the tip and of all friction.
+    pub fn base_force(&self) -> f64 {
+        let held = self.stations.iter().filter(|station| station.known).chain(&self.tip);
+        held.map(|station| station.along).sum::<f64>() + self.tip_force
+    }
+
+    /// Target displacement.
+    pub fn target_displacement(&self) -> Vector2<f64> {
+        self.model.target_row().interpolate(self.equilibrium.coefficients())
+    }
+
+    /// Depth at which the tip meets the target where it is now, or passes it.
+    pub fn depth_of_target(&self) -> f64 {
+        self.axis().dot(&(self.model.scene().target + self.target_displacement() - self.shaft.entry))
+    }
+
+    /// The tissue under the needle's forces.
+    pub fn equilibrium(&self) -> &Equilibrium<2> {
+        &self.equilibrium
+    }
+
+    /// Where the work has gone.
+    pub fn energy(&self) -> EnergyAccount {
+        self.energy
+    }
+
+    /// What the shaft does along the cut, from the entry on; the tip last.
+    pub fn stations(&self) -> Vec<StationState> {
+        let (contacts, _) = self.holding();
+        let places: Vec<f64> = contacts.iter().map(|contact| contact.arc_length).collect();
+        let lengths = hat_integrals(&places, 0.0, self.engaged);
+        let per_length = |force: f64, length: f64| if length > 0.0 { force / length } else { 0.0 };
+        let states = contacts.iter().zip(&lengths).map(|(contact, length)| StationState {
+            arc_length: contact.arc_length,
+            slip: contact.slip,
+            friction: per_length(contact.along, *length),
+            normal: per_length(contact.across, *length),
+        });
+        states.collect()
+    }
+}
