@@ -10,6 +10,18 @@ use crate::scalar::Scalar;
 /// well-placed paddles pay nothing; above it the paddle's excursion along the weak direction stays bounded.
 pub const DAMPING_CONDITION: f64 = 1e2;
 
+/// How measurements of the target become corrections.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Feedback {
+    /// Every sample moves the paddle by a fixed part of the error: no belief about sensor or tissue, the fewest
+    /// instructions. What the table leaves grows with the depth, so that it lags behind; noise goes through.
+    Integral,
+    /// What the table leaves is estimated from sensor and table, as good as each is, and removed: see
+    /// [`crate::observer`].
+    #[default]
+    Observer,
+}
+
 /// Paddle direction per unit of orthogonal target displacement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Direction {

@@ -16,7 +16,7 @@
 //!
 //! 1. [`contract`]: frames, table format, codec, validation, errors: what others rely on.
 //! 2. [`detection`]: what counts as a fault, each limit with its reason. [`schedule`]: absolute release times.
-//! 3. Mathematics: [`law`], [`limits`], [`loop_stability`], [`table_lookup`].
+//! 3. Mathematics: [`law`], [`limits`], [`loop_stability`], [`observer`], [`table_lookup`].
 //! 4. [`settings`] in physical units, checked once and turned into what a tick needs.
 //! 5. [`inputs`]: streams, checks, monitors, supervisor, ledger: what is trusted.
 //! 6. [`controller`]: one tick from inputs to command. [`io`] and [`serial`]: how a host or a board calls it.
@@ -26,12 +26,16 @@
 //!
 //! ```text
 //! feed-forward    f = path(z)                        table, cubic Hermite in depth
-//! error           e = n·y                            once per target sample, y measured
-//! feedback        w ← w − g·d(z)·e,   d = J⁻¹n       or the minimum-norm direction Jₙᵀ/(Jₙ·Jₙᵀ)
+//! left over       m = n·y − n·J(z)·(u − f)           once per target sample; z, u: when y was measured
+//! estimate        l, s ← observer(m)                 level and slope in depth of what the table leaves
+//! feedback        n·J·w = −(l + s·Δz), w along d     d = J⁻¹n, or the minimum-norm direction Jₙᵀ/(Jₙ·Jₙᵀ)
 //! command         u ← towards f + w                  |u| ≤ u_max, |Δu| ≤ Δ_max on every tick
 //! ```
 //!
-//! The gain g follows from the delay of the loop, see [`loop_stability`]; the limits and their anti-windup are in
+//! [`observer`] tells how sensor and table are weighed. [`Feedback::Integral`] is the plain law, w ← w − g·d·e with
+//! the error e = n·y: no estimate, fewer instructions.
+//!
+//! The gain g, of an observer the largest, follows from the delay of the loop, see [`loop_stability`]; the limits and their anti-windup are in
 //! [`limits`].
 //!
 //! # Symbols and units
@@ -41,6 +45,7 @@
 //! | y | target displacement from rest | length |
 //! | n | unit vector orthogonal to the needle axis | – |
 //! | u | paddle displacement | length |
+//! | w | what the feedback adds to the feed-forward | length |
 //! | J | actuation Jacobian dy/du | – |
 //! | g | loop gain per target sample | – |
 //! | d | delay of the loop | target samples |
@@ -115,6 +120,7 @@ pub mod schedule;
 pub mod law;
 pub mod limits;
 pub mod loop_stability;
+pub mod observer;
 pub mod table_lookup;
 
 pub mod settings;
@@ -131,7 +137,7 @@ pub use contract::{
 pub use controller::{Controller, State};
 pub use inputs::{Discard, Inputs, Ledger, StreamLedger};
 pub use io::{CommandSink, MonotonicClock, SampleSource, run_tick};
-pub use law::Direction;
+pub use law::{Direction, Feedback};
 pub use limits::PositionLimit;
 pub use scalar::{Scalar, ScalarKind};
 pub use schedule::Schedule;

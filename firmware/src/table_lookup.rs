@@ -17,6 +17,8 @@ pub struct TableLocation<'t, T: Scalar, const D: usize> {
     interval: T,
     /// 0 at the left knot, 1 at the right one.
     fraction: T,
+    /// Where this is: the depth that was asked for, moved into the table.
+    pub depth: T,
     /// The depth was outside the table and has been moved to its nearest end.
     pub clamped: bool,
 }
@@ -34,6 +36,7 @@ impl<T: Scalar, const D: usize> Table<T, D> {
             left,
             right,
             interval,
+            depth: inside,
             fraction: (inside - left.depth) / interval,
             clamped: inside != depth,
         })

@@ -7,6 +7,8 @@ use crate::scalar::Scalar;
 use crate::settings::{Runtime, Settings, SettingsError};
 
 mod clock;
+mod feedback;
+mod history;
 mod motion;
 #[cfg(test)]
 pub(crate) mod plant;
@@ -97,11 +99,15 @@ impl<'t, T: Scalar> Controller<'t, T> {
         self.expire_before_arming(state);
         self.check_ages(state, &mut faults);
         let mut mode = state.supervisor.decide(self.runtime.seen(faults));
-        if let (Mode::Run, Some(elapsed_ns)) = (mode, elapsed_ns) {
+        let depth = self.depth_ahead(state, inputs.time_ns);
+        if let (Mode::Run, Some(elapsed_ns), Some(depth)) = (mode, elapsed_ns, depth) {
             state.armed = true;
-            self.move_paddle(state, &Tick { time_ns: inputs.time_ns, elapsed_ns, fresh_target }, &mut faults);
+            self.move_paddle(state, &Tick { time_ns: inputs.time_ns, elapsed_ns, fresh_target }, depth, &mut faults);
             // The law itself may have found a reason to stop; its last command is within the limits.
             mode = state.supervisor.decide(self.runtime.seen(faults));
+        }
+        if let (Some(_), Some(depth)) = (elapsed_ns, depth) {
+            self.remember(state, inputs.time_ns, depth);
         }
         state.mode = mode;
         state.faults = self.runtime.seen(faults) | state.supervisor.latched();

@@ -2,10 +2,13 @@
 
 use nalgebra::SVector;
 
-use super::state::{Underway, from_frame, to_frame};
+use super::feedback::Setting;
+use super::history::{INTERVALS, Moment};
+use super::state::{Underway, to_frame};
 use super::{Controller, D, State};
 use crate::contract::Faults;
 use crate::inputs::sample::Measurement;
+use crate::law::Feedback;
 use crate::limits::Limits;
 use crate::scalar::Scalar;
 use crate::units::seconds;
@@ -22,16 +25,21 @@ pub(super) struct Tick {
 }
 
 impl<T: Scalar> Controller<'_, T> {
-    /// Feed-forward plus integral feedback, within the limits.
-    pub(super) fn move_paddle(&self, state: &mut State<T>, tick: &Tick, faults: &mut Faults) {
+    /// Where the needle will be when a command of this tick acts, length.
+    pub(super) fn depth_ahead(&self, state: &State<T>, time_ns: u64) -> Option<T> {
+        let needle = state.needle.accepted?;
+        let [depth, velocity] = needle.values;
+        let lead_ns = time_ns.saturating_sub(needle.time_ns).saturating_add(self.runtime.actuator_delay_ns);
+        Some(T::of(depth + velocity * seconds(lead_ns)))
+    }
+
+    /// Feed-forward plus feedback, within the limits.
+    pub(super) fn move_paddle(&self, state: &mut State<T>, tick: &Tick, depth: T, faults: &mut Faults) {
         let runtime = &self.runtime;
         let (Some(previous), Some(needle)) = (state.displacement, state.needle.accepted) else {
             return;
         };
-        let [depth, velocity] = needle.values;
-        // Where the needle will be when the command acts.
-        let lead_ns = tick.time_ns.saturating_sub(needle.time_ns).saturating_add(runtime.actuator_delay_ns);
-        let Some(location) = self.table.locate(T::of(depth + velocity * seconds(lead_ns))) else {
+        let Some(location) = self.table.locate(depth) else {
             return;
         };
         // The rate limit is one per second: a tick that comes early may go less far, one that comes late no further.
@@ -41,28 +49,17 @@ impl<T: Scalar> Controller<'_, T> {
             Limits { max_step: T::of(runtime.paddle_rate * seconds(tick.elapsed_ns)), ..runtime.limits }
         };
         let feed_forward = location.paddle_path();
-        let mut integral = state.integral.unwrap_or(previous - feed_forward);
-        if let Some(sample) = tick.fresh_target {
-            let n = &self.table.orthogonal;
-            let error = n.dot(&from_frame(&sample.values));
-            let direction = runtime.direction.solve(&location.jacobian(), n);
-            let change = -runtime.gain * error;
-            let correction = direction.map(|component| component * change);
-            // Measured while the paddle was on its way at full rate: what is asked for once more may be there already.
-            let repeats = state.underway.is_some_and(|underway| underway.explains(sample.time_ns, &correction));
-            let corrected =
-                if repeats { integral } else { limits.integrate(&integral, &correction, &feed_forward, &previous) };
-            // A correction that saturation swallows proves nothing about the sign of the plant.
-            let taken = (corrected - integral).dot(&correction);
-            let acted = taken > correction.norm_squared() * T::of(0.5);
-            integral = corrected;
-            if acted {
-                let diverges = state.divergence.update(runtime, error.to_f64(), velocity);
-                faults.set_if(Faults::DIVERGENCE, diverges);
-            }
+        let setting = Setting { location, feed_forward, previous, limits };
+        let feedback = match runtime.feedback {
+            Feedback::Integral => self.integrate(state, tick.fresh_target, &setting),
+            Feedback::Observer => self.observe(state, tick.fresh_target, &setting),
+        };
+        if let Some(correction) = feedback.correction {
+            let diverges = state.divergence.update(runtime, correction.error, correction.size, needle.values[1]);
+            faults.set_if(Faults::DIVERGENCE, diverges);
         }
 
-        let limited = limits.command(&previous, &(feed_forward + integral));
+        let limited = limits.command(&previous, &(feed_forward + feedback.now));
         if !to_frame(&limited.displacement).iter().all(|component| component.is_finite()) {
             *faults |= Faults::INTERNAL;
             return;
@@ -75,8 +72,16 @@ impl<T: Scalar> Controller<'_, T> {
         }
         let [x, y] = &mut state.gate.travel.paddle;
         (*x, *y) = (*x + step.x.abs().to_f64(), *y + step.y.abs().to_f64());
-        state.integral = Some(integral);
+        (state.integral, state.estimate) = (Some(feedback.at_sample), feedback.estimate);
         state.displacement = Some(limited.displacement);
+    }
+
+    /// Remembers where needle and paddle are once the command of this tick has acted.
+    pub(super) fn remember(&self, state: &mut State<T>, time_ns: u64, depth: T) {
+        if let (Feedback::Observer, Some(paddle)) = (self.runtime.feedback, state.displacement) {
+            let time_ns = time_ns.saturating_add(self.runtime.actuator_delay_ns);
+            state.history.record(self.runtime.history_ns / INTERVALS, Moment { time_ns, depth, paddle });
+        }
     }
 
     fn note_motion_underway(&self, state: &mut State<T>, tick: &Tick, step: SVector<T, D>) {

@@ -4,6 +4,7 @@ use nalgebra::SVector;
 
 use super::D;
 use super::clock::Clock;
+use super::history::History;
 use crate::contract::{Faults, Mode};
 use crate::inputs::Ledger;
 use crate::inputs::monitors::{
@@ -11,6 +12,7 @@ use crate::inputs::monitors::{
 };
 use crate::inputs::stream::StreamGate;
 use crate::inputs::supervisor::Supervisor;
+use crate::observer::Observer;
 use crate::scalar::Scalar;
 
 /// Everything that changes from tick to tick. Equal states and inputs give equal commands, bit by bit.
@@ -26,8 +28,12 @@ pub struct State<T: Scalar> {
     pub(super) armed: bool,
     /// Last displacement commanded; `None` until the measured position has been adopted.
     pub(super) displacement: Option<SVector<T, D>>,
-    /// Integral of the feedback; `None` until the first tick in RUN makes it continue from the adopted position.
+    /// What the feedback adds, at the last sample that it used; `None` until the first tick in RUN makes it continue from the adopted position.
     pub(super) integral: Option<SVector<T, D>>,
+    /// What the observer knows; `None` until the first tick in RUN, and without one.
+    pub(super) estimate: Option<Estimate<T>>,
+    /// Where needle and paddle were.
+    pub(super) history: History<T>,
     /// The last motion at full rate.
     pub(super) underway: Option<Underway<T>>,
     pub(super) needle: StreamGate,
@@ -65,14 +71,14 @@ impl<T: Scalar> State<T> {
         &self.ledger
     }
 
-    /// Integral part of the command, length; `None` before RUN.
+    /// What the feedback adds to the feed-forward since the last sample that it used, length; `None` before RUN.
     pub fn integral(&self) -> Option<[f64; 2]> {
         self.integral.as_ref().map(to_frame)
     }
 
     /// The paddle's position is no longer known.
     pub(super) fn forget_position(&mut self) {
-        (self.displacement, self.integral) = (None, None);
+        (self.displacement, self.integral, self.estimate) = (None, None, None);
         self.rest = RestMonitor::default();
     }
 
@@ -90,6 +96,18 @@ impl<T: Scalar> State<T> {
             ..Self::default()
         };
     }
+}
+
+/// What the observer knows, and what it asks of the paddle between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Estimate<T: Scalar> {
+    pub(super) observer: Observer<T>,
+    /// Time of the last sample, ns.
+    pub(super) time_ns: u64,
+    /// Where the integral holds, length.
+    pub(super) depth: T,
+    /// d(what the feedback adds)/d(depth).
+    pub(super) drift: SVector<T, D>,
 }
 
 /// A motion at full rate: longer than the delay that the gain was chosen for knows of.

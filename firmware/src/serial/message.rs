@@ -10,7 +10,7 @@ use crate::inputs::Ledger;
 use crate::settings::Settings;
 
 /// Version of the messages; the host refuses a device of another one.
-pub const PROTOCOL_VERSION: u32 = 2;
+pub const PROTOCOL_VERSION: u32 = 3;
 
 /// Bytes of a table in one message: whole frames stay small against the line's buffers.
 pub const TABLE_CHUNK_BYTES: usize = 256;

@@ -5,7 +5,7 @@ use core::num::NonZeroU64;
 
 use serde::{Deserialize, Serialize};
 
-use crate::law::Direction;
+use crate::law::{Direction, Feedback};
 use crate::limits::PositionLimit;
 use crate::loop_stability;
 use crate::schedule::quotient;
@@ -27,7 +27,9 @@ pub struct Settings {
     pub actuator_delay_ns: u64,
     /// Standard deviation of the target sensor per component, length.
     pub target_noise: f64,
-    /// Loop gain g per target sample; `None`: [`loop_stability::default_gain`].
+    /// How measurements of the target become corrections.
+    pub feedback: Feedback,
+    /// Loop gain g per target sample, of an observer the largest; `None`: [`loop_stability::default_gain`].
     pub loop_gain: Option<f64>,
     /// Largest |λ| of J·Ĵ⁻¹ over the expected model errors; `None`: the table's.
     pub lambda_max: Option<f64>,
@@ -48,6 +50,7 @@ impl Settings {
             target_latency_ns,
             actuator_delay_ns: loop_period_ns,
             target_noise: 0.0,
+            feedback: Feedback::Observer,
             loop_gain: None,
             lambda_max: None,
             direction: Direction::Inverse,

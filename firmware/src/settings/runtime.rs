@@ -6,9 +6,10 @@ use crate::detection::{
     DEPTH_MARGIN, FOLLOWING_FRACTION, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN, RESOLUTION_PER_FOLLOWING_ERROR,
     SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
 };
-use crate::law::Direction;
+use crate::law::{Direction, Feedback};
 use crate::limits::Limits;
 use crate::loop_stability;
+use crate::observer::Belief;
 use crate::scalar::Scalar;
 use crate::units::seconds;
 
@@ -24,6 +25,11 @@ pub(crate) struct AgeLimits {
 pub(crate) struct Runtime<T: Scalar> {
     pub(crate) limits: Limits<T>,
     pub(crate) gain: T,
+    pub(crate) feedback: Feedback,
+    /// What the observer believes.
+    pub(crate) belief: Belief<T>,
+    /// Longest time from a measurement of the target to the tick that uses it, ns.
+    pub(crate) history_ns: u64,
     pub(crate) direction: Direction,
     /// Identity of the table's paddle.
     pub(crate) paddle_index: u32,
@@ -95,6 +101,7 @@ impl<T: Scalar> Runtime<T> {
         let (start, end) = (table.validity.depth_start.to_f64(), table.validity.depth_end.to_f64());
         let margin = DEPTH_MARGIN * (end - start);
         let bounds = TableBounds::of(table);
+        let target_range = TARGET_MARGIN * bounds.target_displacement + bounds.jacobian_norm * max_displacement;
         Ok(Self {
             limits: Limits {
                 shape: settings.position_limit,
@@ -102,6 +109,9 @@ impl<T: Scalar> Runtime<T> {
                 max_step: T::of(table.paddle.max_rate.to_f64() * loop_period),
             },
             gain: T::of(gain),
+            feedback: settings.feedback,
+            belief: Belief::new(noise, bounds.target_slope, end - start, target_range, gain.min(1.0)),
+            history_ns: settings.target_latency_ns + settings.target_period_ns + settings.actuator_delay_ns,
             direction: settings.direction,
             paddle_index: table.paddle.index,
             loop_period_ns: settings.loop_period_ns,
@@ -116,7 +126,7 @@ impl<T: Scalar> Runtime<T> {
             plausible_depth: (start - margin, end + margin),
             needle_speed: table.validity.needle_speed.to_f64(),
             plausible_speed: NEEDLE_SPEED_MARGIN * table.validity.needle_speed.to_f64(),
-            target_range: TARGET_MARGIN * bounds.target_displacement + bounds.jacobian_norm * max_displacement,
+            target_range,
             paddle_range: PADDLE_MARGIN * max_displacement,
             target_slope: bounds.target_slope,
             jacobian_norm: bounds.jacobian_norm,

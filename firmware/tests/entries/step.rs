@@ -4,7 +4,7 @@
 use firmware::contract::{
     Gains, Knot, NeedleSample, Paddle, PaddleCommand, PaddleSample, Table, TargetSample, Units, Validity,
 };
-use firmware::{Controller, Faults, Inputs, Mode, Settings, State};
+use firmware::{Controller, Faults, Feedback, Inputs, Mode, Settings, State};
 
 /// A small valid table: needle down, depth 0 to 0.1.
 pub(crate) fn table() -> Table<f64, 2> {
@@ -67,7 +67,9 @@ impl Source<'_> {
 pub(crate) fn step(bytes: &[u8]) {
     const MS: u64 = 1_000_000;
     let table = table();
-    let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+    let feedback = if bytes.len().is_multiple_of(2) { Feedback::Observer } else { Feedback::Integral };
+    let settings = Settings { feedback, ..Settings::new(MS, 20 * MS, 20 * MS) };
+    let controller = Controller::new(&table, &settings).unwrap();
     let mut state = State::<f64>::new();
     let mut source = Source(bytes);
     let mut last: Option<PaddleCommand> = None;

@@ -7,7 +7,7 @@ use firmware::contract::TableError;
 use mcap::McapError;
 use model_offline::model::ModelError;
 use model_offline::output::OutputRefused;
-use model_offline::scene::{SceneError, TableScalar};
+use model_offline::scene::{SceneError, TableScalar, UnknownLength};
 use model_offline::table::TableBuildError;
 
 use super::board::measure::MeasureError;
@@ -33,6 +33,10 @@ pub enum SimError {
     /// An output is refused before the work begins.
     #[error(transparent)]
     Refused(#[from] OutputRefused),
+    /// A sensor in millimetres, and a scene in nobody knows what.
+    #[error(transparent)]
+    #[diagnostic(help("{}", _0.help()))]
+    Sensor(#[from] UnknownLength),
     /// Options that cannot be obeyed.
     #[error(transparent)]
     Usage(#[from] UsageError),
@@ -182,6 +186,7 @@ impl SimError {
             | Self::OutOfRange(_)
             | Self::Refused(_)
             | Self::OtherScene { .. }
+            | Self::Sensor(_)
             | Self::Usage(_)
             | Self::NoInclusion { .. }
             | Self::QemuIsLockstepOnly

@@ -17,8 +17,9 @@ use host_sim::runtime::names;
 use host_sim::runtime::peer::introduction::Introduction;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
-use host_sim::world::loop_settings::LoopSettings;
+use host_sim::world::loop_settings::{LoopArgs, LoopSettings};
 use model_offline::output::table_text::hex;
+use model_offline::scene::SensorPreset;
 
 use super::world_args::PATIENCE;
 use model_offline::output::check_outputs;
@@ -38,9 +39,9 @@ pub(crate) struct ControllerArgs {
     /// What computes the steps
     #[arg(long = "controller", value_enum, default_value_t)]
     pub(crate) hardware: Hardware,
-    /// Rates, latency, noise.
+    /// Rates, and what sees the target.
     #[command(flatten)]
-    pub(crate) loop_settings: LoopSettings,
+    pub(crate) loop_args: LoopArgs,
     /// Seconds of silence after which the plant is given up
     #[arg(long, default_value_t = 30.0, value_name = "S")]
     pub(crate) patience: f64,
@@ -71,13 +72,13 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     if args.parent.is_none() {
         super::sweep();
     }
-    args.loop_settings.check()?;
     PATIENCE.check(args.patience)?;
     check_outputs(&[&args.table], &[("--record", args.record.as_deref()), ("--json", args.json.as_deref())])?;
     let timeout = Duration::from_secs_f64(args.patience);
     let bytes = read_bytes(&args.table)?;
     let table = AnyTable::decode(&bytes).map_err(|source| SimError::Table { path: args.table.clone(), source })?;
-    let settings = args.loop_settings.settings(table.depth_end());
+    let loop_settings = loop_settings(&args.loop_args, &table)?;
+    let settings = loop_settings.settings(table.depth_end());
     let executor = match args.hardware {
         Hardware::Native => table.on_this_machine(&settings)?,
         Hardware::Qemu if args.mode == RunMode::FreeRun => return Err(SimError::QemuIsLockstepOnly),
@@ -93,9 +94,16 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     }
     let parent = args.parent.and_then(rustix::process::Pid::from_raw);
     let introduction = Introduction { scene_hash: hex(&table.scene_hash()), units: table.units() };
-    let service = Service { mode: args.mode, loop_settings: args.loop_settings, timeout, parent, introduction };
+    let service = Service { mode: args.mode, loop_settings, timeout, parent, introduction };
     let served = serve(control_loop, &Space::new(&args.link)?, &service)?;
     hand_in(args, served)
+}
+
+/// What the command line asks for; what it leaves open is as in a scene with the table's units.
+fn loop_settings(args: &LoopArgs, table: &AnyTable) -> Result<LoopSettings, SimError> {
+    let ([unit, _], depth) = (table.units(), table.depth_end());
+    let own = SensorPreset::of_unit(&unit).sensor(depth, &unit)?;
+    Ok(args.settings(&args.sensor(&own, depth, &unit)?)?)
 }
 
 /// Writes the accounts where they are wanted.

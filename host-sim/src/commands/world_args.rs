@@ -6,7 +6,7 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::usage::UsageError;
 use host_sim::world::error::OptionRange;
-use host_sim::world::loop_settings::LoopSettings;
+use host_sim::world::loop_settings::LoopArgs;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::tissue::WantedPlant;
 use model_offline::scene::Scene;
@@ -28,9 +28,9 @@ pub(crate) struct WorldArgs {
     /// Scene file, or the name of a bundled scene [default: paper]
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
-    /// Rates, latency, noise.
+    /// Rates, and what sees the target.
     #[command(flatten)]
-    pub(crate) loop_settings: LoopSettings,
+    pub(crate) loop_args: LoopArgs,
     /// Duration of the insertion, s
     #[arg(long, default_value_t = 5.0, value_name = "S")]
     pub(crate) insertion_time: f64,
@@ -69,7 +69,8 @@ impl WorldArgs {
     /// # Errors
     /// [`SimError::Usage`] names the option.
     pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
-        self.loop_settings.check()?;
+        let sensor = self.loop_args.sensor(&scene.sensor, scene.needle.depth, &scene.length_unit)?;
+        let loop_settings = self.loop_args.settings(&sensor)?;
         INSERTION_TIME.check(self.insertion_time)?;
         PADDLE_LAG.check(self.paddle_lag)?;
         PADDLE_DELAY.check(f64::from(self.paddle_delay))?;
@@ -77,12 +78,13 @@ impl WorldArgs {
         let mut simulation = Simulation::new(scene).with_insertion(self.insertion_time);
         simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
         DURATION.check(simulation.duration_s)?;
-        let ticks = simulation.duration_s * self.loop_settings.rate;
+        let ticks = simulation.duration_s * loop_settings.rate;
         if ticks > MOST_TICKS {
-            let (duration_s, rate_hz) = (simulation.duration_s, self.loop_settings.rate);
+            let (duration_s, rate_hz) = (simulation.duration_s, loop_settings.rate);
             return Err(UsageError::TooManyTicks { duration_s, rate_hz, ticks, most: MOST_TICKS }.into());
         }
-        simulation.loop_settings = self.loop_settings;
+        simulation.loop_settings = loop_settings;
+        simulation.sensor = sensor;
         simulation.actuator.lag_s = self.paddle_lag * 1e-3;
         simulation.actuator.delay_ticks = self.paddle_delay;
         simulation.actuator.gain = self.paddle_gain;

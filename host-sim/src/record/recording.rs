@@ -10,7 +10,7 @@
 //! | 8 | seed |
 //! | 32 | SHA-256 of the plant's scene |
 //! | 32 | SHA-256 of the table's bytes |
-//! | 96 | settings of the controller, see [`RecordingHeader`] |
+//! | 100 | settings of the controller, see [`RecordingHeader`]; 96 in version 1, whose feedback is the integral |
 //! | 4 + L | length of the table, and the table itself |
 //! | 32 | chain value h₀ = SHA-256 of everything above |
 //! | n · 288 | records: 256 bytes b, and hᵢ = SHA-256(hᵢ₋₁ ‖ b) |
@@ -36,7 +36,9 @@ pub mod stream;
 use layout::{decode_header, decode_record, encode_header, encode_record};
 
 const MAGIC: [u8; 8] = *b"STILLREC";
-const FORMAT_VERSION: u32 = 1;
+const FORMAT_VERSION: u32 = 2;
+/// Before there was a choice of feedback: the integral.
+const FIRST_VERSION: u32 = 1;
 const BODY_BYTES: usize = 256;
 const HASH_BYTES: usize = 32;
 const RECORD_BYTES: usize = BODY_BYTES + HASH_BYTES;

@@ -1,12 +1,10 @@
 //! What plant and controller must agree on: rates, latency, noise. The same options on both command lines.
 
-use clap::Args;
-use firmware::Settings;
+use clap::{Args, ValueEnum};
+use firmware::{Feedback, Settings};
+use model_offline::scene::{IDEAL_NOISE_PER_DEPTH, Sensor, SensorPreset, UnknownLength};
 
 use super::error::{OptionRange, OutOfRange};
-
-/// Standard deviation of the target sensor when none is given, part of the insertion depth.
-pub const DEFAULT_NOISE_PER_DEPTH: f64 = 1e-4;
 
 /// Rates of the loop: a period of 10 µs is less than a step and an exchange take, and 50 s are no loop any more.
 const RATE: OptionRange = OptionRange::new("--rate", 0.02, 1e5, " Hz");
@@ -14,7 +12,83 @@ const TARGET_RATE: OptionRange = OptionRange::new("--target-rate", 0.02, 1e5, " 
 const LATENCY: OptionRange = OptionRange::new("--latency", 0.0, 6e4, " ms");
 const NOISE: OptionRange = OptionRange::new("--noise", 0.0, 1e6, " length units");
 
-/// Rates, latency and noise of the loop, as command-line options.
+/// How measurements of the target become corrections, as command lines call it; see [`Feedback`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum FeedbackLaw {
+    /// A fixed part of the error at every sample
+    Integral,
+    /// What the table leaves is estimated from sensor and table, as good as each is
+    #[default]
+    Observer,
+}
+
+impl FeedbackLaw {
+    /// As the controller calls it.
+    pub const fn feedback(self) -> Feedback {
+        match self {
+            Self::Integral => Feedback::Integral,
+            Self::Observer => Feedback::Observer,
+        }
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Integral => "integral",
+            Self::Observer => "observer",
+        }
+    }
+}
+
+/// Rate of the loop, and what sees the target, as command-line options: what is not given is the scene's.
+#[derive(Args, Clone, Copy, Debug, PartialEq)]
+pub struct LoopArgs {
+    /// Rate of the control loop, Hz
+    #[arg(long, default_value_t = LoopSettings::default().rate, value_name = "HZ")]
+    pub rate: f64,
+    /// What sees the target [default: the scene's, which is ultrasound where its unit of length is known, else ideal]
+    #[arg(long, value_enum, value_name = "PRESET")]
+    pub sensor: Option<SensorPreset>,
+    /// Rate of the target sensor, Hz [default: the sensor's]
+    #[arg(long, value_name = "HZ")]
+    pub target_rate: Option<f64>,
+    /// Time from a measurement of the target to its arrival, ms [default: the sensor's]
+    #[arg(long, value_name = "MS")]
+    pub latency: Option<f64>,
+    /// Standard deviation of the target sensor per component, length [default: the sensor's]
+    #[arg(long, value_name = "LENGTH")]
+    pub noise: Option<f64>,
+    /// How measurements of the target become corrections
+    #[arg(long, value_enum, default_value_t, value_name = "LAW")]
+    pub feedback: FeedbackLaw,
+}
+
+impl LoopArgs {
+    /// The sensor that is asked for; `own` where none is.
+    ///
+    /// # Errors
+    /// [`UnknownLength`].
+    pub fn sensor(&self, own: &Sensor, depth: f64, unit: &str) -> Result<Sensor, UnknownLength> {
+        let preset = self.sensor.map_or(Ok(*own), |preset| preset.sensor(depth, unit))?;
+        let mut sensor = preset;
+        sensor.rate = self.target_rate.unwrap_or(sensor.rate);
+        sensor.latency = self.latency.map_or(sensor.latency, |latency| 1e-3 * latency);
+        sensor.noise = self.noise.unwrap_or(sensor.noise);
+        sensor.is_changed |= sensor != preset;
+        Ok(sensor)
+    }
+
+    /// The settings of a loop with this sensor.
+    ///
+    /// # Errors
+    /// [`OutOfRange`] names the option.
+    pub fn settings(&self, sensor: &Sensor) -> Result<LoopSettings, OutOfRange> {
+        let settings = LoopSettings { rate: self.rate, feedback: self.feedback, ..LoopSettings::of(sensor) };
+        settings.check()?;
+        Ok(settings)
+    }
+}
+
+/// Rates, latency and noise of the loop.
 ///
 /// ```
 /// use host_sim::LoopSettings;
@@ -23,30 +97,34 @@ const NOISE: OptionRange = OptionRange::new("--noise", 0.0, 1e6, " length units"
 /// assert_eq!(settings.period_ns(), 2_000_000);
 /// assert!(LoopSettings { rate: 0.0, ..settings }.check().is_err());
 /// ```
-#[derive(Args, Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopSettings {
-    /// Rate of the control loop, Hz
-    #[arg(long, default_value_t = Self::default().rate, value_name = "HZ")]
+    /// Rate of the control loop, Hz.
     pub rate: f64,
-    /// Rate of the target sensor, Hz
-    #[arg(long, default_value_t = Self::default().target_rate, value_name = "HZ")]
+    /// Rate of the target sensor, Hz.
     pub target_rate: f64,
-    /// Time from a measurement of the target to its arrival, ms
-    #[arg(long, default_value_t = Self::default().latency, value_name = "MS")]
+    /// Time from a measurement of the target to its arrival, ms.
     pub latency: f64,
-    /// Standard deviation of the target sensor per component, length [default: 1e-4 of the insertion depth]
-    #[arg(long, value_name = "LENGTH")]
+    /// Standard deviation of the target sensor per component, length; none: 1e-4 of the insertion depth.
     pub noise: Option<f64>,
+    /// How measurements of the target become corrections.
+    pub feedback: FeedbackLaw,
 }
 
 impl Default for LoopSettings {
     /// 1 kHz, with the target seen at 50 Hz and 20 ms late.
     fn default() -> Self {
-        Self { rate: 1000.0, target_rate: 50.0, latency: 20.0, noise: None }
+        Self { rate: 1000.0, target_rate: 50.0, latency: 20.0, noise: None, feedback: FeedbackLaw::default() }
     }
 }
 
 impl LoopSettings {
+    /// A loop of 1 kHz with this sensor.
+    pub fn of(sensor: &Sensor) -> Self {
+        let Sensor { rate, latency, noise, .. } = *sensor;
+        Self { target_rate: rate, latency: 1e3 * latency, noise: Some(noise), ..Self::default() }
+    }
+
     /// Checks the numbers.
     ///
     /// # Errors
@@ -65,7 +143,7 @@ impl LoopSettings {
 
     /// Noise for an insertion to `depth`, length.
     pub fn noise_for(&self, depth: f64) -> f64 {
-        self.noise.unwrap_or(DEFAULT_NOISE_PER_DEPTH * depth)
+        self.noise.unwrap_or(IDEAL_NOISE_PER_DEPTH * depth)
     }
 
     /// Settings of the controller for an insertion to `depth`.
@@ -73,12 +151,13 @@ impl LoopSettings {
         let latency_ns = (self.latency * 1e6).round() as u64;
         Settings {
             target_noise: self.noise_for(depth),
+            feedback: self.feedback.feedback(),
             ..Settings::new(period_ns(self.rate), period_ns(self.target_rate), latency_ns)
         }
     }
 
     /// The options as another process takes them. Rust prints the shortest decimal that reads back the same number.
-    pub fn to_arguments(self, depth: f64) -> [String; 8] {
+    pub fn to_arguments(self, depth: f64) -> [String; 10] {
         [
             "--rate".to_owned(),
             self.rate.to_string(),
@@ -88,6 +167,8 @@ impl LoopSettings {
             self.latency.to_string(),
             "--noise".to_owned(),
             self.noise_for(depth).to_string(),
+            "--feedback".to_owned(),
+            self.feedback.name().to_owned(),
         ]
     }
 }

@@ -98,7 +98,8 @@ impl<T: TissueResponse> World<T> {
                 settings.target_latency_ns,
                 settings.target_noise,
                 simulation.seed,
-            ),
+            )
+            .with_defects_of(&simulation.sensor, simulation.seed),
             encoders: Encoders::new(paddle_index),
         };
         Self::of(tissue, drive, PaddleActuator::new(simulation.actuator), sensors)

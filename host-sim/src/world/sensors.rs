@@ -7,14 +7,16 @@ use std::collections::VecDeque;
 
 use firmware::contract::frames::TARGET_VISIBLE;
 use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
+use model_offline::scene::{Outages, Sensor};
 use nalgebra::Vector2;
-use rand_distr::{Distribution, StandardNormal};
+use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::needle::NeedleMotion;
 
 /// Stream numbers of the generator: sensors do not share random numbers.
 const TARGET_STREAM: u128 = 1;
+const OUTAGE_STREAM: u128 = 2;
 
 /// The target's camera: samples at its own rate, which arrive late.
 #[derive(Clone, Debug)]
@@ -23,6 +25,11 @@ pub struct TargetSensor {
     latency_ns: u64,
     /// Standard deviation per component, length.
     noise: f64,
+    /// Step of what is reported, length; 0: none.
+    quantisation: f64,
+    /// Added to every measurement, length.
+    bias: Vector2<f64>,
+    outages: Option<OutageSchedule>,
     random: Pcg64,
     sequence: u32,
     next_ns: Option<u64>,
@@ -36,11 +43,21 @@ impl TargetSensor {
             period_ns: period_ns.max(1),
             latency_ns,
             noise,
+            quantisation: 0.0,
+            bias: Vector2::zeros(),
+            outages: None,
             random: Pcg64::new(u128::from(seed), TARGET_STREAM),
             sequence: 0,
             next_ns: None,
             on_their_way: VecDeque::new(),
         }
+    }
+
+    /// The same with the bias, the steps and the outages of this one.
+    #[must_use]
+    pub fn with_defects_of(self, sensor: &Sensor, seed: u64) -> Self {
+        let outages = sensor.outages.map(|outages| OutageSchedule::new(outages, seed));
+        Self { quantisation: sensor.quantisation, bias: sensor.bias, outages, ..self }
     }
 
     /// Measures if a measurement is due at `time_ns`.
@@ -52,10 +69,14 @@ impl TargetSensor {
         // The phase stays, also when the plant has skipped ticks.
         let periods = (time_ns - due_ns) / self.period_ns + 1;
         self.next_ns = Some(due_ns + periods * self.period_ns);
-        let measured = displacement.map(|component| component + self.noise * self.normal());
+        let mut measured = displacement.map(|component| component + self.noise * self.normal()) + self.bias;
+        if self.quantisation > 0.0 {
+            measured = measured.map(|component| (component / self.quantisation).round() * self.quantisation);
+        }
+        let sees = !self.outages.as_mut().is_some_and(|outages| outages.is_out(time_ns));
         self.on_their_way.push_back(TargetSample {
             sequence: self.sequence,
-            flags: TARGET_VISIBLE,
+            flags: if sees { TARGET_VISIBLE } else { 0 },
             time_ns,
             displacement: measured.into(),
         });
@@ -70,6 +91,37 @@ impl TargetSensor {
 
     fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.random)
+    }
+}
+
+/// When nothing is seen: gaps of exponential length between outages.
+#[derive(Clone, Debug)]
+struct OutageSchedule {
+    outages: Outages,
+    random: Pcg64,
+    /// The outage that is next or now, ns.
+    next_ns: Option<[u64; 2]>,
+}
+
+impl OutageSchedule {
+    fn new(outages: Outages, seed: u64) -> Self {
+        Self { outages, random: Pcg64::new(u128::from(seed), OUTAGE_STREAM), next_ns: None }
+    }
+
+    /// Called with times that do not go back.
+    fn is_out(&mut self, time_ns: u64) -> bool {
+        let mut next_ns = self.next_ns.unwrap_or_else(|| self.after(time_ns));
+        while time_ns >= next_ns[1] {
+            next_ns = self.after(next_ns[1]);
+        }
+        self.next_ns = Some(next_ns);
+        time_ns >= next_ns[0]
+    }
+
+    fn after(&mut self, time_ns: u64) -> [u64; 2] {
+        let gap_s: f64 = Exp1.sample(&mut self.random);
+        let begins_ns = time_ns + (1e9 * self.outages.every * gap_s) as u64;
+        [begins_ns, begins_ns + ((1e9 * self.outages.last) as u64).max(1)]
     }
 }
 
@@ -111,6 +163,7 @@ impl Encoders {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use model_offline::scene::Scene;
 
     const MS: u64 = 1_000_000;
 
@@ -143,6 +196,34 @@ mod tests {
     fn noise_follows_the_seed_alone() {
         assert_eq!(samples(3, 0.1), samples(3, 0.1));
         assert_ne!(samples(3, 0.1), samples(4, 0.1));
+    }
+
+    #[test]
+    fn bias_and_steps_are_those_of_the_scene() {
+        let scene = Scene::bundled("paper").unwrap();
+        let defects = Sensor { quantisation: 0.25, bias: Vector2::new(0.1, -1.0), ..scene.sensor };
+        let mut sensor = TargetSensor::new(1, 0, 0.0, 1).with_defects_of(&defects, 1);
+        sensor.measure(0, &Vector2::new(0.3, 0.3));
+        let sample = sensor.arrived(0).unwrap();
+        assert_eq!(sample.displacement, [0.5, -0.75], "0.4 and −0.7 in steps of a quarter");
+        assert!(sample.is_visible());
+    }
+
+    #[test]
+    fn outages_are_as_long_and_as_rare_as_stated() {
+        let scene = Scene::bundled("paper").unwrap();
+        let defects = Sensor { outages: Some(Outages { every: 3.0, last: 0.5 }), ..scene.sensor };
+        let mut sensor = TargetSensor::new(10 * MS, 0, 0.0, 1).with_defects_of(&defects, 7);
+        let seen: Vec<bool> = (0..400_000)
+            .map(|k| {
+                sensor.measure(k * 10 * MS, &Vector2::zeros());
+                sensor.arrived(k * 10 * MS).unwrap().is_visible()
+            })
+            .collect();
+        let out: Vec<usize> = seen.chunk_by(|a, b| a == b).filter(|run| !run[0]).map(<[bool]>::len).collect();
+        assert!(out.iter().filter(|length| **length == 50).count() > out.len() / 2, "{out:?}");
+        let share = seen.iter().filter(|seen| !**seen).count() as f64 / seen.len() as f64;
+        assert!((share - 0.5 / 3.5).abs() < 0.01, "{share}");
     }
 
     #[test]

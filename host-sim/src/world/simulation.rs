@@ -1,6 +1,6 @@
 //! The numbers of a simulation.
 
-use model_offline::scene::Scene;
+use model_offline::scene::{Scene, Sensor};
 
 use super::actuator::ActuatorModel;
 use super::loop_settings::LoopSettings;
@@ -26,6 +26,8 @@ const SETTLE_S: f64 = 0.5;
 pub struct Simulation {
     /// Rates, latency, noise.
     pub loop_settings: LoopSettings,
+    /// What sees the target; its rate, latency, and noise are those of the loop's settings.
+    pub sensor: Sensor,
     /// Duration of the insertion, s.
     pub insertion_s: f64,
     /// Time simulated after the start of the needle, s.
@@ -42,12 +44,13 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// An insertion to the scene's depth in 5 s, with a servo that follows at the scene's largest rate.
+    /// An insertion to the scene's depth in 5 s, seen by the scene's sensor, with a servo that follows at the scene's largest rate.
     pub fn new(scene: &Scene) -> Self {
         let actuator = ActuatorModel { max_rate: scene.actuator.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
-        let loop_settings = LoopSettings::default();
+        let loop_settings = LoopSettings::of(&scene.sensor);
+        let sensor = scene.sensor;
         let depth = scene.needle.depth;
-        Self { loop_settings, insertion_s: 0.0, duration_s: 0.0, depth, actuator, seed: 1, plant: None }
+        Self { loop_settings, sensor, insertion_s: 0.0, duration_s: 0.0, depth, actuator, seed: 1, plant: None }
             .with_insertion(5.0)
     }
 

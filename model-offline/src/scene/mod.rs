@@ -4,6 +4,7 @@ mod error;
 pub mod import;
 pub mod limits;
 pub mod schema;
+mod sensor;
 mod shaft;
 pub mod starter;
 mod tissue;
@@ -12,6 +13,7 @@ mod validate;
 pub use error::{NoSuchPaddle, SceneError};
 pub use limits::LimitError;
 pub use schema::{FitSection, PlantModel, TableScalar};
+pub use sensor::{IDEAL_NOISE_PER_DEPTH, Outages, Sensor, SensorPreset, UnknownLength};
 pub use shaft::{Mechanics, Resistance, Shaft};
 pub use tissue::TissueVariant;
 
@@ -66,6 +68,8 @@ pub struct Scene {
     pub paddles: Vec<PaddlePosition>,
     /// Limits of the paddle's actuator.
     pub actuator: Actuator,
+    /// What sees the target; not part of the tissue.
+    pub sensor: Sensor,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Discretization,
     /// What else a fit to a tolerance has chosen; not part of the tissue.

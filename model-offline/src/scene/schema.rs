@@ -1,6 +1,7 @@
 //! The scene file as it is written: the public contract, field for field. Validation turns it into a
 //! [`Scene`](super::Scene).
 
+use super::sensor::SensorPreset;
 use super::shaft::Mechanics;
 use crate::choice::choice;
 use crate::discretization::{Basis, Essential, Integration};
@@ -75,6 +76,9 @@ pub struct SceneFile {
     /// Limits of the paddle's actuator.
     #[serde(default)]
     pub actuator: ActuatorSection,
+    /// What sees the target in a simulation (default: ultrasound where the unit of length is known, else ideal).
+    #[serde(default)]
+    pub sensor: SensorSection,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Located<DiscretizationSection>,
     /// What else a fit to a tolerance has chosen.
@@ -225,6 +229,36 @@ pub struct ActuatorSection {
     pub max_rate: Option<Located<f64>>,
     /// Fastest needle the controller keeps compensating, length units per second (default: twice the depth per second).
     pub max_needle_speed: Option<Located<f64>>,
+}
+
+/// What sees the target in a simulation: a preset, and numbers of its own in place of the preset's.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SensorSection {
+    /// Where the numbers come from that are not given (default: ultrasound where the unit of length is known, else ideal).
+    pub preset: Option<Located<SensorPreset>>,
+    /// Measurements per second.
+    pub rate: Option<Located<f64>>,
+    /// Time from a measurement to its arrival, s.
+    pub latency: Option<Located<f64>>,
+    /// Standard deviation of each component, length units.
+    pub noise: Option<Located<f64>>,
+    /// Step of what it reports, length units.
+    pub quantisation: Option<Located<f64>>,
+    /// Added to every measurement, length units.
+    pub bias: Option<Located<[f64; 2]>>,
+    /// Times without measurements, which begin at random.
+    pub outages: Option<Located<OutagesSection>>,
+}
+
+/// Times without measurements.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutagesSection {
+    /// Mean time from the end of one to the beginning of the next, s.
+    pub every: Located<f64>,
+    /// How long each lasts, s.
+    pub last: Located<f64>,
 }
 
 /// How fine and by which method the tissue is modelled.

@@ -1,6 +1,7 @@
 //! How well the target is held, and where the loop stops being stable.
 
 use super::*;
+use crate::law::Feedback;
 
 #[test]
 fn the_right_table_leaves_almost_no_error() {
@@ -49,7 +50,8 @@ fn growth(ratio: f64) -> f64 {
     let mut table = table();
     table.paddle.max_rate = 1e3;
     let limit = loop_stability::gain_limit(0.0, 1);
-    let mut closed = Loop::new(&table, &Settings { loop_gain: Some(ratio * limit), ..settings() });
+    let settings = Settings { feedback: Feedback::Integral, loop_gain: Some(ratio * limit), ..settings() };
+    let mut closed = Loop::new(&table, &settings);
     closed.plant.speed = 0.0;
     let start = 1e-5;
     closed.plant.offset = start;
@@ -190,5 +192,83 @@ fn single_precision_follows_double() {
         assert_eq!(other.state, command.state);
         let distance = Vector2::from(other.displacement) - Vector2::from(command.displacement);
         assert!(distance.norm() < 1e-6);
+    }
+}
+
+/// Root mean square of the orthogonal error over an insertion of 5 s, with a sensor whose noise is six times what the
+/// table's tissue is thought to be off by at the end; mean over seeds.
+fn root_mean_square(settings: &Settings, push: f64) -> f64 {
+    const NOISE: f64 = 1.8e-3;
+    const SEEDS: u64 = 20;
+    let table = table();
+    let mean_square = |seed: u64| {
+        let mut closed = Loop::new(&table, &Settings { target_noise: NOISE, ..*settings });
+        closed.plant.push = push;
+        let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        // Uniform of unit variance (xorshift).
+        let mut deviate = || {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            ((random >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 12f64.sqrt()
+        };
+        let mut squares = 0.0;
+        for _ in 0..5000 {
+            closed.tick(|inputs| {
+                for component in inputs.target.iter_mut().flat_map(|sample| &mut sample.displacement) {
+                    *component += NOISE * deviate();
+                }
+            });
+            squares += closed.plant.target().x.powi(2);
+        }
+        assert_eq!(closed.state.mode(), Mode::Run, "{}", closed.state.faults());
+        squares / 5000.0
+    };
+    ((1..=SEEDS).map(mean_square).sum::<f64>() / SEEDS as f64).sqrt()
+}
+
+/// With a sensor that is poor against the table, using it must not be worse than not using it, nor than trusting it.
+#[test]
+fn feedback_does_not_hurt() {
+    let integral = Settings { feedback: Feedback::Integral, ..settings() };
+    let none = Settings { loop_gain: Some(1e-9), ..integral };
+    for (push, bound) in [(0.02, 1.2e-4), (0.023, 1.4e-4), (0.026, 2.5e-4), (0.04, 6e-4)] {
+        let [by_table, by_sensor, observed] =
+            [none, integral, settings()].map(|settings| root_mean_square(&settings, push));
+        assert!(observed < bound, "push {push}: {observed}");
+        assert!(observed < by_sensor, "push {push}: {observed} against {by_sensor} by the sensor alone");
+        // The table alone is best where it is right, which nobody knows.
+        assert!(observed < by_table.max(1.2e-4), "push {push}: {observed} against {by_table} by the table alone");
+    }
+}
+
+/// With a good sensor: what the table leaves grows with the depth, and an integral lags behind it.
+#[test]
+fn the_observer_does_not_lag_behind_a_ramp() {
+    let table = table();
+    let halfway = |feedback| {
+        let mut closed = Loop::new(&table, &Settings { feedback, target_noise: 1e-5, ..settings() });
+        closed.plant.push = 0.035;
+        closed.run(3000);
+        closed.plant.target().x.abs()
+    };
+    let (integral, observer) = (halfway(Feedback::Integral), halfway(Feedback::Observer));
+    assert!(integral > 1e-5 && observer < 0.02 * integral, "{integral} {observer}");
+}
+
+/// A servo that is slower than thought, and tissue that answers more or less than thought: no offset, no instability.
+#[test]
+fn the_observer_bears_an_effect_that_is_not_the_table_s() {
+    let table = table();
+    for scale in [0.3, 0.7, 1.3, 2.0, 3.0] {
+        for actuator_gain in [0.99, 1.0] {
+            let mut closed = Loop::new(&table, &settings());
+            closed.plant.jacobian = jacobian() * scale;
+            closed.plant.actuator_gain = actuator_gain;
+            closed.run(9000);
+            let left = closed.plant.target().x.abs();
+            assert_eq!(closed.state.mode(), Mode::Run, "{scale}: {}", closed.state.faults());
+            assert!(left < 1e-6, "effect {scale}, gain {actuator_gain}: {left}");
+        }
     }
 }

@@ -20,8 +20,14 @@ pub(crate) struct DivergenceMonitor {
 }
 
 impl DivergenceMonitor {
-    /// Enters a sample whose correction acts; returns whether the loop diverges.
-    pub(crate) fn update<T: Scalar>(&mut self, runtime: &Runtime<T>, error: f64, needle_speed: f64) -> bool {
+    /// Enters a sample whose correction, the target's motion that it asks for, acts; returns whether the loop diverges.
+    pub(crate) fn update<T: Scalar>(
+        &mut self,
+        runtime: &Runtime<T>,
+        error: f64,
+        correction: f64,
+        needle_speed: f64,
+    ) -> bool {
         let gain = runtime.gain.to_f64();
         self.peak_speed = self.peak_speed.max(needle_speed.abs());
         let lag_time = (f64::from(runtime.delay_samples) + 1.0 / gain) * runtime.target_period;
@@ -34,7 +40,7 @@ impl DivergenceMonitor {
         }
         self.samples += 1;
         let diverges = magnitude > DIVERGENCE_GROWTH * floor.max(self.start_error) && self.predicted >= floor;
-        self.predicted += gain * magnitude;
+        self.predicted += correction;
         diverges
     }
 }

@@ -194,7 +194,7 @@ fn divergence_needs_growth_and_corrections() {
     let floor = 0.01 * runtime.target_range;
     let trips = |errors: &[f64], speed: f64| {
         let mut monitor = DivergenceMonitor::default();
-        errors.iter().position(|error| monitor.update(&runtime, *error, speed))
+        errors.iter().position(|error| monitor.update(&runtime, *error, 0.25 * error.abs(), speed))
     };
     // Start at 1.1 floors: predicted after k samples is the sum of a quarter of each.
     assert_eq!(trips(&[1.1 * floor, 1.6 * floor, 1.9 * floor, 2.3 * floor], 0.0), Some(3));
@@ -219,8 +219,8 @@ fn divergence_needs_growth_and_corrections() {
     // And the noise of a sensor that states it, eight deviations.
     let noisy = self::runtime(&Settings { target_noise: floor, ..settings() });
     let mut monitor = DivergenceMonitor::default();
-    assert!(![1.1, 1.6, 1.9, 2.3].iter().any(|part| monitor.update(&noisy, part * floor, 0.0)));
-    assert!([8.1, 12.0, 14.0, 17.0].iter().any(|part| monitor.update(&noisy, part * floor, 0.0)));
+    assert!(![1.1, 1.6, 1.9, 2.3].iter().any(|part| monitor.update(&noisy, part * floor, 0.25 * part * floor, 0.0)));
+    assert!([8.1, 12.0, 14.0, 17.0].iter().any(|part| monitor.update(&noisy, part * floor, 0.25 * part * floor, 0.0)));
 }
 
 #[test]
@@ -228,9 +228,9 @@ fn the_peak_speed_of_the_needle_is_remembered() {
     let runtime = runtime(&settings());
     let lag = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt() * 0.1 * 5.0 * 0.02;
     let mut monitor = DivergenceMonitor::default();
-    monitor.update(&runtime, 0.0, -0.1);
+    monitor.update(&runtime, 0.0, 0.0, -0.1);
     let below = [0.6, 0.9, 1.2, 1.5, 1.8];
-    assert!(!below.iter().any(|part| monitor.update(&runtime, part * lag, 0.0)));
+    assert!(!below.iter().any(|part| monitor.update(&runtime, part * lag, 0.25 * part * lag, 0.0)));
 }
 
 #[test]

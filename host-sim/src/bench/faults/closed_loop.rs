@@ -20,7 +20,7 @@ use super::shuttle::ShuttleDrive;
 use super::tissue::LinearTissue;
 use crate::runtime::accounting::tick::ControllerTick;
 use crate::world::actuator::{ActuatorModel, PaddleActuator};
-use crate::world::loop_settings::DEFAULT_NOISE_PER_DEPTH;
+use model_offline::scene::IDEAL_NOISE_PER_DEPTH;
 use crate::world::sensors::{Encoders, TargetSensor};
 use crate::world::{Sensors, World};
 
@@ -59,7 +59,7 @@ impl Setup {
     pub fn new(table: &Table<f64, 2>, seed: u64) -> Self {
         const MS: u64 = 1_000_000;
         let depth = table.validity.depth_end;
-        let noise = DEFAULT_NOISE_PER_DEPTH * depth;
+        let noise = IDEAL_NOISE_PER_DEPTH * depth;
         Self {
             settings: Settings { target_noise: noise, ..Settings::new(MS, 20 * MS, 20 * MS) },
             noise,

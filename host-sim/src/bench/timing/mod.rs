@@ -139,7 +139,7 @@ pub struct SweepResult {
 
 /// Settings of a loop at this rate: both processes of an exchange need the same.
 pub fn loop_settings(rate: f64) -> LoopSettings {
-    LoopSettings { rate, target_rate: f64::min(50.0, rate), latency: 20.0, noise: None }
+    LoopSettings { rate, target_rate: f64::min(50.0, rate), ..LoopSettings::default() }
 }
 
 /// Measures.

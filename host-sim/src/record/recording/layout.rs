@@ -1,11 +1,11 @@
 //! The bytes of headers and records.
 
 use firmware::Settings;
-use firmware::law::Direction;
+use firmware::law::{Direction, Feedback};
 use firmware::limits::PositionLimit;
 use sha2::{Digest, Sha256};
 
-use super::{BODY_BYTES, FORMAT_VERSION, MAGIC, Record, RecordingError, RecordingHeader, TICK_MARK};
+use super::{BODY_BYTES, FIRST_VERSION, FORMAT_VERSION, MAGIC, Record, RecordingError, RecordingHeader, TICK_MARK};
 use crate::exchange::bytes::{ByteReader, ByteWriter};
 use crate::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
 use crate::runtime::time::mode::RunMode;
@@ -39,6 +39,10 @@ pub(super) fn encode_header(header: &RecordingHeader, writer: &mut ByteWriter) {
         PositionLimit::Norm => 1,
         PositionLimit::Box => 2,
     });
+    writer.u32(match settings.feedback {
+        Feedback::Integral => 1,
+        Feedback::Observer => 2,
+    });
     writer.u32(header.table.len() as u32);
     writer.bytes(&header.table);
 }
@@ -48,13 +52,13 @@ pub(super) fn decode_header(reader: &mut ByteReader<'_>) -> Result<RecordingHead
         return Err(RecordingError::NotARecording);
     }
     let found = reader.u32().ok_or(RecordingError::Header)?;
-    if found != FORMAT_VERSION {
+    if !(FIRST_VERSION..=FORMAT_VERSION).contains(&found) {
         return Err(RecordingError::Version { found, known: FORMAT_VERSION });
     }
-    decode_header_fields(reader).ok_or(RecordingError::Header)
+    decode_header_fields(reader, found).ok_or(RecordingError::Header)
 }
 
-fn decode_header_fields(reader: &mut ByteReader<'_>) -> Option<RecordingHeader> {
+fn decode_header_fields(reader: &mut ByteReader<'_>, version: u32) -> Option<RecordingHeader> {
     let mode = match reader.u32()? {
         1 => RunMode::Lockstep,
         2 => RunMode::FreeRun,
@@ -82,6 +86,11 @@ fn decode_header_fields(reader: &mut ByteReader<'_>) -> Option<RecordingHeader> 
     settings.position_limit = match reader.u32()? {
         1 => PositionLimit::Norm,
         2 => PositionLimit::Box,
+        _ => return None,
+    };
+    settings.feedback = match if version == FIRST_VERSION { 1 } else { reader.u32()? } {
+        1 => Feedback::Integral,
+        2 => Feedback::Observer,
         _ => return None,
     };
     let length = reader.u32()? as usize;

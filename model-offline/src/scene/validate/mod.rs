@@ -1,5 +1,6 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
+mod sensor;
 mod shaft;
 
 use super::error::{SceneError, Source};
@@ -83,6 +84,7 @@ impl Validator<'_> {
             paddles,
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, &outline)?,
+            sensor: self.sensor(needle.depth)?,
             fit: file.fit,
             needle,
             outline,
@@ -139,6 +141,15 @@ impl Validator<'_> {
             Ok(v)
         } else {
             Err(self.error(value.span(), format!("{what} is {v}"), format!("{what} must be a positive finite number")))
+        }
+    }
+
+    fn not_negative(&self, value: &Located<f64>, what: &str) -> Checked<f64> {
+        let v = *value.get();
+        if v.is_finite() && v >= 0.0 {
+            Ok(v)
+        } else {
+            Err(self.error(value.span(), format!("{what} is {v}"), format!("{what} must be a finite number, not negative")))
         }
     }
 

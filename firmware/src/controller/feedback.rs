@@ -1,0 +1,120 @@
+//! What measurements of the target add to the feed-forward.
+
+use nalgebra::SVector;
+
+use super::state::{Estimate, from_frame};
+use super::{Controller, D, State};
+use crate::inputs::sample::Measurement;
+use crate::limits::Limits;
+use crate::observer::Observer;
+use crate::scalar::Scalar;
+use crate::table_lookup::TableLocation;
+use crate::units::seconds;
+
+/// What the feedback of a tick starts from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Setting<'t, T: Scalar> {
+    /// The table where the needle will be.
+    pub(super) location: TableLocation<'t, T, D>,
+    /// Its paddle displacement, length.
+    pub(super) feed_forward: SVector<T, D>,
+    /// The command before, length.
+    pub(super) previous: SVector<T, D>,
+    /// Limits of this tick.
+    pub(super) limits: Limits<T>,
+}
+
+/// What the feedback of a tick comes to.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fed<T: Scalar> {
+    /// What it adds to the feed-forward now, length.
+    pub(super) now: SVector<T, D>,
+    /// The same at the last sample that it used, length.
+    pub(super) at_sample: SVector<T, D>,
+    /// What the observer knows.
+    pub(super) estimate: Option<Estimate<T>>,
+    /// A correction that acts, for the monitors.
+    pub(super) correction: Option<Correction>,
+}
+
+/// An orthogonal error and what was done about it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Correction {
+    /// Orthogonal displacement of the target, length.
+    pub(super) error: f64,
+    /// How far the target is to move because of it, length.
+    pub(super) size: f64,
+}
+
+impl<T: Scalar> Controller<'_, T> {
+    /// A fixed part of the error, at every sample.
+    pub(super) fn integrate(&self, state: &State<T>, sample: Option<Measurement>, setting: &Setting<'_, T>) -> Fed<T> {
+        let runtime = &self.runtime;
+        let Setting { location, feed_forward, previous, limits } = setting;
+        let integral = state.integral.unwrap_or(previous - feed_forward);
+        let Some(sample) = sample else {
+            return Fed { now: integral, at_sample: integral, estimate: None, correction: None };
+        };
+        let n = &self.table.orthogonal;
+        let error = n.dot(&from_frame(&sample.values));
+        let direction = runtime.direction.solve(&location.jacobian(), n);
+        let change = -runtime.gain * error;
+        let correction = direction.map(|component| component * change);
+        // Measured while the paddle was on its way at full rate: what is asked for once more may be there already.
+        let repeats = state.underway.is_some_and(|underway| underway.explains(sample.time_ns, &correction));
+        let corrected =
+            if repeats { integral } else { limits.integrate(&integral, &correction, feed_forward, previous) };
+        // A correction that saturation swallows proves nothing about the sign of the plant.
+        let taken = (corrected - integral).dot(&correction);
+        let acted = taken > correction.norm_squared() * T::of(0.5);
+        let correction = Correction { error: error.to_f64(), size: change.abs().to_f64() };
+        Fed { now: corrected, at_sample: corrected, estimate: None, correction: acted.then_some(correction) }
+    }
+
+    /// As much as the observer believes that the table leaves.
+    pub(super) fn observe(&self, state: &State<T>, sample: Option<Measurement>, setting: &Setting<'_, T>) -> Fed<T> {
+        let Setting { location, feed_forward, previous, limits } = setting;
+        let n = &self.table.orthogonal;
+        let (before, mut estimate) = match (state.integral, state.estimate) {
+            (Some(integral), Some(estimate)) => (integral, estimate),
+            // Whoever placed the paddle beside its path had a reason: so much is left there.
+            _ => {
+                let placed = previous - feed_forward;
+                let level = -n.dot(&(location.jacobian() * placed));
+                (placed, self.first_estimate(level, location.depth, sample.map_or(0, |sample| sample.time_ns)))
+            }
+        };
+        let now = before + estimate.drift * (location.depth - estimate.depth);
+        let then = sample.and_then(|sample| state.history.at(sample.time_ns));
+        let measured = then.and_then(|then| Some((then, self.table.locate(then.depth)?)));
+        let (Some(sample), Some((then, measured))) = (sample, measured) else {
+            return Fed { now, at_sample: before, estimate: Some(estimate), correction: None };
+        };
+
+        let error = n.dot(&from_frame(&sample.values));
+        let by_paddle = n.dot(&(measured.jacobian() * (then.paddle - measured.paddle_path())));
+        let elapsed = T::of(seconds(sample.time_ns.saturating_sub(estimate.time_ns)));
+        estimate.observer.update(&self.runtime.belief, error - by_paddle, measured.depth, elapsed);
+
+        // Changed along d alone: where the paddle was placed across it, it stays.
+        let jacobian = location.jacobian();
+        let direction = self.runtime.direction.solve(&jacobian, n);
+        let change = -(estimate.observer.at(location.depth) + n.dot(&(jacobian * now)));
+        let corrected = now + direction * change;
+        estimate.time_ns = sample.time_ns;
+        estimate.depth = location.depth;
+        estimate.drift = -direction * estimate.observer.slope();
+        // A correction that saturation swallows proves nothing about the sign of the plant.
+        let setpoint = feed_forward + corrected;
+        let acted = limits.clamp_position(&setpoint) == setpoint;
+        let correction = Correction { error: error.to_f64(), size: change.abs().to_f64() };
+        let correction = acted.then_some(correction);
+        Fed { now: corrected, at_sample: corrected, estimate: Some(estimate), correction }
+    }
+
+    fn first_estimate(&self, level: T, depth: T, time_ns: u64) -> Estimate<T> {
+        let surface = T::of(self.runtime.table_depth.0);
+        let observer = Observer::starting(&self.runtime.belief, level, depth, surface);
+        Estimate { observer, time_ns, depth, drift: SVector::zeros() }
+    }
+}

@@ -1,0 +1,62 @@
+//! The rules of what sees the target.
+
+use super::{Checked, Validator};
+use crate::scene::schema::Located;
+use crate::scene::sensor::{Outages, Sensor, SensorPreset};
+
+/// Slowest and fastest sensor that is no wrong unit, Hz.
+const RATES: [f64; 2] = [0.02, 1e5];
+/// Longest latency that is no wrong unit, s.
+const LONGEST_LATENCY: f64 = 60.0;
+
+impl Validator<'_> {
+    /// The sensor: a preset with keys of the scene's own.
+    pub(super) fn sensor(&self, depth: f64) -> Checked<Sensor> {
+        let section = &self.file.sensor;
+        let unit = &self.file.scene.units.length;
+        let preset = section.preset.as_ref().map_or(SensorPreset::of_unit(unit), |preset| *preset.get());
+        let mut sensor = preset.sensor(depth, unit).map_err(|error| {
+            // Only a preset that is named can be refused.
+            let span = section.preset.as_ref().map_or(0..0, Located::span);
+            self.error(span, error.to_string(), error.help())
+        })?;
+        let unchanged = sensor;
+        if let Some(rate) = &section.rate {
+            sensor.rate = *rate.get();
+            let [least, most] = RATES;
+            if !(least..=most).contains(&sensor.rate) {
+                return Err(self.error(
+                    rate.span(),
+                    format!("rate: {} Hz is no sensor", sensor.rate),
+                    format!("give measurements per second, from {least} to {most}"),
+                ));
+            }
+        }
+        if let Some(latency) = &section.latency {
+            sensor.latency = self.not_negative(latency, "latency")?;
+            if sensor.latency > LONGEST_LATENCY {
+                return Err(self.error(
+                    latency.span(),
+                    format!("latency: {} s is longer than a minute", sensor.latency),
+                    "give the time from a measurement to its arrival in seconds",
+                ));
+            }
+        }
+        if let Some(noise) = &section.noise {
+            sensor.noise = self.not_negative(noise, "noise")?;
+        }
+        if let Some(quantisation) = &section.quantisation {
+            sensor.quantisation = self.not_negative(quantisation, "quantisation")?;
+        }
+        if let Some(bias) = &section.bias {
+            sensor.bias = self.point(bias.get(), bias.span(), "bias")?;
+        }
+        if let Some(outages) = &section.outages {
+            let every = self.positive(&outages.get().every, "every")?;
+            let last = self.positive(&outages.get().last, "last")?;
+            sensor.outages = Some(Outages { every, last });
+        }
+        sensor.is_changed = sensor != unchanged;
+        Ok(sensor)
+    }
+}
