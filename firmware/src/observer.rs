@@ -299,13 +299,14 @@ mod tests {
         last / 1e-3
     }
 
-    /// Up to four fifths of the effect that the integral with the same gain bears: the slope takes some of its margin.
+    /// Up to seven tenths of the effect that the integral with the same gain bears: the slope takes some of its margin
+    /// (λ·(2α + β) < 4 without delay).
     #[test]
     fn the_loop_is_stable_where_the_gain_promises_it() {
         for delay in [0usize, 1, 2, 3, 5] {
             let limit = crate::loop_stability::gain_limit(0.0, delay as u32)
                 / crate::loop_stability::default_gain(delay as u32, 1.3);
-            for lambda in [0.5, 0.8, 1.0, 1.3, 0.8 * limit] {
+            for lambda in [0.5, 0.8, 1.0, 1.3, 0.7 * limit] {
                 for (noise, way) in [(0.0, 4e-4), (0.0, 0.0), (1e-5, 4e-4), (1e-5, 0.0)] {
                     let left = residual(lambda, delay, noise, way);
                     assert!(left < 0.02, "delay {delay}, λ {lambda}, noise {noise}, way {way}: {left}");

@@ -1,7 +1,8 @@
 //! A needle that slips, against independent numbers, closed forms and balances.
 
+use model_offline::geometry::Polygon;
 use model_offline::needle::{Inserted, NeedleError, SlippingNeedle, Way, insert};
-use model_offline::scene::BUNDLED;
+use model_offline::scene::{BUNDLED, Inclusion, Resistance};
 use model_offline::{NewtonSettings, Scene, TissueModel, discretise};
 use nalgebra::{Matrix2, Vector2};
 
@@ -309,4 +310,127 @@ fn scenes_say_what_is_wrong_with_a_shaft() {
     assert_eq!(scene.resistance_at(Vector2::new(0.65, 0.35), &shaft).cutting_force, 9.0);
     assert_eq!(scene.resistance_at(Vector2::new(0.5, 0.9), &shaft).cutting_force, 1.0);
     assert!(Scene::parse(&own.replace("mechanics = \"shaft\"\ncutting_force = 1.0", ""), "x.toml").is_err());
+}
+
+/// The same with a thin layer across the needle's way, 0.18 to 0.2 below the skin, that is hard to cut.
+fn with_a_layer(scene: Scene) -> Scene {
+    let outline = [[0.3, 0.8], [0.7, 0.8], [0.7, 0.82], [0.3, 0.82]].map(Into::into).to_vec();
+    let resistance = Some(Resistance { cutting_force: 60.0, ..Resistance::default() });
+    let layer = Inclusion { outline: Polygon::new(outline).unwrap(), stiffness: 1.0, material: None, resistance };
+    Scene { inclusions: vec![layer], ..scene }
+}
+
+/// What holds is held: against finite differences of the needle as it is, tips that cut and that hold.
+#[test]
+fn the_jacobian_is_that_of_a_small_motion_of_the_paddle() {
+    let coarse = "spacing = 0.05";
+    let cases = [
+        (with_a_layer(scene("paper", 0.24, "tip_length = 0.02\ncutting_force = 2.0", coarse)), true),
+        (scene("paper", 0.1, "tip_length = 0.02\ncutting_force = 2.0\nkinetic_friction = 3.0", coarse), false),
+        (with_a_layer(linear_paper(0.24, "cutting_force = 2.0", coarse)), true),
+        (
+            scene("breast", 5.0, "tip_length = 0.2\ncutting_force = 1.0\nkinetic_friction = 0.02", "spacing = 4.0"),
+            false,
+        ),
+    ];
+    for (scene, holds) in cases {
+        let model = discretise(&scene).unwrap().0;
+        let mut needle = within(&model, Some(1), 10);
+        let depth = needle.depth();
+        let step = 2e-4 * depth;
+        let difference = |column: usize| {
+            let moved = |by: f64| {
+                let mut needle = needle.clone();
+                let mut paddle = Vector2::zeros();
+                paddle[column] = by;
+                // A needle that slides and cuts is one that goes on.
+                needle.advance(if holds { depth } else { depth + 20.0 * step }, paddle).unwrap();
+                needle.target_displacement()
+            };
+            (moved(step) - moved(-step)) / (2.0 * step)
+        };
+        let expected = Matrix2::from_columns(&[difference(0), difference(1)]);
+        let (tip, jacobian) = (needle.tip_force(), needle.actuation_jacobian().unwrap());
+        let off = (jacobian - expected).norm() / expected.norm();
+        assert!(off < 0.02, "{} tip holds: {holds} with {tip}: {jacobian} by linearisation, {expected}", scene.name);
+    }
+}
+
+/// A thin layer that is hard to cut, met in the middle of an increment or passed within one.
+#[test]
+fn a_thin_layer_is_met_by_any_increments() {
+    let layer = "spacing = 0.05";
+    for linear in [false, true] {
+        let mut scene = with_a_layer(scene("paper", 0.3, "tip_length = 0.02\ncutting_force = 2.0", layer));
+        if linear {
+            scene.material = scene.material.linearised();
+        }
+        let model = discretise(&scene).unwrap().0;
+        let forces = [3, 5, 10, 30, 47].map(|increments| within(&model, None, increments).base_force());
+        let (least, most) = forces.iter().fold((f64::INFINITY, 0.0), |(a, b), f| (f64::min(a, *f), f64::max(b, *f)));
+        assert!(least > 25.0 && most < 1.01 * least, "linear: {linear}: {forces:?}");
+    }
+}
+
+#[test]
+fn the_paddle_s_work_is_in_the_balance() {
+    for mut scene in nonlinear() {
+        scene.needle.increments = 60;
+        let model = discretise(&scene).unwrap().0;
+        let mut needle = within(&model, Some(1), 60);
+        let step = 0.01 * needle.depth();
+        for k in 1..=20 {
+            needle.advance(needle.depth(), Vector2::new(step, 0.5 * step) * f64::from(k)).unwrap();
+        }
+        let energy = needle.energy();
+        assert!(energy.paddle.abs() > 1e-3 * energy.stored, "{}: {energy:?}", scene.name);
+        let left = energy.work + energy.paddle - energy.stored - energy.friction - energy.cutting;
+        assert!(left.abs() < 0.01 * (energy.work + energy.paddle.abs()), "{}: {left} of {energy:?}", scene.name);
+    }
+}
+
+/// A needle pushed on in its own old cut: the tip is led by it, and nothing jumps.
+#[test]
+fn an_old_cut_leads_the_tip() {
+    let scene = scene("paper", 0.2, "tip_length = 0.02\ncutting_force = 2.0\nkinetic_friction = 3.0", "spacing = 0.05");
+    let model = discretise(&scene).unwrap().0;
+    let mut needle = within(&model, Some(1), 20);
+    for k in 1..=10 {
+        needle.advance(0.2, Vector2::new(0.004, 0.0) * f64::from(k)).unwrap();
+    }
+    needle.advance(0.15, Vector2::new(0.04, 0.0)).unwrap();
+    let before = needle.target_displacement();
+    for step in [1e-5, 1e-4, 1e-3] {
+        let mut on = needle.clone();
+        on.advance(0.15 + step, Vector2::new(0.04, 0.0)).unwrap();
+        let moved = (on.target_displacement() - before).norm();
+        assert!(moved < step, "{step} further: the target moves by {moved}");
+    }
+}
+
+#[test]
+fn forces_as_small_as_you_like_are_forces() {
+    let forces = [1e-7, 1e-5, 1e-3].map(|friction| {
+        let keys = format!("tip_length = 0.02\nkinetic_friction = {friction}");
+        let model = discretise(&scene("paper", 0.3, &keys, "spacing = 0.05")).unwrap().0;
+        within(&model, None, 10).base_force() / friction
+    });
+    assert!(forces.iter().all(|force| (force - 0.3).abs() < 1e-3), "{forces:?}");
+}
+
+/// Nodes that happen to lie on the line are not the stations where others lie closer beside it.
+#[test]
+fn a_line_through_few_nodes_is_held_as_well_as_one_through_none() {
+    let displacement = |slope: f64| {
+        let mut scene = scene("paper", 0.5, "tip_length = 0.02\ncutting_force = 2.0", "spacing = 0.05");
+        scene.needle.axis = Vector2::new(slope, -1.0).normalize();
+        scene.needle.shaft.as_mut().unwrap().entry = Vector2::new(0.4, 1.0);
+        let model = discretise(&scene).unwrap().0;
+        let mut needle = within(&model, Some(1), 10);
+        needle.advance(0.5, Vector2::new(0.03, 0.03)).unwrap();
+        (needle.target_displacement(), needle.stations().len())
+    };
+    let ((few, stations), (none, others)) = (displacement(0.2), displacement(0.2001));
+    assert!(stations > 8 && others > 8, "{stations} {others}");
+    assert!((few - none).norm() < 0.02 * none.norm(), "{few} {none}");
 }

@@ -28,6 +28,8 @@ pub fn settings(scene: &Scene, simulation: &Simulation) -> SimulationSettings {
         insertion_s: simulation.insertion_s,
         duration_s: simulation.duration_s,
         depth: simulation.depth,
+        sensor: simulation.sensor.title(),
+        feedback: loop_settings.feedback.name().to_owned(),
         target_rate_hz: loop_settings.target_rate,
         target_latency_ms: loop_settings.latency,
         noise: loop_settings.noise_for(simulation.depth),

@@ -60,6 +60,14 @@ impl RunResult {
     }
 }
 
+fn unnamed() -> String {
+    "sensor".to_owned()
+}
+
+fn integral() -> String {
+    "integral".to_owned()
+}
+
 /// Settings of the simulation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SimulationSettings {
@@ -71,6 +79,12 @@ pub struct SimulationSettings {
     pub duration_s: f64,
     /// Depth of the insertion, length.
     pub depth: f64,
+    /// What sees the target: a preset, or one that was changed.
+    #[serde(default = "unnamed")]
+    pub sensor: String,
+    /// How measurements of the target become corrections: `integral` or `observer`.
+    #[serde(default = "integral")]
+    pub feedback: String,
     /// Rate of the target sensor, Hz.
     pub target_rate_hz: f64,
     /// Latency of the target sensor, ms.
@@ -288,6 +302,13 @@ pub struct StrategyResult {
     #[serde(with = "names::mode")]
     #[schemars(with = "String")]
     pub final_state: Option<Mode>,
+    /// Part of the ticks from the needle's start on that ended in RUN; none without a controller.
+    #[serde(default)]
+    pub run_share: Option<f64>,
+    /// Fault codes of the others.
+    #[serde(default, with = "names::faults")]
+    #[schemars(with = "String")]
+    pub outside_run_for: Faults,
     /// Every fault that was ever present: names joined by ` | `, or `NONE`.
     #[serde(with = "names::faults")]
     #[schemars(with = "String")]

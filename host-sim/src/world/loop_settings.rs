@@ -31,7 +31,8 @@ impl FeedbackLaw {
         }
     }
 
-    const fn name(self) -> &'static str {
+    /// Its name on command lines and in reports.
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Integral => "integral",
             Self::Observer => "observer",

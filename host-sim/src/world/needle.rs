@@ -32,6 +32,11 @@ impl NeedleTrajectory {
         Self { depth, insertion_s, ramp_s: RAMP_S.min(0.25 * insertion_s) }
     }
 
+    /// Its largest speed, length/s.
+    pub fn speed(&self) -> f64 {
+        self.depth / (self.insertion_s - self.ramp_s)
+    }
+
     /// Motion at a time after the start, s (negative: not started).
     pub fn at(&self, time_s: f64) -> NeedleMotion {
         let (depth, velocity) = self.depth_and_velocity(time_s);
@@ -40,7 +45,7 @@ impl NeedleTrajectory {
 
     fn depth_and_velocity(&self, time_s: f64) -> (f64, f64) {
         let (total, ramp) = (self.insertion_s, self.ramp_s);
-        let speed = self.depth / (total - ramp);
+        let speed = self.speed();
         if time_s <= 0.0 {
             (0.0, 0.0)
         } else if time_s < ramp {

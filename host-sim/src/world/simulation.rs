@@ -4,6 +4,7 @@ use model_offline::scene::{Scene, Sensor};
 
 use super::actuator::ActuatorModel;
 use super::loop_settings::LoopSettings;
+use super::needle::NeedleTrajectory;
 use super::tissue::WantedPlant;
 
 /// The controller needs one target sample to arrive; everything longer is a fault of the set-up.
@@ -58,6 +59,11 @@ impl Simulation {
     #[must_use]
     pub fn with_insertion(self, insertion_s: f64) -> Self {
         Self { insertion_s, duration_s: insertion_s + SETTLE_S, ..self }
+    }
+
+    /// Largest speed of the needle, length/s.
+    pub fn needle_speed(&self) -> f64 {
+        NeedleTrajectory::new(self.depth, self.insertion_s).speed()
     }
 
     /// Ticks of a run, with the wait for RUN.

@@ -65,6 +65,12 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     if !args.depth.is_finite() || args.depth < 0.0 {
         return Err(CliError::usage(format!("--depth is {}", args.depth), "give a depth of 0 or more"));
     }
+    if scene.needle.shaft.is_some() && args.depth > scene.needle.depth {
+        return Err(CliError::usage(
+            format!("--depth is {}, and the needle of this scene goes to {}", args.depth, scene.needle.depth),
+            "raise depth in [needle]: nodes are placed along its shaft",
+        ));
+    }
     let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref()), ("--svg", args.svg.as_deref())];
     check_outputs(&[&args.scene.scene], &outputs)?;
     solve(&scene, displacement, args).map_err(|error| error.reported(args.json.as_deref(), &scene))

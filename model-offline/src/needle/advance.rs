@@ -9,27 +9,96 @@ use nalgebra::Vector2;
 
 /// Positions of the tip that are tried.
 const ROUNDS: usize = 40;
+/// Pieces that one advance is divided into, and the shortest, over the whole.
+const MOST_PARTS: usize = 200;
+const SHORTEST_PART: f64 = 1.0 / 64.0;
+/// Distance, over the spacing, that the tissue may jump where the tip passes a station.
+const JUMP: f64 = 0.05;
 
 impl SlippingNeedle<'_> {
-    /// Takes the tip to `depth` and the paddle to its displacement, in one increment.
+    /// Takes the tip to `depth` and the paddle to its displacement: in one increment, or in several where the tip comes
+    /// into other tissue on the way, or where one finds no equilibrium.
     ///
     /// # Errors
     /// [`NeedleError`]; the needle is then where it was.
     pub fn advance(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), NeedleError> {
         let before = self.clone();
-        let outcome = self.increment(depth, paddle);
+        let outcome = self.by_parts(depth, paddle);
         if outcome.is_err() {
             *self = before;
         }
         outcome
     }
 
-    fn increment(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), NeedleError> {
-        self.paddle = paddle;
+    fn by_parts(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), NeedleError> {
+        let (from, beside) = (self.depth, self.paddle);
+        let at = |share: f64| match share {
+            share if share >= 1.0 => (depth, paddle),
+            share => (from + (depth - from) * share, beside + (paddle - beside) * share),
+        };
+        let (mut done, mut goal, mut parts) = (0.0, 1.0, 0);
+        loop {
+            let before = self.clone();
+            let (depth, paddle) = at(goal);
+            let outcome = self.increment(depth, paddle);
+            parts += 1;
+            let shorter = match &outcome {
+                Ok(None) => {
+                    if goal >= 1.0 {
+                        return Ok(());
+                    }
+                    (done, goal) = (goal, f64::min(1.0, goal + 2.0 * (goal - done)));
+                    continue;
+                }
+                Ok(Some(share)) => *share,
+                Err(_) => 0.5,
+            };
+            *self = before;
+            if parts >= MOST_PARTS || goal - done < SHORTEST_PART {
+                return outcome.and(Err(NeedleError::NoForces { depth }));
+            }
+            goal = done + (goal - done) * shorter;
+        }
+    }
+
+    /// One increment; the share of it that may be taken at once, where the tip would come into other tissue.
+    fn increment(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Option<f64>, NeedleError> {
+        let beside = std::mem::replace(&mut self.paddle, paddle);
         let ahead = self.ahead();
+        let cut = self.path.length();
         let (engaged, trial) = self.tip_finds_its_place(depth, ahead)?;
-        self.commit(depth, engaged, trial);
-        Ok(())
+        if let Some(edge) = self.other_tissue(cut, engaged, ahead) {
+            return Ok(Some((edge - cut) / (engaged - cut)));
+        }
+        self.commit(depth, beside, engaged, trial)?;
+        Ok(None)
+    }
+
+    /// How far ahead of the tip its tissue is asked for.
+    fn probe(&self) -> f64 {
+        1e-3 * self.model.spacing()
+    }
+
+    /// The arc length between these at which other tissue begins, where one increment must end: the first, found by
+    /// bisection between points that are closer than any inclusion is wide.
+    fn other_tissue(&self, from: f64, to: f64, ahead: Point2) -> Option<f64> {
+        let scene = self.model.scene();
+        let tissue = |arc_length: f64| scene.resistance_at(self.path.at(arc_length, ahead), &self.shaft).cutting_force;
+        let first = from + self.probe();
+        if to <= first + self.probe() {
+            return None;
+        }
+        let pieces = ((to - first) / (0.1 * self.model.spacing())).ceil().clamp(1.0, 1000.0) as usize;
+        let at = |k: usize| first + (to - first) * k as f64 / pieces as f64;
+        let here = tissue(first);
+        let other = (1..=pieces).find(|k| tissue(at(*k)) != here)?;
+        let (mut low, mut high) = (at(other - 1), at(other));
+        while high - low > 0.1 * self.probe() {
+            let middle = 0.5 * (low + high);
+            if tissue(middle) == here { low = middle } else { high = middle }
+        }
+        // So near to the edge that what is asked for next is beyond it.
+        (to > high + self.probe()).then_some(high - 0.5 * self.probe())
     }
 
     /// The direction in the undeformed body that the needle's line has ahead of the tip.
@@ -52,23 +121,27 @@ impl SlippingNeedle<'_> {
         if self.engaged < cut {
             let (engaged, trial) = self.tip_at(depth, ahead, 0.0)?;
             if engaged < cut {
+                self.tip_holds = false;
                 return Ok((engaged, trial));
             }
         }
-        let cutting_force = self.model.scene().resistance_at(self.path.at(cut, ahead), &self.shaft).cutting_force;
+        let cutting_force =
+            self.model.scene().resistance_at(self.path.at(cut + self.probe(), ahead), &self.shaft).cutting_force;
         let held = self.cutting_force(cutting_force, cut);
         let trial = self.trial(depth, ahead, Tip { engaged: cut, bounds: Bounds { lower: 0.0, upper: held } })?;
+        self.tip_holds = false;
         if trial.tip_force >= held {
             self.tip_at(depth, ahead, cutting_force)
         } else if trial.tip_force <= 0.0 {
             self.tip_at(depth, ahead, 0.0)
         } else {
+            self.tip_holds = true;
             Ok((cut, trial))
         }
     }
 
     /// The part of a cutting force that the part of the tip takes which is in.
-    fn cutting_force(&self, whole: f64, engaged: f64) -> f64 {
+    pub(super) fn cutting_force(&self, whole: f64, engaged: f64) -> f64 {
         whole * (engaged / self.shaft.tip_length).min(1.0)
     }
 
@@ -77,8 +150,11 @@ impl SlippingNeedle<'_> {
     fn tip_at(&mut self, depth: f64, ahead: Point2, force: f64) -> Result<(f64, Trial), NeedleError> {
         if self.is_small_strain() {
             let engaged = depth.max(0.0);
-            let bounds = Bounds::exactly(self.cutting_force(force, engaged));
-            return Ok((engaged, self.trial(depth, ahead, Tip { engaged, bounds })?));
+            // On the undeformed body a blunt tip would have the tissue overtake it: then it holds.
+            let bounds = Bounds { lower: 0.0, upper: self.cutting_force(force, engaged) };
+            let trial = self.trial(depth, ahead, Tip { engaged, bounds })?;
+            self.tip_holds = bounds.upper > 0.0 && trial.tip_force < bounds.upper;
+            return Ok((engaged, trial));
         }
         let enough = 1e-6 * self.model.spacing();
         let mut engaged = (self.engaged + depth - self.depth).max(0.0);
@@ -88,13 +164,13 @@ impl SlippingNeedle<'_> {
         for _ in 0..ROUNDS {
             let bounds = Bounds::exactly(self.cutting_force(force, engaged));
             let trial = self.trial(depth, ahead, Tip { engaged, bounds })?;
-            let off = engaged + trial.tip_displacement - depth;
+            let off = self.ahead_of_entry(engaged, ahead, &trial) + trial.tip_displacement - depth;
             if off > 0.0 {
                 beyond = f64::min(beyond, engaged);
             } else {
                 behind = f64::max(behind, engaged);
             }
-            if off.abs() <= enough || beyond - behind <= enough {
+            if off.abs() <= enough || beyond - behind <= enough && off.abs() <= JUMP * self.model.spacing() {
                 return Ok((engaged, trial));
             }
             let slope = last.map_or(1.0, |(there, then)| ((off - then) / (engaged - there)).clamp(0.2, 5.0));
@@ -106,12 +182,31 @@ impl SlippingNeedle<'_> {
         Err(NeedleError::NoForces { depth })
     }
 
+    /// How far the tip's place in the undeformed body is along the axis.
+    fn ahead_of_entry(&self, engaged: f64, ahead: Point2, trial: &Trial) -> f64 {
+        let at = trial.contacts.last().map_or_else(|| self.path.at(engaged, ahead), |tip| tip.at);
+        self.axis().dot(&(at - self.shaft.entry))
+    }
+
     /// Makes a trial the state of the needle.
-    fn commit(&mut self, depth: f64, engaged: f64, trial: Trial) {
+    ///
+    /// # Errors
+    /// [`NeedleError::Outrun`]; the state is then spoilt.
+    fn commit(&mut self, depth: f64, beside: Vector2<f64>, engaged: f64, trial: Trial) -> Result<(), NeedleError> {
         let Trial { mut contacts, tip_force, tip_displacement } = trial;
-        let base = self.base_force();
-        self.energy.friction += self.dissipated(&contacts, depth);
-        self.energy.cutting += tip_force * self.tip_passed(&contacts, depth, engaged);
+        let (base, paddle) = (self.base_force(), self.last_paddle_force);
+        let friction = self.dissipated(&contacts, depth);
+        let passed = self.tip_passed(&contacts, depth, engaged);
+        let cutting = self.mean_tip_force(tip_force, engaged) * passed;
+        self.energy.friction += friction;
+        self.energy.cutting += cutting;
+        // On the first lengths of a tip every force moves tissue further than the needle has gone.
+        let is_in = engaged >= self.shaft.tip_length;
+        let rounding = -1e-6 * self.energy.work.abs();
+        let gives = self.energy.friction < rounding || self.energy.cutting < rounding;
+        if is_in && (gives || depth <= tip_displacement) {
+            return Err(NeedleError::Outrun { depth });
+        }
         self.engaged = engaged;
         for contact in &contacts {
             self.path.cut_to(contact.arc_length, contact.at);
@@ -133,8 +228,11 @@ impl SlippingNeedle<'_> {
         }
         (self.tip, self.tip_force) = (tip, tip_force);
         self.energy.work += 0.5 * (base + self.base_force()) * (depth - self.depth);
+        self.last_paddle_force = self.paddle_force();
+        self.energy.paddle += 0.5 * (paddle + self.last_paddle_force).dot(&(self.paddle - beside));
         self.depth = depth;
         self.last.copy_from_slice(self.equilibrium.coefficients());
         self.energy.stored = self.equilibrium.energy() + self.load_work();
+        Ok(())
     }
 }

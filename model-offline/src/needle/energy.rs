@@ -2,6 +2,7 @@
 
 use super::state::SlippingNeedle;
 use super::station::{Station, spread};
+use nalgebra::Vector2;
 
 impl SlippingNeedle<'_> {
     /// How far the tip has gone in this increment past the tissue that it pushes, as that lies deformed: the mean of what it
@@ -36,6 +37,23 @@ impl SlippingNeedle<'_> {
         let [.., tip] = contacts else { return slid };
         let on = tip.arc_length - self.tip.as_ref().map_or(0.0, |tip| tip.arc_length);
         slid + if on > 0.0 { 0.5 * per_length(tip) * on * on } else { 0.0 }
+    }
+
+    /// The tip's force, as a mean over what it has passed: it grows until the tip is in over its length.
+    pub(super) fn mean_tip_force(&self, now: f64, engaged: f64) -> f64 {
+        let part = |engaged: f64| self.cutting_force(1.0, engaged);
+        if engaged > self.engaged && part(engaged) > 0.0 {
+            now * 0.5 * (1.0 + part(self.engaged) / part(engaged))
+        } else {
+            now
+        }
+    }
+
+    /// Force of the paddle on the tissue.
+    pub(super) fn paddle_force(&self) -> Vector2<f64> {
+        let [immobile, _] = self.rows;
+        let forces: Vec<f64> = self.equilibrium.reactions().skip(2 * immobile).collect();
+        forces.chunks_exact(2).map(|force| Vector2::new(force[0], force[1])).sum()
     }
 
     /// Work that the present forces would do over the present displacements.

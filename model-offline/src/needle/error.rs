@@ -28,7 +28,16 @@ pub enum NeedleError {
         /// Depth that was asked for, length.
         depth: f64,
     },
+    /// The tissue would have to go further than the needle that takes it along.
+    #[error(
+        "on the way to depth {depth} the tissue goes along further than the needle: its forces are too large for this \
+         tissue (a linear law adds them up on the undeformed body); use a nonlinear law, or less cutting force and friction"
+    )]
+    Outrun {
+        /// Depth that was asked for, length.
+        depth: f64,
+    },
     /// Shape functions do not exist at a point of the shaft.
-    #[error(transparent)]
+    #[error("the shaft would leave the body, or lie between nodes that are too far apart: {0}")]
     Shape(#[from] ShapeError),
 }

@@ -10,6 +10,9 @@ use nalgebra::Vector2;
 /// base is summed over increments.
 const BEGINNING: i32 = 7;
 
+/// How often the increment that does not find an equilibrium before the puncture is halved.
+const HALVINGS: i32 = 8;
+
 /// A straight way of needle and paddle from rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Way {
@@ -62,17 +65,32 @@ pub fn insert<'m>(model: &'m TissueModel, paddle: Option<usize>, way: Way) -> Re
         let mut body = model.body(paddle, NewtonSettings::default()).map_err(failed(0.0))?;
         let mut before = (0.0, 0.0);
         let punctured = (1..=way.increments.max(1)).find_map(|increment| {
-            let (depth, place) = way.after(increment);
-            if let Err(source) = body.drive(depth, place) {
-                return Some(Err(NeedleError::Equilibrium { depth, source }));
+            let mut halvings = 0;
+            let start = way.after(increment - 1);
+            let goal = way.after(increment);
+            let mut share = 1.0;
+            // Skin that cannot be pushed as far as that may have given way before.
+            loop {
+                let (depth, place) = (start.0 + (goal.0 - start.0) * share, start.1 + (goal.1 - start.1) * share);
+                if let Err(source) = body.drive(depth, place) {
+                    halvings += 1;
+                    share *= 0.5;
+                    if halvings > HALVINGS {
+                        return Some(Err(NeedleError::Equilibrium { depth, source }));
+                    }
+                    continue;
+                }
+                let force = body.contact_force();
+                if force >= shaft.puncture_force {
+                    let share = (shaft.puncture_force - before.1) / (force - before.1);
+                    return Some(Ok(before.0 + (depth - before.0) * share.clamp(0.0, 1.0)));
+                }
+                before = (depth, force);
+                if share >= 1.0 {
+                    return None;
+                }
+                share = f64::min(1.0, share + 0.5_f64.powi(halvings));
             }
-            let force = body.contact_force();
-            if force >= shaft.puncture_force {
-                let share = (shaft.puncture_force - before.1) / (force - before.1);
-                return Some(Ok(before.0 + (depth - before.0) * share.clamp(0.0, 1.0)));
-            }
-            before = (depth, force);
-            None
         });
         match punctured {
             None => return Ok(Inserted::Pushing(Box::new(body))),

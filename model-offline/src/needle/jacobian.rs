@@ -8,7 +8,8 @@ use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
 impl SlippingNeedle<'_> {
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle as it is: stations that stick are
-    /// held, those that slide go on sliding.
+    /// held, those that slide go on sliding; a tip that holds is held, one that cuts goes on
+    /// cutting with the same force.
     ///
     /// # Errors
     /// [`NeedleError`].
@@ -18,19 +19,35 @@ impl SlippingNeedle<'_> {
         let mut contacts: Vec<Station> = self.holding().0.into_iter().cloned().collect();
         self.respond(&mut contacts, true).map_err(failed)?;
         let (axis, normal) = (self.axis(), self.normal());
-        let rows = contacts.iter().flat_map(|contact| {
-            let sticks = (contact.slide == Slide::Sticks).then_some((contact, axis, 1));
-            [Some((contact, normal, 0)), sticks].into_iter().flatten()
-        });
-        let rows: Vec<(&Station, Point2, usize)> = rows.collect();
+        // What is held: points on the line, points that stick, and a tip that holds, as its force is spread.
+        let mut rows: Vec<(Point2, usize, Vec<(&Station, f64)>)> = Vec::new();
+        for contact in &contacts {
+            rows.push((normal, 0, vec![(contact, 1.0)]));
+            if contact.slide == Slide::Sticks {
+                rows.push((axis, 1, vec![(contact, 1.0)]));
+            }
+        }
+        if self.tip_holds {
+            let spread = self.holding().1;
+            rows.push((axis, 1, contacts.iter().zip(spread).filter(|(_, share)| *share > 0.0).collect()));
+        }
         let felt = |response: &[f64]| {
-            DVector::from_iterator(
-                rows.len(),
-                rows.iter().map(|(at, along, _)| along.dot(&at.stencil.interpolate(response))),
-            )
+            let values = rows.iter().map(|(along, _, points)| -> f64 {
+                points.iter().map(|(at, share)| share * along.dot(&at.stencil.interpolate(response))).sum()
+            });
+            DVector::from_iterator(rows.len(), values)
         };
-        let responses: Vec<&[f64]> =
-            rows.iter().filter_map(|(at, _, which)| Some(at.responses.as_ref()?[*which].as_slice())).collect();
+        let responses: Vec<Vec<f64>> = rows
+            .iter()
+            .map(|(_, which, points)| {
+                let mut response = vec![0.0; self.model.dofs()];
+                for (at, share) in points {
+                    let own = at.responses.iter().flat_map(|both| both[*which].iter());
+                    response.iter_mut().zip(own).for_each(|(sum, value)| *sum += share * value);
+                }
+                response
+            })
+            .collect();
         let mut compliance = DMatrix::zeros(rows.len(), rows.len());
         for (column, response) in responses.iter().enumerate() {
             compliance.set_column(column, &felt(response));

@@ -11,11 +11,14 @@ use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::Vector2;
 use serde::Serialize;
 
-/// Where the work at the needle's base went, since it is in.
+/// Where the work at the needle's base and of the paddle went, since it is in:
+/// work + paddle = stored + friction + cutting.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct EnergyAccount {
     /// Work at the base.
     pub work: f64,
+    /// Work of the paddle.
+    pub paddle: f64,
     /// Strain energy of the tissue now.
     pub stored: f64,
     /// Dissipated by friction.
@@ -59,6 +62,10 @@ pub struct SlippingNeedle<'m> {
     pub(super) stations: Vec<Station>,
     pub(super) tip: Option<Station>,
     pub(super) tip_force: f64,
+    /// Whether the tip neither cuts nor is withdrawn: its force is what holds it where it is.
+    pub(super) tip_holds: bool,
+    /// Force of the paddle on the tissue at the end of the last increment.
+    pub(super) last_paddle_force: Vector2<f64>,
     pub(super) energy: EnergyAccount,
     /// Coefficients at the end of the last increment.
     pub(super) last: Vec<f64>,
@@ -92,6 +99,8 @@ impl<'m> SlippingNeedle<'m> {
             stations: Vec::new(),
             tip: None,
             tip_force: 0.0,
+            tip_holds: false,
+            last_paddle_force: Vector2::zeros(),
             energy: EnergyAccount::default(),
             last: vec![0.0; model.dofs()],
         };
@@ -101,7 +110,8 @@ impl<'m> SlippingNeedle<'m> {
         Ok(needle)
     }
 
-    /// Arc lengths of the stations: where nodes lie on the needle's way, else a spacing apart.
+    /// Arc lengths of the stations: where nodes lie on the needle's way, and a spacing apart where there are others beside
+    /// it that lie closer.
     fn places(&self) -> Vec<f64> {
         let (entry, axis, depth) = (self.shaft.entry, self.axis(), self.model.scene().needle.depth);
         let near = 1e-6 * self.model.spacing();
@@ -110,11 +120,27 @@ impl<'m> SlippingNeedle<'m> {
         places.retain(|s| (-near..=depth + near).contains(s));
         places.sort_by(f64::total_cmp);
         places.dedup_by(|a, b| *a - *b <= near);
-        if places.len() > 2 {
-            return places;
+        if places.first().is_none_or(|first| *first > near) {
+            places.insert(0, 0.0);
         }
-        let count = (depth / self.model.spacing()).ceil().clamp(2.0, 1000.0) as usize;
-        (0..=count).map(|k| depth * k as f64 / count as f64).collect()
+        if places.last().is_none_or(|last| *last < depth - near) {
+            places.push(depth);
+        }
+        let mut filled = vec![places[0]];
+        for pair in places.windows(2) {
+            let gap = pair[1] - pair[0];
+            let count = if self.is_crossed_by_nodes(pair) { (gap / self.model.spacing()).ceil() } else { 1.0 };
+            let count = count.clamp(1.0, 1000.0) as usize;
+            filled.extend((1..=count).map(|k| pair[0] + gap * k as f64 / count as f64));
+        }
+        filled
+    }
+
+    /// Whether nodes lie nearer to the middle of a stretch of the way than its ends do.
+    fn is_crossed_by_nodes(&self, ends: &[f64]) -> bool {
+        let middle = self.shaft.entry + self.axis() * (0.5 * (ends[0] + ends[1]));
+        let half = 0.5 * (ends[1] - ends[0]);
+        self.model.positions().iter().any(|x| (x - middle).norm() < 0.9 * half)
     }
 
     pub(super) fn station(&self, arc_length: f64, at: Point2) -> Result<Station, NeedleError> {

@@ -12,6 +12,8 @@ use std::sync::Arc;
 
 /// Change of the stations' displacements, over the spacing, at which forces and tissue agree.
 const AGREED: f64 = 1e-7;
+/// Change of the forces, over the largest, at which they do: in units of displacement small forces would never be asked.
+const SETTLED: f64 = 1e-5;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
 /// A compliance that leaves more than this part of the error is computed anew.
@@ -90,7 +92,7 @@ impl SlippingNeedle<'_> {
         let m = contacts.len();
         let mut forces = DVector::from_fn(2 * m + 1, |i, _| match i {
             i if i < m => contacts[i].across,
-            i if i < 2 * m => contacts[i - m].along,
+            i if i < 2 * m => self.first_guess(&contacts[i - m], lengths[i - m]),
             _ => self.tip_force.clamp(tip.bounds.lower, tip.bounds.upper),
         });
         let enough = AGREED * self.model.spacing();
@@ -123,7 +125,8 @@ impl SlippingNeedle<'_> {
             let held = |k: &usize| !self.lies_where_it_is(&contacts[*k]);
             let off = (0..m).filter(held).map(|k| felt[k].abs()).fold(0.0, f64::max);
             let change = (&known * (&found - &forces)).amax().max(off).max(astray);
-            if change <= enough {
+            let settled = (&found - &forces).amax() <= SETTLED * found.amax();
+            if change <= enough && settled {
                 for (k, contact) in contacts.iter_mut().enumerate() {
                     (contact.across, contact.along) = (forces[k], forces[m + k]);
                     contact.length = lengths[k];
@@ -142,10 +145,21 @@ impl SlippingNeedle<'_> {
         Err(NeedleError::NoForces { depth })
     }
 
-    /// Whether a station has just been cut, behind the skin that the tip took with it: the tip goes through the tissue that it meets and pushes none aside, so that the
-    /// station is the material point that lies on the needle's line, under no force across it.
+    /// Friction of a station that has slid so far and goes on, or what it was.
+    fn first_guess(&self, contact: &Station, length: f64) -> f64 {
+        let sliding = contact.resistance.sliding(self.shaft.speed) * length;
+        match (contact.slide, contact.known) {
+            (Slide::Forward, false) => sliding,
+            (Slide::Backward, false) => -sliding,
+            _ => contact.along,
+        }
+    }
+
+    /// Whether a station has just been cut, behind the skin that the tip took with it: the tip goes through the tissue
+    /// that it meets and pushes none aside, so that the station is the material point that lies on the needle's line,
+    /// under no force across it. In an old cut there is nothing to choose.
     pub(super) fn lies_where_it_is(&self, station: &Station) -> bool {
-        !station.known && !self.is_small_strain() && station.arc_length > 0.0
+        !station.known && !self.is_small_strain() && station.arc_length > self.path.length()
     }
 
     /// Makes stations that have just been cut the points that lie on the needle's line; how far they were off it.
@@ -221,7 +235,11 @@ impl SlippingNeedle<'_> {
         let (axis, normal) = (self.axis(), self.normal());
         let coefficients = self.equilibrium.coefficients();
         let m = contacts.len();
-        let at = if self.is_small_strain() { self.cut } else { engaged };
+        let at = match contacts.last() {
+            Some(tip) if !self.is_small_strain() => axis.dot(&(tip.at - self.shaft.entry)),
+            Some(_) => self.cut,
+            None => engaged,
+        };
         let mut felt = DVector::zeros(2 * m + 1);
         for (k, contact) in contacts.iter().enumerate() {
             let u = contact.stencil.interpolate(coefficients);

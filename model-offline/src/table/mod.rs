@@ -34,13 +34,19 @@ pub struct TableOptions {
     /// without), mistaken for each other, reach more at some depth, the table says so and its gain allows for that. On the
     /// paper's scene they give 0.9 to 1.28 (`host-sim loop-stability`).
     pub lambda_max: f64,
+    /// Speed of the insertion that the table is for, length/s: where it is faster than the scene's
+    /// `max_needle_speed`, that is raised to it, with a tenth for the drive.
+    pub needle_speed: f64,
 }
 
 impl Default for TableOptions {
     fn default() -> Self {
-        Self { knots: 21, delay_samples: 1, lambda_max: 1.3 }
+        Self { knots: 21, delay_samples: 1, lambda_max: 1.3, needle_speed: 0.0 }
     }
 }
+
+/// How much faster than asked for a drive may be for a moment.
+const SPEED_MARGIN: f64 = 1.1;
 
 /// Why a table could not be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -139,7 +145,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
             depth_start: first.depth,
             depth_end: last.depth,
             paddle_displacement: scene.actuator.max_displacement,
-            needle_speed: scene.actuator.max_needle_speed,
+            needle_speed: scene.actuator.max_needle_speed.max(SPEED_MARGIN * options.needle_speed),
         },
         gains: Gains {
             loop_gain: default_gain(options.delay_samples, lambda_max),

@@ -279,7 +279,8 @@ impl<'p> Comparison<'p> {
     fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
         let studied = &self.studied(tissue).study;
         let paddle = studied.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
-        let table = build(&studied.model, paddle, &TableOptions::default())?;
+        let needle_speed = self.simulation.needle_speed();
+        let table = build(&studied.model, paddle, &TableOptions { needle_speed, ..TableOptions::default() })?;
         let bytes = to_bytes(&table)?;
         Ok(EncodedTable { table, bytes })
     }

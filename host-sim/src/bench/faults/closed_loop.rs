@@ -20,9 +20,9 @@ use super::shuttle::ShuttleDrive;
 use super::tissue::LinearTissue;
 use crate::runtime::accounting::tick::ControllerTick;
 use crate::world::actuator::{ActuatorModel, PaddleActuator};
-use model_offline::scene::IDEAL_NOISE_PER_DEPTH;
 use crate::world::sensors::{Encoders, TargetSensor};
 use crate::world::{Sensors, World};
+use model_offline::scene::IDEAL_NOISE_PER_DEPTH;
 
 /// Part of a period that a healthy step takes.
 const HEALTHY_STEP: f64 = 0.1;

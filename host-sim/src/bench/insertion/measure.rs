@@ -60,6 +60,8 @@ pub(super) fn measure(
         rms_orthogonal_error: (squares / truths.len().max(1) as f64).sqrt(),
         paddle_travel: travel,
         final_state: None,
+        run_share: None,
+        outside_run_for: Faults::NONE,
         faults: Faults::NONE,
         ledger: None,
         timing: None,

@@ -2,6 +2,7 @@
 
 mod measure;
 
+use firmware::{Faults, Mode};
 use std::path::Path;
 use std::time::Duration;
 
@@ -258,6 +259,13 @@ impl<'a> SimulatedInsertion<'a> {
         result.csv = Some(artifacts[0].name.clone());
         result.final_state = run.accounts.final_state;
         result.faults = run.accounts.faults;
+        let moving = || recording.records.iter().map(|record| &record.tick).filter(|t| t.inputs.time_ns >= started_ns);
+        let (in_run, outside) = moving().fold((0, Faults::NONE), |(in_run, faults), tick| match tick.command.state {
+            state if state == Mode::Run as u32 => (in_run + 1, faults),
+            _ => (in_run, faults | Faults::from_bits(tick.command.faults)),
+        });
+        result.run_share = Some(f64::from(in_run) / moving().count().max(1) as f64);
+        result.outside_run_for = outside;
         result.ledger = Some(run.ledger);
         result.timing = run.accounts.timing;
         result.plant_timing = run.plant_timing;

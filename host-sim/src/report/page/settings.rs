@@ -32,6 +32,8 @@ fn rows(run: &RunResult) -> Vec<(&'static str, String, String)> {
         row("depth of the insertion", settings.depth, length),
         row("duration of the insertion", settings.insertion_s, "s"),
         row("time simulated", settings.duration_s, "s"),
+        ("what sees the target", settings.sensor.clone(), String::new()),
+        ("feedback", settings.feedback.clone(), String::new()),
         row("rate of the target sensor", settings.target_rate_hz, "Hz"),
         row("latency of the target sensor", settings.target_latency_ms, "ms"),
         row("noise of the target sensor, σ per component", settings.noise, length),

@@ -34,6 +34,8 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         rms_orthogonal_error: 0.5 * error,
         paddle_travel: 0.0,
         final_state: None,
+        run_share: None,
+        outside_run_for: Faults::NONE,
         faults: Faults::NONE,
         ledger: controlled.then(|| LedgerResult {
             needle: StreamResult {
@@ -142,6 +144,8 @@ fn run(scene: &str) -> RunResult {
             insertion_s: 5.0,
             duration_s: 5.5,
             depth: 0.1,
+            sensor: "ideal".to_owned(),
+            feedback: "observer".to_owned(),
             target_rate_hz: 50.0,
             target_latency_ms: 20.0,
             noise: 1e-5,

@@ -43,8 +43,14 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     writeln!(
         text,
         "\nLargest target displacement orthogonal to the needle, depth {} in {} s,\n\
-         target seen at {} Hz, {} ms late, noise {:.1e}; paddle in brackets",
-        settings.depth, settings.insertion_s, settings.target_rate_hz, settings.target_latency_ms, settings.noise
+         target seen by {}: {} Hz, {} ms late, noise {}; feedback: {}; paddle in brackets",
+        settings.depth,
+        settings.insertion_s,
+        settings.sensor,
+        settings.target_rate_hz,
+        settings.target_latency_ms,
+        noise(settings.noise, &run.units[0]),
+        settings.feedback,
     )?;
     writeln!(text, "  {:<13} {:<13} {:>12} {:>16} {:>16}", "tissue", "table", "none", "static", "dynamic")?;
     let results = run.cases.iter().flat_map(|case| case.strategies.iter());
@@ -55,6 +61,28 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     write_plant(text, run)?;
     write_loop(text, run)?;
     writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
+}
+
+/// The sensor's noise with its unit, where it has one.
+fn noise(noise: f64, unit: &str) -> String {
+    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+    if (0.01..1e4).contains(&noise) { format!("{}{unit}", rounded(noise)) } else { format!("{noise:.1e}{unit}") }
+}
+
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() * 1e-4
+}
+
+/// The controller's state at the end; where it was not RUN throughout, how long it was, and why not.
+fn state(dynamic: &StrategyResult) -> String {
+    let end = names::mode::name(dynamic.final_state);
+    match dynamic.run_share {
+        Some(share) if share < 1.0 => {
+            let percent = (100.0 * share).floor();
+            format!("{end}; in RUN for {percent:.0} % of the time, else {}", dynamic.outside_run_for)
+        }
+        _ => end.to_owned(),
+    }
 }
 
 /// The largest orthogonal error and the paddle.
@@ -82,7 +110,7 @@ fn write_case(text: &mut String, case: &CaseResult, digits: usize) -> std::fmt::
         (Some(factor), Some(dynamic)) => {
             let none =
                 case.improvement_over_none.map_or_else(String::new, |factor| format!("{}, ", share(factor, "none")));
-            writeln!(text, "   {}, {none}{}", share(factor, "static"), names::mode::name(dynamic.final_state))
+            writeln!(text, "   {}, {none}{}", share(factor, "static"), state(dynamic))
         }
         _ => writeln!(text),
     }

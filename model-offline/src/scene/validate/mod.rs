@@ -149,7 +149,11 @@ impl Validator<'_> {
         if v.is_finite() && v >= 0.0 {
             Ok(v)
         } else {
-            Err(self.error(value.span(), format!("{what} is {v}"), format!("{what} must be a finite number, not negative")))
+            Err(self.error(
+                value.span(),
+                format!("{what} is {v}"),
+                format!("{what} must be a finite number, not negative"),
+            ))
         }
     }
 

@@ -2,7 +2,7 @@
 
 use firmware::contract::{MAX_TABLE_BYTES, Table, encode};
 use firmware::detection::{FOLLOWING_FRACTION, FOLLOWING_SAMPLES, FROZEN_TRAVEL};
-use firmware::{Faults, Mode, Settings, loop_stability};
+use firmware::{Faults, Feedback, Mode, Settings, loop_stability};
 use nalgebra::{Matrix2, Rotation2, Vector2};
 
 use super::{FOR_EVER, Trial, comes_back, stays_safe_until_rearmed};
@@ -128,7 +128,7 @@ pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
     Ok(())
 }
 
-/// Row 22: lag and delay of the actuator, 0 to 10 ticks: stable right up to the theoretical limit of the gain, and at
+/// Row 22: lag and delay of the actuator, 0 to 10 ticks: the integral, whose limit is known, is stable right up to it; at
 /// the default gain always.
 pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut table = trial.table.clone();
@@ -138,6 +138,7 @@ pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Resul
         let mut setup = Setup { noise: 0.0, speed: 0.0, ..trial.setup() };
         // A target sample on every tick, at once: a delay of k ticks is a delay of k samples.
         setup.settings = Settings {
+            feedback: if gain.is_some() { Feedback::Integral } else { Feedback::default() },
             loop_gain: gain,
             actuator_delay_ns: u64::from(delay) * MS + (2.0 * lag_s * 1e9) as u64,
             ..Settings::new(MS, MS, 0)
