@@ -6,6 +6,14 @@ use super::station::{Slide, Station};
 use crate::geometry::Point2;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
 
+/// A displacement that is held: the mean of points along a direction.
+struct Held<'c> {
+    along: Point2,
+    /// Which of the points' responses is that to a force along it.
+    response: usize,
+    points: Vec<(&'c Station, f64)>,
+}
+
 impl SlippingNeedle<'_> {
     /// Actuation Jacobian d(target displacement)/d(paddle displacement) with the needle as it is: stations that stick are
     /// held, those that slide go on sliding; a tip that holds is held, one that cuts goes on
@@ -20,26 +28,27 @@ impl SlippingNeedle<'_> {
         self.respond(&mut contacts, true).map_err(failed)?;
         let (axis, normal) = (self.axis(), self.normal());
         // What is held: points on the line, points that stick, and a tip that holds, as its force is spread.
-        let mut rows: Vec<(Point2, usize, Vec<(&Station, f64)>)> = Vec::new();
+        let mut rows: Vec<Held<'_>> = Vec::new();
         for contact in &contacts {
-            rows.push((normal, 0, vec![(contact, 1.0)]));
+            rows.push(Held { along: normal, response: 0, points: vec![(contact, 1.0)] });
             if contact.slide == Slide::Sticks {
-                rows.push((axis, 1, vec![(contact, 1.0)]));
+                rows.push(Held { along: axis, response: 1, points: vec![(contact, 1.0)] });
             }
         }
         if self.tip_holds {
             let spread = self.holding().1;
-            rows.push((axis, 1, contacts.iter().zip(spread).filter(|(_, share)| *share > 0.0).collect()));
+            let points = contacts.iter().zip(spread).filter(|(_, share)| *share > 0.0).collect();
+            rows.push(Held { along: axis, response: 1, points });
         }
         let felt = |response: &[f64]| {
-            let values = rows.iter().map(|(along, _, points)| -> f64 {
+            let values = rows.iter().map(|Held { along, points, .. }| -> f64 {
                 points.iter().map(|(at, share)| share * along.dot(&at.stencil.interpolate(response))).sum()
             });
             DVector::from_iterator(rows.len(), values)
         };
         let responses: Vec<Vec<f64>> = rows
             .iter()
-            .map(|(_, which, points)| {
+            .map(|Held { response: which, points, .. }| {
                 let mut response = vec![0.0; self.model.dofs()];
                 for (at, share) in points {
                     let own = at.responses.iter().flat_map(|both| both[*which].iter());
