@@ -130,6 +130,10 @@ pub const SURPRISE_SIGMAS: f64 = 3.5;
 /// Growth of the variances at every sample that surprises.
 pub const SURPRISE_GROWTH: f64 = 3.0;
 
+/// Variance of the slope, over that before the first sample, from which on surprise widens the level alone: a slope eight
+/// times as steep as was thought.
+pub const STEEPEST_SURPRISE: f64 = 64.0;
+
 /// Ticks with skipped periods before them that are a fault, if in a row; otherwise n of m, see [`BUCKET_EVENT`]. A loop
 /// that skips every second period no longer runs at the rate that its gain was chosen for.
 pub const MAX_SUCCESSIVE_OVERRUNS: u32 = 10;

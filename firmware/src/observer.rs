@@ -20,7 +20,9 @@
 //! bears ([`crate::loop_stability`]), and innovations that keep their sign for longer than noise would widen the
 //! covariance until the estimate follows (a patient who moves, tissue that is further off than was allowed for).
 
-use crate::detection::{LEVEL_TIME, SURPRISE_GROWTH, SURPRISE_MEMORY, SURPRISE_SIGMAS, TISSUE_SPREAD};
+use crate::detection::{
+    LEVEL_TIME, STEEPEST_SURPRISE, SURPRISE_GROWTH, SURPRISE_MEMORY, SURPRISE_SIGMAS, TISSUE_SPREAD,
+};
 use crate::scalar::{Scalar, bounded};
 
 /// What is believed before the first sample, as variances; built once.
@@ -44,7 +46,8 @@ impl<T: Scalar> Belief<T> {
     /// Of a table whose target moves by at most `target_slope` per length over `depth_range` and by at most
     /// `target_range` in all, and a sensor with this standard deviation, length.
     pub fn new(noise: f64, target_slope: f64, depth_range: f64, target_range: f64, max_gain: f64) -> Self {
-        let spread = TISSUE_SPREAD * target_slope;
+        // Where the table says that nothing moves, tissue that is another may still.
+        let spread = TISSUE_SPREAD * target_slope.max(1e-3 * target_range / depth_range);
         // A sensor without stated noise still rounds.
         let noise = noise.max(1e-7 * target_range);
         let at_the_end = spread * depth_range;
@@ -143,8 +146,11 @@ impl<T: Scalar> Observer<T> {
         if self.surprise * self.surprise > expected && self.level_variance < belief.widest {
             let growth = T::of(SURPRISE_GROWTH);
             self.level_variance *= growth;
-            self.covariance *= growth;
-            self.slope_variance *= growth;
+            // At rest nothing would ever bring the slope's variance down again: what surprises then is no slope.
+            if self.slope_variance < T::of(STEEPEST_SURPRISE) * belief.slope {
+                self.covariance *= growth;
+                self.slope_variance *= growth;
+            }
         }
     }
 
@@ -334,6 +340,29 @@ mod tests {
                 prop_assert!(determinant > -1e-9 * level_variance * slope_variance, "{observer:?}");
                 prop_assert!(observer.at(6.0).is_finite() && observer.slope().is_finite());
             }
+        }
+
+        /// A long rest with a target that drifts and breathes, and then motion: nothing is left that the motion could blow up.
+        #[test]
+        fn a_long_rest_leaves_nothing_behind(
+            noise in 1e-4..0.5f32,
+            amplitude in 0.1..5.0f32,
+            period_s in 1.0..10.0f32,
+            drift in -0.3..0.3f32,
+        ) {
+            let belief = Belief::<f32>::new(f64::from(noise), 0.2, 12.0, 17.0, 0.19);
+            let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+            let mut worst = 0.0f32;
+            for k in 0..1500u16 {
+                let time_s = f32::from(k) / 30.0;
+                let depth = if k < 75 { 0.08 * f32::from(k) } else if k < 1200 { 6.0 } else { 6.0 + 0.02 * f32::from(k - 1200) };
+                let phase = core::f64::consts::TAU * f64::from(time_s / period_s);
+                let target = amplitude * libm::sin(phase) as f32 + drift * time_s.min(30.0);
+                observer.update(&belief, target, depth, 1.0 / 30.0);
+                worst = worst.max((observer.at(depth) - target).abs());
+                prop_assert!(observer.at(depth).is_finite() && observer.slope_variance.is_finite(), "{observer:?}");
+            }
+            prop_assert!(worst < 3.0 * amplitude + 2.0, "{worst} of {amplitude}");
         }
 
         /// Lengths in any unit.

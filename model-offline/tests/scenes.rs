@@ -118,3 +118,50 @@ fn new_scenes_can_be_placed_at_once() {
     model_offline().args(["new", "--msh"]).arg(&drawing).assert().code(2);
     model_offline().args(["new", "--svg", "absent.svg"]).assert().code(2);
 }
+
+/// What sees the target: presets, numbers of the scene's own, and what is refused.
+#[test]
+fn scenes_say_what_sees_the_target() {
+    use model_offline::scene::SensorPreset;
+
+    let (_, paper) = BUNDLED[0];
+    let with = |unit: &str, section: &str| {
+        let text = paper.replace("length = \"1\"", &format!("length = {unit:?}"));
+        assert!(unit == "1" || text != paper, "the unit stands in the file");
+        Scene::parse(&format!("{text}\n[sensor]\n{section}\n"), "sensor.toml")
+    };
+    let plain = with("1", "").unwrap();
+    assert_eq!((plain.sensor.preset, plain.sensor.rate, plain.sensor.noise), (SensorPreset::Ideal, 50.0, 1e-5));
+    assert_eq!(with("mm", "").unwrap().sensor.preset, SensorPreset::Ultrasound);
+    assert!((with("cm", "preset = \"camera\"").unwrap().sensor.noise - 0.005).abs() < 1e-12);
+    let own = with(
+        "mm",
+        "preset = \"mri\"\nrate = 8.0\nnoise = 0.3\nbias = [0.1, 0.0]\noutages = { every = 20.0, last = 0.3 }",
+    );
+    let sensor = own.unwrap().sensor;
+    assert_eq!((sensor.rate, sensor.noise, sensor.latency, sensor.quantisation), (8.0, 0.3, 0.3, 0.5));
+    assert!(sensor.is_changed && sensor.outages.is_some_and(|outages| outages.every == 20.0));
+    // Not part of the tissue: tables and recordings stay those of the scene.
+    assert_eq!(with("mm", "preset = \"mri\"").unwrap().hash(), with("mm", "").unwrap().hash());
+    for (unit, section, said) in [
+        ("1", "preset = \"camera\"", "unit of length"),
+        ("mm", "preset = \"sonar\"", "sonar"),
+        ("mm", "rate = 0.05", "rate"),
+        ("mm", "rate = nan", "rate"),
+        ("mm", "latency = 61.0", "latency"),
+        ("mm", "latency = -1.0", "latency"),
+        ("mm", "noise = -0.1", "noise"),
+        ("mm", "noise = 1e9", "noise"),
+        ("mm", "noise = inf", "noise"),
+        ("mm", "quantisation = -1.0", "quantisation"),
+        ("mm", "bias = [nan, 0.0]", "bias"),
+        ("mm", "outages = { every = 1e12, last = 1.0 }", "every"),
+        ("mm", "outages = { every = 1.0, last = 1e-9 }", "last"),
+        ("mm", "outages = { every = 1.0 }", "last"),
+        ("mm", "colour = \"red\"", "colour"),
+    ] {
+        let refused = with(unit, section).unwrap_err();
+        let text = format!("{refused:?} {refused}");
+        assert!(text.contains(said), "{section}: {text}");
+    }
+}

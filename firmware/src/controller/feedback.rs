@@ -14,6 +14,8 @@ use crate::units::seconds;
 /// What the feedback of a tick starts from.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setting<'t, T: Scalar> {
+    /// Time of the tick, ns.
+    pub(super) time_ns: u64,
     /// The table where the needle will be.
     pub(super) location: TableLocation<'t, T, D>,
     /// Its paddle displacement, length.
@@ -50,7 +52,7 @@ impl<T: Scalar> Controller<'_, T> {
     /// A fixed part of the error, at every sample.
     pub(super) fn integrate(&self, state: &State<T>, sample: Option<Measurement>, setting: &Setting<'_, T>) -> Fed<T> {
         let runtime = &self.runtime;
-        let Setting { location, feed_forward, previous, limits } = setting;
+        let Setting { location, feed_forward, previous, limits, .. } = setting;
         let integral = state.integral.unwrap_or(previous - feed_forward);
         let Some(sample) = sample else {
             return Fed { now: integral, at_sample: integral, estimate: None, correction: None };
@@ -73,7 +75,7 @@ impl<T: Scalar> Controller<'_, T> {
 
     /// As much as the observer believes that the table leaves.
     pub(super) fn observe(&self, state: &State<T>, sample: Option<Measurement>, setting: &Setting<'_, T>) -> Fed<T> {
-        let Setting { location, feed_forward, previous, limits } = setting;
+        let Setting { time_ns, location, feed_forward, previous, limits } = setting;
         let n = &self.table.orthogonal;
         let (before, mut estimate) = match (state.integral, state.estimate) {
             (Some(integral), Some(estimate)) => (integral, estimate),
@@ -81,7 +83,7 @@ impl<T: Scalar> Controller<'_, T> {
             _ => {
                 let placed = previous - feed_forward;
                 let level = -n.dot(&(location.jacobian() * placed));
-                (placed, self.first_estimate(level, location.depth, sample.map_or(0, |sample| sample.time_ns)))
+                (placed, self.first_estimate(level, location.depth, *time_ns))
             }
         };
         let now = before + estimate.drift * (location.depth - estimate.depth);

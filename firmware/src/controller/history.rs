@@ -83,7 +83,7 @@ fn between<T: Scalar>(earlier: &Moment<T>, later: &Moment<T>, time_ns: u64) -> M
     if time_ns >= later.time_ns {
         return *later;
     }
-    // Both differences are below the time that the ring spans.
+    // Both differences are below the spacing, seconds at most.
     let part = |ns: u64| T::of(f64::from(u32::try_from(ns).unwrap_or(u32::MAX)));
     let fraction = part(time_ns - earlier.time_ns) / part(later.time_ns - earlier.time_ns);
     Moment {

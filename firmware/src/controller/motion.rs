@@ -49,7 +49,7 @@ impl<T: Scalar> Controller<'_, T> {
             Limits { max_step: T::of(runtime.paddle_rate * seconds(tick.elapsed_ns)), ..runtime.limits }
         };
         let feed_forward = location.paddle_path();
-        let setting = Setting { location, feed_forward, previous, limits };
+        let setting = Setting { time_ns: tick.time_ns, location, feed_forward, previous, limits };
         let feedback = match runtime.feedback {
             Feedback::Integral => self.integrate(state, tick.fresh_target, &setting),
             Feedback::Observer => self.observe(state, tick.fresh_target, &setting),
@@ -73,6 +73,7 @@ impl<T: Scalar> Controller<'_, T> {
         let [x, y] = &mut state.gate.travel.paddle;
         (*x, *y) = (*x + step.x.abs().to_f64(), *y + step.y.abs().to_f64());
         (state.integral, state.estimate) = (Some(feedback.at_sample), feedback.estimate);
+        state.added = Some(feedback.now);
         state.displacement = Some(limited.displacement);
     }
 

@@ -30,6 +30,8 @@ pub struct State<T: Scalar> {
     pub(super) displacement: Option<SVector<T, D>>,
     /// What the feedback adds, at the last sample that it used; `None` until the first tick in RUN makes it continue from the adopted position.
     pub(super) integral: Option<SVector<T, D>>,
+    /// What the feedback adds at the last tick in RUN.
+    pub(super) added: Option<SVector<T, D>>,
     /// What the observer knows; `None` until the first tick in RUN, and without one.
     pub(super) estimate: Option<Estimate<T>>,
     /// Where needle and paddle were.
@@ -76,9 +78,15 @@ impl<T: Scalar> State<T> {
         self.integral.as_ref().map(to_frame)
     }
 
+    /// What the feedback added to the feed-forward at the last tick in RUN, length: the depth may have changed it since the
+    /// last sample. `None` before RUN.
+    pub fn added(&self) -> Option<[f64; 2]> {
+        self.added.as_ref().map(to_frame)
+    }
+
     /// The paddle's position is no longer known.
     pub(super) fn forget_position(&mut self) {
-        (self.displacement, self.integral, self.estimate) = (None, None, None);
+        (self.displacement, self.integral, self.added, self.estimate) = (None, None, None, None);
         self.rest = RestMonitor::default();
     }
 

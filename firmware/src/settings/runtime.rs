@@ -111,7 +111,9 @@ impl<T: Scalar> Runtime<T> {
             gain: T::of(gain),
             feedback: settings.feedback,
             belief: Belief::new(noise, bounds.target_slope, end - start, target_range, gain.min(1.0)),
-            history_ns: settings.target_latency_ns + settings.target_period_ns + settings.actuator_delay_ns,
+            history_ns: settings.target_latency_ns
+                + TARGET_SAMPLES_TO_HOLD * settings.target_period_ns
+                + settings.actuator_delay_ns,
             direction: settings.direction,
             paddle_index: table.paddle.index,
             loop_period_ns: settings.loop_period_ns,

@@ -108,6 +108,8 @@ pub struct LoopSettings {
     pub latency: f64,
     /// Standard deviation of the target sensor per component, length; none: 1e-4 of the insertion depth.
     pub noise: Option<f64>,
+    /// Step of what the target sensor reports, length.
+    pub quantisation: f64,
     /// How measurements of the target become corrections.
     pub feedback: FeedbackLaw,
 }
@@ -115,15 +117,16 @@ pub struct LoopSettings {
 impl Default for LoopSettings {
     /// 1 kHz, with the target seen at 50 Hz and 20 ms late.
     fn default() -> Self {
-        Self { rate: 1000.0, target_rate: 50.0, latency: 20.0, noise: None, feedback: FeedbackLaw::default() }
+        let feedback = FeedbackLaw::default();
+        Self { rate: 1000.0, target_rate: 50.0, latency: 20.0, noise: None, quantisation: 0.0, feedback }
     }
 }
 
 impl LoopSettings {
     /// A loop of 1 kHz with this sensor.
     pub fn of(sensor: &Sensor) -> Self {
-        let Sensor { rate, latency, noise, .. } = *sensor;
-        Self { target_rate: rate, latency: 1e3 * latency, noise: Some(noise), ..Self::default() }
+        let Sensor { rate, latency, noise, quantisation, .. } = *sensor;
+        Self { target_rate: rate, latency: 1e3 * latency, noise: Some(noise), quantisation, ..Self::default() }
     }
 
     /// Checks the numbers.
@@ -147,11 +150,19 @@ impl LoopSettings {
         self.noise.unwrap_or(IDEAL_NOISE_PER_DEPTH * depth)
     }
 
+    /// What the controller is to expect of a sample: noise, and a step's own deviation.
+    fn deviation(&self, depth: f64) -> f64 {
+        match self.quantisation {
+            0.0 => self.noise_for(depth),
+            step => self.noise_for(depth).hypot(step / 12f64.sqrt()),
+        }
+    }
+
     /// Settings of the controller for an insertion to `depth`.
     pub fn settings(&self, depth: f64) -> Settings {
         let latency_ns = (self.latency * 1e6).round() as u64;
         Settings {
-            target_noise: self.noise_for(depth),
+            target_noise: self.deviation(depth),
             feedback: self.feedback.feedback(),
             ..Settings::new(period_ns(self.rate), period_ns(self.target_rate), latency_ns)
         }
@@ -167,7 +178,7 @@ impl LoopSettings {
             "--latency".to_owned(),
             self.latency.to_string(),
             "--noise".to_owned(),
-            self.noise_for(depth).to_string(),
+            self.deviation(depth).to_string(),
             "--feedback".to_owned(),
             self.feedback.name().to_owned(),
         ]

@@ -96,7 +96,7 @@ impl<T: TissueResponse> World<T> {
             target: TargetSensor::new(
                 settings.target_period_ns,
                 settings.target_latency_ns,
-                settings.target_noise,
+                simulation.loop_settings.noise_for(simulation.depth),
                 simulation.seed,
             )
             .with_defects_of(&simulation.sensor, simulation.seed),

@@ -120,8 +120,8 @@ impl OutageSchedule {
 
     fn after(&mut self, time_ns: u64) -> [u64; 2] {
         let gap_s: f64 = Exp1.sample(&mut self.random);
-        let begins_ns = time_ns + (1e9 * self.outages.every * gap_s) as u64;
-        [begins_ns, begins_ns + ((1e9 * self.outages.last) as u64).max(1)]
+        let begins_ns = time_ns.saturating_add((1e9 * self.outages.every * gap_s) as u64);
+        [begins_ns, begins_ns.saturating_add(((1e9 * self.outages.last) as u64).max(1))]
     }
 }
 

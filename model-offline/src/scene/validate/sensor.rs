@@ -5,9 +5,13 @@ use crate::scene::schema::Located;
 use crate::scene::sensor::{Outages, Sensor, SensorPreset};
 
 /// Slowest and fastest sensor that is no wrong unit, Hz.
-const RATES: [f64; 2] = [0.02, 1e5];
+const RATES: [f64; 2] = [0.1, 1e5];
 /// Longest latency that is no wrong unit, s.
 const LONGEST_LATENCY: f64 = 60.0;
+/// Noise past which a number has another unit, length.
+const MOST_NOISE: f64 = 1e6;
+/// Shortest and longest outage, and time between two, s.
+const OUTAGES: [f64; 2] = [1e-3, 1e6];
 
 impl Validator<'_> {
     /// The sensor: a preset with keys of the scene's own.
@@ -44,6 +48,10 @@ impl Validator<'_> {
         }
         if let Some(noise) = &section.noise {
             sensor.noise = self.not_negative(noise, "noise")?;
+            if sensor.noise > MOST_NOISE {
+                let message = format!("noise: {} is no sensor of a target in this body", sensor.noise);
+                return Err(self.error(noise.span(), message, "give a standard deviation in length units"));
+            }
         }
         if let Some(quantisation) = &section.quantisation {
             sensor.quantisation = self.not_negative(quantisation, "quantisation")?;
@@ -52,11 +60,20 @@ impl Validator<'_> {
             sensor.bias = self.point(bias.get(), bias.span(), "bias")?;
         }
         if let Some(outages) = &section.outages {
-            let every = self.positive(&outages.get().every, "every")?;
-            let last = self.positive(&outages.get().last, "last")?;
+            let every = self.outage(&outages.get().every, "every")?;
+            let last = self.outage(&outages.get().last, "last")?;
             sensor.outages = Some(Outages { every, last });
         }
         sensor.is_changed = sensor != unchanged;
         Ok(sensor)
+    }
+
+    fn outage(&self, seconds: &Located<f64>, what: &str) -> Checked<f64> {
+        let [least, most] = OUTAGES;
+        if (least..=most).contains(seconds.get()) {
+            return Ok(*seconds.get());
+        }
+        let message = format!("{what}: {} s is no outage", seconds.get());
+        Err(self.error(seconds.span(), message, format!("give seconds, from {least} to {most}")))
     }
 }

@@ -35,11 +35,11 @@ pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Re
             outside_since = Some(bench.now());
             evidence.detect(flagged.then_some(1), 1, || "depth past the table".to_owned());
         }
-        // No extrapolation: the command is the last value of the path and the integral, unless limited.
+        // No extrapolation: the command is the last value of the path and what the feedback adds, unless limited.
         if faults.intersection(Faults::POSITION_LIMITED | Faults::RATE_LIMITED).is_empty()
-            && let Some(integral) = bench.state.integral()
+            && let Some(added) = bench.state.added()
         {
-            let expected = last.paddle_path + Vector2::from(integral);
+            let expected = last.paddle_path + Vector2::from(added);
             let off = (Vector2::from(command.displacement) - expected).norm();
             evidence.require(off < 1e-12, || format!("depth {}: {off} off the last knot's path", needle.depth));
         }
