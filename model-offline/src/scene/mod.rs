@@ -168,7 +168,7 @@ impl Scene {
     }
 
     fn bundled_at(path: &Path) -> Option<&'static (&'static str, &'static str)> {
-        if path.exists() { None } else { BUNDLED.iter().find(|(name, _)| Path::new(name) == path) }
+        if path.is_file() { None } else { BUNDLED.iter().find(|(name, _)| Path::new(name) == path) }
     }
 
     /// The text of a scene file, or of a bundled scene, not yet parsed.
