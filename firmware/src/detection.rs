@@ -115,7 +115,7 @@ pub const DIVERGENCE_FLOOR: f64 = 0.01;
 
 /// How far off the table's tissue is thought to be, part of the largest slope of the target in depth, as the standard
 /// deviation of the orthogonal slope that it leaves. The bundled scenes, mistaken for tissue without their inclusions,
-/// leave 2 to 8 %; three standard deviations cover them.
+/// leave 2.3 to 7.5 %; three standard deviations cover them.
 pub const TISSUE_SPREAD: f64 = 0.025;
 
 /// The target moves by itself as far as the tissue is thought to be off over the whole depth within this time, s.
@@ -124,7 +124,7 @@ pub const LEVEL_TIME: f64 = 30.0;
 /// How much of the innovations before counts with the newest: ten samples or so.
 pub const SURPRISE_MEMORY: f64 = 0.9;
 
-/// Standard deviations of their sum that are no noise: one false alarm in a thousand samples, which costs little.
+/// Standard deviations of their sum that are no noise: of white innovations about one sum in two thousand is larger.
 pub const SURPRISE_SIGMAS: f64 = 3.5;
 
 /// Growth of the variances at every sample that surprises.
