@@ -153,7 +153,7 @@ impl SlippingNeedle<'_> {
             // On the undeformed body a blunt tip would have the tissue overtake it: then it holds.
             let bounds = Bounds { lower: 0.0, upper: self.cutting_force(force, engaged) };
             let trial = self.trial(depth, ahead, Tip { engaged, bounds })?;
-            self.tip_holds = bounds.upper > 0.0 && trial.tip_force < bounds.upper;
+            self.tip_holds = 0.0 < trial.tip_force && trial.tip_force < bounds.upper;
             return Ok((engaged, trial));
         }
         let enough = 1e-6 * self.model.spacing();
