@@ -28,7 +28,7 @@ fn linear_paper(depth: f64, keys: &str, discretization: &str) -> Scene {
 }
 
 fn within<'m>(model: &'m TissueModel, paddle: Option<usize>, increments: u32) -> SlippingNeedle<'m> {
-    let way = Way { depth: model.scene().needle.depth, paddle: Vector2::zeros(), increments };
+    let way = Way { depth: model.scene().needle.depth, paddle: Vector2::zeros(), increments, seconds: 0.0 };
     match insert(model, paddle, way).unwrap() {
         Inserted::Within { needle, .. } => *needle,
         Inserted::Pushing(_) => panic!("the skin holds"),
@@ -229,7 +229,7 @@ fn skin_that_holds_is_pushed_as_a_patch_and_skin_that_never_gives_way_is_one() {
     assert_eq!((never.hash(), never.needle.shaft), (plain.hash(), None));
 
     let holds = TissueModel::new(&scene("paper", 0.1, &keys("1e6"), text)).unwrap();
-    let way = Way { depth: 0.05, paddle: Vector2::new(0.001, 0.0), increments: 5 };
+    let way = Way { depth: 0.05, paddle: Vector2::new(0.001, 0.0), increments: 5, seconds: 0.0 };
     let Inserted::Pushing(body) = insert(&holds, Some(1), way).unwrap() else { panic!("it gave way") };
     let model = TissueModel::new(&plain).unwrap();
     let mut patch = model.body(Some(1), NewtonSettings::default()).unwrap();

@@ -6,8 +6,9 @@ use model_offline::geometry::Point2;
 use model_offline::linalg::Pattern;
 use model_offline::material::Law;
 use model_offline::mechanics::Tissue;
-use model_offline::mechanics::assembly::{AssemblyState, internal_force, tangent};
+use model_offline::mechanics::assembly::{AssemblyState, Medium, internal_force, tangent};
 use model_offline::mechanics::blocks::BlockPositions;
+use model_offline::mechanics::history::Prestress;
 use model_offline::mechanics::stabilisation::Stabilisation;
 use model_offline::model::TissueModel;
 use model_offline::placement::rest::rest_responses;
@@ -81,7 +82,13 @@ fn energy_and_force(planar: &Planar, tissue: &Tissue, d: &[f64]) -> (f64, Vec<f6
     let (mut state, mut force) = (AssemblyState::default(), vec![0.0; d.len()]);
     let (pattern, blocks) = laid_out(planar);
     let stabilisation = Stabilisation::new(planar.rule(), tissue, &blocks, &pattern);
-    let energy = internal_force((planar.rule(), &stabilisation), tissue, d, &mut state, &mut force).unwrap();
+    let energy = internal_force(
+        Medium { rule: planar.rule(), stabilisation: &stabilisation, tissue, prestress: &Prestress::default() },
+        d,
+        &mut state,
+        &mut force,
+    )
+    .unwrap();
     (energy, force, state)
 }
 
@@ -94,7 +101,17 @@ fn force_and_tangent_are_the_derivatives_of_the_energy() {
         let (pattern, blocks) = laid_out(&planar);
         let stabilisation = Stabilisation::new(planar.rule(), &tissue, &blocks, &pattern);
         let mut values = vec![0.0; pattern.entries()];
-        tangent((planar.rule(), &stabilisation), &tissue, &state, &blocks, &mut values);
+        tangent(
+            Medium {
+                rule: planar.rule(),
+                stabilisation: &stabilisation,
+                tissue: &tissue,
+                prestress: &Prestress::default(),
+            },
+            &state,
+            &blocks,
+            &mut values,
+        );
         // One node of the interior against all others.
         let (node, step) = (24_u32, 1e-6);
         for axis in 0..2 {

@@ -3,7 +3,7 @@
 use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
-use model_offline::model::{Body, ModelError, TissueModel};
+use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
 use model_offline::output;
@@ -35,6 +35,9 @@ pub(super) struct SolveArgs {
         allow_hyphen_values = true
     )]
     paddle_displacement: Option<Vec<f64>>,
+    /// Hold needle and paddle there for so many seconds: tissue that relaxes goes on.
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
+    dwell: f64,
     /// Write the result as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -65,6 +68,15 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     if !args.depth.is_finite() || args.depth < 0.0 {
         return Err(CliError::usage(format!("--depth is {}", args.depth), "give a depth of 0 or more"));
     }
+    if !args.dwell.is_finite() || args.dwell < 0.0 {
+        return Err(CliError::usage(format!("--dwell is {}", args.dwell), "give seconds, 0 or more"));
+    }
+    if args.dwell > 0.0 && !scene.relaxes() {
+        return Err(CliError::usage(
+            "--dwell changes nothing: this tissue does not relax",
+            "add [material.relaxation] to the scene, or leave --dwell out",
+        ));
+    }
     if scene.needle.shaft.is_some() && args.depth > scene.needle.depth {
         return Err(CliError::usage(
             format!("--depth is {}, and the needle of this scene goes to {}", args.depth, scene.needle.depth),
@@ -81,7 +93,7 @@ fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<
     let position = args.paddle.map(|index| scene.paddle_position(index)).transpose().map_err(ModelError::from)?;
     // In pieces of the scene's increment: the path matters near the limits of stability, and to a needle that slips.
     let increments = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
-    let way = Way { depth: args.depth, paddle: displacement, increments };
+    let way = Way { depth: args.depth, paddle: displacement, increments, seconds: args.depth / scene.needle.speed };
     let mut solved = match scene.needle.shaft {
         Some(_) => match insert(&model, position, way)? {
             Inserted::Pushing(body) => Solved::Pushing(body),
@@ -89,15 +101,17 @@ fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<
         },
         None => {
             let mut body = model.body(position, NewtonSettings::default()).map_err(ModelError::from)?;
+            let end = Pose { depth: args.depth, paddle: displacement, ..Pose::default() };
             for increment in 1..=increments {
-                let share = f64::from(increment) / f64::from(increments);
-                if let Err(failure) = body.drive(args.depth * share, displacement * share) {
+                let pose = Pose::default().towards(&end, f64::from(increment) / f64::from(increments));
+                if let Err(failure) = body.take_in(pose, way.seconds / f64::from(increments)) {
                     return Err(CliError::Solve { failure, depth: body.depth() });
                 }
             }
             Solved::Pushing(Box::new(body))
         }
     };
+    solved.dwell(args.dwell)?;
     write(&model, &mut solved, displacement, args)?;
     if !args.run.quiet {
         print(scene, &solved, displacement, args);
@@ -133,6 +147,22 @@ impl Solved<'_> {
             Self::Pushing(body) => body.equilibrium(),
             Self::Within(needle, _) => needle.equilibrium(),
         }
+    }
+
+    /// Holds everything where it is for so many seconds, in steps that grow: relaxation is fastest at first.
+    fn dwell(&mut self, seconds: f64) -> Result<(), CliError> {
+        const STEPS: u32 = 40;
+        let until = |step: u32| seconds * (f64::from(step) / f64::from(STEPS)).powi(3);
+        for step in 1..=if seconds > 0.0 { STEPS } else { 0 } {
+            let elapsed = until(step) - until(step - 1);
+            match self {
+                Self::Pushing(body) => body
+                    .take_in(body.pose(), elapsed)
+                    .map_err(|failure| CliError::Solve { failure, depth: body.depth() })?,
+                Self::Within(needle, _) => needle.take_in(needle.pose(), elapsed)?,
+            }
+        }
+        Ok(())
     }
 
     fn jacobian(&mut self) -> Result<Matrix2<f64>, CliError> {

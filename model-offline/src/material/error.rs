@@ -18,6 +18,15 @@ pub enum MaterialError {
     /// A modulus is given that the law does not know.
     #[error("{0} has no meaning for this law")]
     Meaningless(&'static str),
+    /// A number that must be positive is not.
+    #[error("{0} must be positive")]
+    NotPositive(&'static str),
+    /// Relaxation that leaves no stress in the end.
+    #[error("the shares g of the relaxation sum to {0}: nothing would hold in the end")]
+    Fluid(f64),
+    /// Shares and times of a relaxation that do not pair.
+    #[error("the relaxation has {0} shares g and {1} times tau")]
+    Unpaired(usize, usize),
     /// A tensor index beyond the dimension.
     #[error("tensor entry [{0}, {1}, {2}, {3}] has an index beyond 1 (indices count from 0)")]
     Index(u32, u32, u32, u32),
@@ -32,6 +41,9 @@ impl MaterialError {
         match self {
             Self::Missing(_) => "give every modulus of the law",
             Self::Meaningless(_) => "remove it, or choose another model",
+            Self::NotPositive(_) | Self::Fluid(_) | Self::Unpaired(..) => {
+                "give as many shares as times, all positive, the shares' sum below 1: e.g. g = [0.3, 0.2], tau = [3.2, 42.0]"
+            }
             _ => "the law must be stable at rest: moduli finite, mu > 0, lambda + 2 mu / 3 > 0",
         }
     }

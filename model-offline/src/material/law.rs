@@ -9,8 +9,9 @@ use super::kinematics::{Matrix, Tensor4};
 use super::linear::Linear;
 use super::material::{Material, Response};
 use super::neo_hookean::NeoHookean;
+use super::relaxation::Relaxation;
 use super::saint_venant_kirchhoff::SaintVenantKirchhoff;
-use super::section;
+use super::section::{self, RelaxationSection};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -93,6 +94,8 @@ pub struct Law {
     #[serde(rename = "law")]
     form: Form,
     barrier: Barrier,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    relaxation: Option<Relaxation>,
 }
 
 impl<const D: usize> Material<D> for Law {
@@ -119,11 +122,17 @@ impl Law {
     /// # Errors
     /// Moduli that are missing, meaningless, or make no law that is stable at rest.
     pub fn read(section: &MaterialSection) -> Result<Self, MaterialError> {
-        let law = Self::plain(Form::read(section)?);
-        match section.barrier {
-            Some(beta) => law.with_barrier(beta),
-            None => Ok(law),
+        let mut law = Self::plain(Form::read(section)?);
+        if let Some(beta) = section.barrier {
+            law = law.with_barrier(beta)?;
         }
+        if let Some(RelaxationSection { g, tau }) = &section.relaxation {
+            if g.len() != tau.len() {
+                return Err(MaterialError::Unpaired(g.len(), tau.len()));
+            }
+            law = law.relaxing(Relaxation::new(g.iter().copied().zip(tau.iter().copied()))?);
+        }
+        Ok(law)
     }
 
     /// Fung's law in isotropic form (the paper's equation 6, its Table I summed over a symmetric strain):
@@ -170,7 +179,7 @@ impl Law {
     }
 
     fn plain(form: Form) -> Self {
-        Self { form, barrier: Barrier::default() }
+        Self { form, barrier: Barrier::default(), relaxation: None }
     }
 
     /// Adds the volumetric barrier `β/4 (ln J)⁴`: zero value, slope and curvature at J = 1, so that small strains do not
@@ -180,6 +189,23 @@ impl Law {
     /// `beta` that is negative or not finite.
     pub fn with_barrier(self, beta: f64) -> Result<Self, MaterialError> {
         Ok(Self { barrier: Barrier::new(beta)?, ..self })
+    }
+
+    /// Stress relaxation on all of its moduli.
+    #[must_use]
+    pub fn relaxing(self, relaxation: Relaxation) -> Self {
+        Self { relaxation: Some(relaxation), ..self }
+    }
+
+    /// Stress relaxation, where there is any.
+    pub fn relaxation(&self) -> Option<&Relaxation> {
+        self.relaxation.as_ref()
+    }
+
+    /// The law without relaxation: its moduli are those of a fast deformation.
+    #[must_use]
+    pub fn elastic(&self) -> Self {
+        Self { relaxation: None, ..self.clone() }
     }
 
     /// Factor β of the volumetric barrier, stress units.
@@ -202,7 +228,11 @@ impl Law {
     /// tangent at rest is not isotropic stays as it is, for small strains.
     #[must_use]
     pub fn linearised(&self) -> Self {
-        self.form.linearised().map_or_else(|| self.clone(), |moduli| Self::plain(Form::Linear(moduli.into())))
+        let linear = |moduli: LameParameters| Self {
+            relaxation: self.relaxation.clone(),
+            ..Self::plain(Form::Linear(moduli.into()))
+        };
+        self.form.linearised().map_or_else(|| self.clone(), linear)
     }
 
     /// The law with another factor c of Fung's exponential term; none where the law has no such term.
@@ -210,7 +240,7 @@ impl Law {
     /// # Errors
     /// `c` that is negative or not finite.
     pub fn with_exponential_factor(&self, c: f64) -> Option<Result<Self, MaterialError>> {
-        Some(self.form.with_exponential_factor(c)?.map(|form| Self { form, barrier: self.barrier }))
+        Some(self.form.with_exponential_factor(c)?.map(|form| Self { form, ..self.clone() }))
     }
 
     /// The law with λ = 2μν/(1 − 2ν) for another Poisson ratio ν, the shear modulus μ kept (and Fung's exponential term as it
@@ -219,7 +249,7 @@ impl Law {
     /// # Errors
     /// ν outside (−1, ½), where no law is stable at rest.
     pub fn with_poisson_ratio(&self, poisson: f64) -> Option<Result<Self, MaterialError>> {
-        Some(self.form.with_poisson_ratio(poisson)?.map(|form| Self { form, barrier: self.barrier }))
+        Some(self.form.with_poisson_ratio(poisson)?.map(|form| Self { form, ..self.clone() }))
     }
 }
 

@@ -32,6 +32,18 @@ pub struct MaterialSection<M> {
     pub c_tensor: Option<Vec<TensorEntry>>,
     /// Volumetric barrier β, stress units: adds β (ln J)⁴ / 4, felt only under strong volume change.
     pub barrier: Option<f64>,
+    /// Stress relaxation (default: none).
+    pub relaxation: Option<RelaxationSection>,
+}
+
+/// A Prony series `G(t) = 1 − Σ g (1 − e^(−t/tau))` on all moduli, which are then those of a fast deformation.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RelaxationSection {
+    /// Shares of the stress that decay, each positive, their sum below 1.
+    pub g: Vec<f64>,
+    /// Their times, seconds.
+    pub tau: Vec<f64>,
 }
 
 impl<M> MaterialSection<M> {

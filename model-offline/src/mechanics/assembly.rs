@@ -5,6 +5,7 @@
 //! [`Stabilisation`] add theirs.
 
 use super::blocks::BlockPositions;
+use super::history::Prestress;
 use super::stabilisation::Stabilisation;
 use super::tissue::Tissue;
 use crate::discretization::Quadrature;
@@ -65,19 +66,32 @@ pub fn displacement_gradient<const D: usize>(rule: &Quadrature<D>, q: usize, coe
     h
 }
 
-/// Internal force and strain energy at the given coefficients, with those of the rule's stabilisation; fills `state` for
-/// [`tangent`].
+/// What resists a deformation: a discretized tissue.
+#[derive(Debug, Clone, Copy)]
+pub struct Medium<'a, const D: usize> {
+    /// The integration rule.
+    pub rule: &'a Quadrature<D>,
+    /// The rule's stabilisation on the tissue.
+    pub stabilisation: &'a Stabilisation,
+    /// Materials by cell.
+    pub tissue: &'a Tissue,
+    /// What its past has left in it.
+    pub prestress: &'a Prestress<D>,
+}
+
+/// Internal force and energy at the given coefficients, with those of the rule's stabilisation and of what the past has left;
+/// fills `state` for [`tangent`].
 ///
 /// # Errors
 /// [`Inverted`] when det F ≤ 0 or not a number, or the stress not finite, at an integration point; `force` is then not
 /// meaningful.
 pub fn internal_force<const D: usize>(
-    (rule, stabilisation): (&Quadrature<D>, &Stabilisation),
-    tissue: &Tissue,
+    medium: Medium<'_, D>,
     coefficients: &[f64],
     state: &mut AssemblyState<D>,
     force: &mut [f64],
 ) -> Result<f64, Inverted> {
+    let Medium { rule, stabilisation, tissue, prestress } = medium;
     force.fill(0.0);
     state.gradients.clear();
     let linear = tissue.is_linear();
@@ -95,6 +109,7 @@ pub fn internal_force<const D: usize>(
             energy += point.weight * factor * response.energy;
             pk1 += response.pk1_stress * (point.weight * factor);
         }
+        prestress.add_stress(q, &h, &mut energy, &mut pk1);
         if !pk1.iter().all(|p| p.is_finite()) {
             return Err(Inverted { point: q, det_f });
         }
@@ -107,20 +122,20 @@ pub fn internal_force<const D: usize>(
             }
         }
     }
-    Ok(energy + stabilisation.add_force::<D>(coefficients, force))
+    Ok(energy + stabilisation.add_force::<D>(coefficients, force) + prestress.add_nodal(coefficients, force))
 }
 
 /// Tangent stiffness at the state that [`internal_force`] left, added into `values` (lower triangle of blocks, laid
 /// out by the pattern of `blocks`).
 pub fn tangent<const D: usize>(
-    (rule, stabilisation): (&Quadrature<D>, &Stabilisation),
-    tissue: &Tissue,
+    medium: Medium<'_, D>,
     state: &AssemblyState<D>,
     blocks: &BlockPositions,
     values: &mut [f64],
 ) {
+    let Medium { rule, stabilisation, tissue, prestress } = medium;
     let mut next = 0;
-    for (point, h) in rule.points().zip(&state.gradients) {
+    for (q, (point, h)) in rule.points().zip(&state.gradients).enumerate() {
         let mut a = [[[[0.0; D]; D]; D]; D];
         for (material, factor) in tissue.parts(point.cell) {
             let part = material.tangent(h);
@@ -128,6 +143,15 @@ pub fn tangent<const D: usize>(
             for (sum, row) in a.iter_mut().flatten().flatten().flatten().zip(part.iter().flatten().flatten().flatten())
             {
                 *sum += scale * row;
+            }
+        }
+        if let Some(pk2) = prestress.geometric(q) {
+            for i in 0..D {
+                for j in 0..D {
+                    for l in 0..D {
+                        a[i][j][i][l] += pk2[(j, l)];
+                    }
+                }
             }
         }
         for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {

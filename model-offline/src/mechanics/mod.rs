@@ -3,6 +3,7 @@
 pub mod assembly;
 pub mod blocks;
 pub mod constraints;
+pub mod history;
 pub mod nitsche;
 pub mod stabilisation;
 pub mod tissue;

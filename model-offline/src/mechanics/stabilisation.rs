@@ -44,6 +44,17 @@ impl Stabilisation {
         Self { pattern: Arc::clone(pattern), weights }
     }
 
+    /// Whether the rule has any.
+    pub(super) fn acts(&self) -> bool {
+        !self.weights.is_empty()
+    }
+
+    /// Adds so many times another one of the same pattern.
+    pub(super) fn add_scaled(&mut self, other: &Self, factor: f64) {
+        self.weights.resize(self.weights.len().max(other.weights.len()), 0.0);
+        self.weights.iter_mut().zip(&other.weights).for_each(|(sum, weight)| *sum += factor * weight);
+    }
+
     /// Adds its force; returns its energy.
     pub(super) fn add_force<const D: usize>(&self, coefficients: &[f64], force: &mut [f64]) -> f64 {
         if self.weights.is_empty() {

@@ -45,6 +45,29 @@ impl Tissue {
         self.parts[range].iter().map(|&(m, factor)| (&self.materials[m as usize], factor))
     }
 
+    /// The materials.
+    pub fn laws(&self) -> &[Law] {
+        &self.materials
+    }
+
+    /// Which materials a cell has, with the factors on their energies.
+    pub(super) fn shares(&self, cell: u32) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let range = self.offsets[cell as usize] as usize..self.offsets[cell as usize + 1] as usize;
+        self.parts[range].iter().map(|&(m, factor)| (m as usize, factor))
+    }
+
+    /// The same tissue with the energy of every material scaled.
+    #[must_use]
+    pub(super) fn scaled(&self, factor: impl Fn(usize) -> f64) -> Self {
+        let parts = self.parts.iter().map(|&(m, of_energy)| (m, of_energy * factor(m as usize))).collect();
+        Self { parts, ..self.clone() }
+    }
+
+    /// Whether stress relaxes anywhere.
+    pub fn relaxes(&self) -> bool {
+        self.materials.iter().any(|law| law.relaxation().is_some())
+    }
+
     /// Whether every material is linear, so that one tangent serves every state.
     pub fn is_linear(&self) -> bool {
         self.materials.iter().all(Law::is_linear)

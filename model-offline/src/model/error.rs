@@ -70,6 +70,11 @@ pub enum ModelError {
         "this needs nodal values that are imposed exactly, and the scene imposes them weakly: use essential = \"transformation\""
     )]
     ImposedWeakly,
+    /// Nitsche's method on tissue that relaxes.
+    #[error(
+        "this tissue relaxes ([material.relaxation]), and its boundary values are imposed weakly: use essential = \"transformation\""
+    )]
+    RelaxesHeldWeakly,
     /// What is asked for is not known of a needle that slips.
     #[error(
         "this needle slips (mechanics = \"shaft\"), and placements, tables and simulations are of a contact that moves with the \
@@ -130,6 +135,7 @@ impl ModelError {
                 | Self::NoSuchPaddle(_)
                 | Self::NitscheInside
                 | Self::ImposedWeakly
+                | Self::RelaxesHeldWeakly
                 | Self::NeedleSlips
                 | Self::Material(_)
         )

@@ -97,12 +97,40 @@ impl<T> Groups<T> {
     }
 
     /// Two prescribed numbers per member, in the same order.
-    fn values(&self, paddle: Option<usize>, needle_value: Vector2<f64>, paddle_value: Vector2<f64>) -> Vec<f64> {
+    fn values(&self, attached: Option<usize>, needle: Vector2<f64>, pose: &Pose) -> Vec<f64> {
         let repeat = |value: Vector2<f64>, count: usize| std::iter::repeat_n([value.x, value.y], count).flatten();
-        repeat(Vector2::zeros(), self.immobile.len())
-            .chain(repeat(needle_value, self.needle.len()))
-            .chain(repeat(paddle_value, paddle.map_or(0, |p| self.paddles[p].len())))
+        repeat(pose.base, self.immobile.len())
+            .chain(repeat(needle, self.needle.len()))
+            .chain(repeat(pose.paddle, attached.map_or(0, |p| self.paddles[p].len())))
             .collect()
+    }
+}
+
+/// Where everything is that moves a body, as displacements from rest.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Pose {
+    /// Depth of the needle, length.
+    pub depth: f64,
+    /// How far the needle is off its line, orthogonally to its axis, length: what bends it or its holder.
+    pub lateral: f64,
+    /// Displacement of the paddle, length.
+    pub paddle: Vector2<f64>,
+    /// Displacement of the part that is immobile in a scene, as breathing moves it, length.
+    pub base: Vector2<f64>,
+}
+
+impl Pose {
+    /// The pose that is a share of the way from here to another; at 1 the other, not the other up to rounding.
+    pub fn towards(&self, other: &Self, share: f64) -> Self {
+        if share >= 1.0 {
+            return *other;
+        }
+        Self {
+            depth: self.depth + (other.depth - self.depth) * share,
+            lateral: self.lateral + (other.lateral - self.lateral) * share,
+            paddle: self.paddle + (other.paddle - self.paddle) * share,
+            base: self.base + (other.base - self.base) * share,
+        }
     }
 }
 
@@ -155,6 +183,9 @@ impl TissueModel {
                 })?)
             }
         };
+        if matches!(essential, EssentialBoundary::Points(_)) && scene.relaxes() {
+            return Err(ModelError::RelaxesHeldWeakly);
+        }
         Ok(Self {
             tissue: tissue_of(scene, planar.cells(), Mixing::of(planar.method().integration)),
             scene: scene.clone(),
@@ -291,10 +322,15 @@ impl TissueModel {
 
     /// All prescribed values: needle at `depth`, paddle displaced.
     pub(crate) fn prescribed_values(&self, paddle: Option<usize>, depth: f64, displacement: Vector2<f64>) -> Vec<f64> {
-        let needle = self.scene.needle.axis * depth;
+        self.prescribed_in(paddle, &Pose { depth, paddle: displacement, ..Pose::default() })
+    }
+
+    /// All prescribed values of a pose.
+    pub(crate) fn prescribed_in(&self, attached: Option<usize>, pose: &Pose) -> Vec<f64> {
+        let needle = self.scene.needle.axis * pose.depth + self.scene.needle.orthogonal() * pose.lateral;
         match &self.essential {
-            EssentialBoundary::Nodes(groups) => groups.values(paddle, needle, displacement),
-            EssentialBoundary::Points(groups) => groups.values(paddle, needle, displacement),
+            EssentialBoundary::Nodes(groups) => groups.values(attached, needle, pose),
+            EssentialBoundary::Points(groups) => groups.values(attached, needle, pose),
         }
     }
 
@@ -338,7 +374,7 @@ impl TissueModel {
         let constraints =
             Constraints { rows: self.constrained_rows(paddle).unwrap_or_default(), weak: self.weakly_imposed(paddle) };
         let equilibrium = Equilibrium::analysed(self.discrete_body(), self.analysis(), constraints, settings)?;
-        Ok(Body { model: self, equilibrium, attached: paddle, depth: 0.0, paddle: Vector2::zeros() })
+        Ok(Body { model: self, equilibrium, attached: paddle, pose: Pose::default() })
     }
 }
 
@@ -348,14 +384,18 @@ pub struct Body<'m> {
     model: &'m TissueModel,
     equilibrium: Equilibrium<2>,
     attached: Option<usize>,
-    depth: f64,
-    paddle: Vector2<f64>,
+    pose: Pose,
 }
 
 impl Body<'_> {
     /// Needle depth.
     pub fn depth(&self) -> f64 {
-        self.depth
+        self.pose.depth
+    }
+
+    /// Where everything is that moves the body.
+    pub fn pose(&self) -> Pose {
+        self.pose
     }
 
     /// Size of the body: the length that tolerances are relative to.
@@ -365,7 +405,7 @@ impl Body<'_> {
 
     /// Paddle displacement.
     pub fn paddle(&self) -> Vector2<f64> {
-        self.paddle
+        self.pose.paddle
     }
 
     /// The equilibrium behind it.
@@ -383,16 +423,31 @@ impl Body<'_> {
     /// # Errors
     /// [`Failure`]; depth and paddle are then where the last converged state has them.
     pub fn drive(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), Failure> {
-        let prescribed = self.model.prescribed_values(self.attached, depth, paddle);
+        self.take_to(Pose { depth, paddle, ..self.pose })
+    }
+
+    /// Takes everything that moves the body to a pose along a straight path, at once.
+    ///
+    /// # Errors
+    /// [`Failure`]; the pose is then that of the last converged state.
+    pub fn take_to(&mut self, pose: Pose) -> Result<(), Failure> {
+        let prescribed = self.model.prescribed_in(self.attached, &pose);
         let outcome = self.equilibrium.drive(&prescribed);
         let reached = outcome.as_ref().map_or_else(|failure| failure.reached, |()| 1.0);
-        self.depth += (depth - self.depth) * reached;
-        self.paddle += (paddle - self.paddle) * reached;
-        if outcome.is_ok() {
-            // Not the sum of the increments, the value asked for.
-            (self.depth, self.paddle) = (depth, paddle);
-        }
+        self.pose = self.pose.towards(&pose, reached);
         outcome
+    }
+
+    /// The same in so many seconds, in which tissue that relaxes does: the elastic stress is taken to change linearly in
+    /// them, so that the error falls with the square of their number.
+    ///
+    /// # Errors
+    /// [`Failure`]; the pose is then that of the last converged state, and tissue remembers what it did before.
+    pub fn take_in(&mut self, pose: Pose, seconds: f64) -> Result<(), Failure> {
+        self.equilibrium.begin(seconds);
+        self.take_to(pose)?;
+        self.equilibrium.remember();
+        Ok(())
     }
 
     /// Target displacement.

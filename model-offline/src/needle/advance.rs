@@ -2,9 +2,10 @@
 
 use super::complementarity::Bounds;
 use super::error::NeedleError;
-use super::state::SlippingNeedle;
+use super::state::{EnergyAccount, SlippingNeedle};
 use super::trial::{Tip, Trial};
 use crate::geometry::Point2;
+use crate::model::Pose;
 use nalgebra::Vector2;
 
 /// Positions of the tip that are tried.
@@ -22,25 +23,29 @@ impl SlippingNeedle<'_> {
     /// # Errors
     /// [`NeedleError`]; the needle is then where it was.
     pub fn advance(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), NeedleError> {
+        self.take_in(Pose { depth, paddle, ..self.pose }, 0.0)
+    }
+
+    /// Takes everything that moves tissue to a pose in so many seconds, in which tissue that relaxes does.
+    ///
+    /// # Errors
+    /// [`NeedleError`]; the needle is then where it was.
+    pub fn take_in(&mut self, pose: Pose, seconds: f64) -> Result<(), NeedleError> {
         let before = self.clone();
-        let outcome = self.by_parts(depth, paddle);
+        let outcome = self.by_parts(pose, seconds);
         if outcome.is_err() {
             *self = before;
         }
         outcome
     }
 
-    fn by_parts(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<(), NeedleError> {
-        let (from, beside) = (self.depth, self.paddle);
-        let at = |share: f64| match share {
-            share if share >= 1.0 => (depth, paddle),
-            share => (from + (depth - from) * share, beside + (paddle - beside) * share),
-        };
+    fn by_parts(&mut self, to: Pose, seconds: f64) -> Result<(), NeedleError> {
+        let from = self.pose;
         let (mut done, mut goal, mut parts) = (0.0, 1.0, 0);
         loop {
             let before = self.clone();
-            let (depth, paddle) = at(goal);
-            let outcome = self.increment(depth, paddle);
+            let pose = from.towards(&to, goal);
+            let outcome = self.increment(pose, seconds * (goal - done));
             parts += 1;
             let shorter = match &outcome {
                 Ok(None) => {
@@ -55,22 +60,27 @@ impl SlippingNeedle<'_> {
             };
             *self = before;
             if parts >= MOST_PARTS || goal - done < SHORTEST_PART {
-                return outcome.and(Err(NeedleError::NoForces { depth }));
+                return outcome.and(Err(NeedleError::NoForces { depth: pose.depth }));
             }
             goal = done + (goal - done) * shorter;
         }
     }
 
     /// One increment; the share of it that may be taken at once, where the tip would come into other tissue.
-    fn increment(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Option<f64>, NeedleError> {
-        let beside = std::mem::replace(&mut self.paddle, paddle);
+    fn increment(&mut self, pose: Pose, seconds: f64) -> Result<Option<f64>, NeedleError> {
+        let depth = pose.depth;
+        let before = self.pose;
+        self.equilibrium.begin(seconds);
+        // The depth follows when the increment has been found: what slides is counted from it.
+        self.pose = Pose { depth: before.depth, ..pose };
         let ahead = self.ahead();
         let cut = self.path.length();
         let (engaged, trial) = self.tip_finds_its_place(depth, ahead)?;
         if let Some(edge) = self.other_tissue(cut, engaged, ahead) {
             return Ok(Some((edge - cut) / (engaged - cut)));
         }
-        self.commit(depth, beside, engaged, trial)?;
+        self.commit(depth, before, engaged, trial)?;
+        self.equilibrium.remember();
         Ok(None)
     }
 
@@ -157,7 +167,7 @@ impl SlippingNeedle<'_> {
             return Ok((engaged, trial));
         }
         let enough = 1e-6 * self.model.spacing();
-        let mut engaged = (self.engaged + depth - self.depth).max(0.0);
+        let mut engaged = (self.engaged + depth - self.pose.depth).max(0.0);
         let mut last: Option<(f64, f64)> = None;
         // Between these the root lies: the tissue jumps a little where a station is passed, maybe over it.
         let (mut behind, mut beyond) = (0.0, f64::INFINITY);
@@ -192,9 +202,9 @@ impl SlippingNeedle<'_> {
     ///
     /// # Errors
     /// [`NeedleError::Outrun`]; the state is then spoilt.
-    fn commit(&mut self, depth: f64, beside: Vector2<f64>, engaged: f64, trial: Trial) -> Result<(), NeedleError> {
+    fn commit(&mut self, depth: f64, before: Pose, engaged: f64, trial: Trial) -> Result<(), NeedleError> {
         let Trial { mut contacts, tip_force, tip_displacement } = trial;
-        let (base, paddle) = (self.base_force(), self.last_paddle_force);
+        let (base, across, held) = (self.base_force(), self.force_across(), self.last_forces);
         let friction = self.dissipated(&contacts, depth);
         let passed = self.tip_passed(&contacts, depth, engaged);
         let cutting = self.mean_tip_force(tip_force, engaged) * passed;
@@ -227,12 +237,19 @@ impl SlippingNeedle<'_> {
             }
         }
         (self.tip, self.tip_force) = (tip, tip_force);
-        self.energy.work += 0.5 * (base + self.base_force()) * (depth - self.depth);
-        self.last_paddle_force = self.paddle_force();
-        self.energy.paddle += 0.5 * (paddle + self.last_paddle_force).dot(&(self.paddle - beside));
-        self.depth = depth;
+        self.energy.work += 0.5 * (base + self.base_force()) * (depth - self.pose.depth);
+        self.energy.work += 0.5 * (across + self.force_across()) * (self.pose.lateral - before.lateral);
+        self.last_forces = self.held_forces();
+        let mean = |k: usize| 0.5 * (held[k] + self.last_forces[k]);
+        self.energy.paddle += mean(0).dot(&(self.pose.paddle - before.paddle));
+        self.energy.base += mean(1).dot(&(self.pose.base - before.base));
+        self.pose.depth = depth;
         self.last.copy_from_slice(self.equilibrium.coefficients());
-        self.energy.stored = self.equilibrium.energy() + self.load_work();
+        let EnergyAccount { work, paddle, base, friction, cutting, .. } = self.energy;
+        self.energy.stored = match self.model.tissue().relaxes() {
+            true => work + paddle + base - friction - cutting,
+            false => self.equilibrium.energy() + self.load_work(),
+        };
         Ok(())
     }
 }

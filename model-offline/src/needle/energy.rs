@@ -18,7 +18,7 @@ impl SlippingNeedle<'_> {
         let new = gone_along(&contacts.iter().collect::<Vec<_>>(), engaged);
         let held = self.holding().0;
         let old = if held.is_empty() { new } else { gone_along(&held, self.engaged) };
-        depth - self.depth - 0.5 * (old + new)
+        depth - self.pose.depth - 0.5 * (old + new)
     }
 
     /// What friction takes in this increment: where the shaft was already, and over the triangle of slip behind a tip that
@@ -49,11 +49,18 @@ impl SlippingNeedle<'_> {
         }
     }
 
-    /// Force of the paddle on the tissue.
-    pub(super) fn paddle_force(&self) -> Vector2<f64> {
+    /// Force of the shaft on the tissue, across its line.
+    pub(super) fn force_across(&self) -> f64 {
+        self.holding().0.iter().map(|contact| contact.across).sum()
+    }
+
+    /// Forces of the paddle and of the base on the tissue.
+    pub(super) fn held_forces(&self) -> [Vector2<f64>; 2] {
         let [immobile, _] = self.rows;
-        let forces: Vec<f64> = self.equilibrium.reactions().skip(2 * immobile).collect();
-        forces.chunks_exact(2).map(|force| Vector2::new(force[0], force[1])).sum()
+        let reactions: Vec<f64> = self.equilibrium.reactions().collect();
+        let (base, paddle) = reactions.split_at(2 * immobile);
+        let sum = |forces: &[f64]| forces.chunks_exact(2).map(|force| Vector2::new(force[0], force[1])).sum();
+        [sum(paddle), sum(base)]
     }
 
     /// Work that the present forces would do over the present displacements.

@@ -2,7 +2,7 @@
 
 use super::error::NeedleError;
 use super::state::SlippingNeedle;
-use crate::model::{Body, TissueModel};
+use crate::model::{Body, Pose, TissueModel};
 use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
 
@@ -22,14 +22,20 @@ pub struct Way {
     pub paddle: Vector2<f64>,
     /// Increments.
     pub increments: u32,
+    /// How long it takes, s, where tissue relaxes meanwhile.
+    pub seconds: f64,
 }
 
 impl Way {
-    /// Depth and paddle displacement after so many increments.
-    fn after(&self, increment: u32) -> (f64, Vector2<f64>) {
-        let share = f64::from(increment) / f64::from(self.increments.max(1));
-        // The end itself, not the end up to rounding.
-        if share >= 1.0 { (self.depth, self.paddle) } else { (self.depth * share, self.paddle * share) }
+    /// Where it is after so many increments.
+    fn after(&self, increment: u32) -> Pose {
+        let end = Pose { depth: self.depth, paddle: self.paddle, ..Pose::default() };
+        Pose::default().towards(&end, f64::from(increment) / f64::from(self.increments.max(1)))
+    }
+
+    /// What an increment takes, s.
+    fn step(&self) -> f64 {
+        self.seconds / f64::from(self.increments.max(1))
     }
 }
 
@@ -66,15 +72,15 @@ pub fn insert<'m>(model: &'m TissueModel, paddle: Option<usize>, way: Way) -> Re
         let mut before = (0.0, 0.0);
         let punctured = (1..=way.increments.max(1)).find_map(|increment| {
             let mut halvings = 0;
-            let start = way.after(increment - 1);
-            let goal = way.after(increment);
-            let mut share = 1.0;
+            let (start, goal) = (way.after(increment - 1), way.after(increment));
+            let (mut done, mut share) = (0.0, 1.0);
             // Skin that cannot be pushed as far as that may have given way before.
             loop {
-                let (depth, place) = (start.0 + (goal.0 - start.0) * share, start.1 + (goal.1 - start.1) * share);
-                if let Err(source) = body.drive(depth, place) {
+                let pose = start.towards(&goal, share);
+                let depth = pose.depth;
+                if let Err(source) = body.take_in(pose, way.step() * (share - done)) {
                     halvings += 1;
-                    share *= 0.5;
+                    share = 0.5 * (done + share);
                     if halvings > HALVINGS {
                         return Some(Err(NeedleError::Equilibrium { depth, source }));
                     }
@@ -85,7 +91,7 @@ pub fn insert<'m>(model: &'m TissueModel, paddle: Option<usize>, way: Way) -> Re
                     let share = (shaft.puncture_force - before.1) / (force - before.1);
                     return Some(Ok(before.0 + (depth - before.0) * share.clamp(0.0, 1.0)));
                 }
-                before = (depth, force);
+                (before, done) = ((depth, force), share);
                 if share >= 1.0 {
                     return None;
                 }
@@ -98,14 +104,14 @@ pub fn insert<'m>(model: &'m TissueModel, paddle: Option<usize>, way: Way) -> Re
         }
     }
     let mut needle = SlippingNeedle::at_rest(model, paddle)?;
-    let (first, beside) = way.after(1);
-    for halvings in (1..=BEGINNING).rev() {
-        let share = 0.5_f64.powi(halvings);
-        needle.advance(first * share, beside * share)?;
+    let shares = (1..=BEGINNING).rev().map(|halvings| 0.5_f64.powi(halvings));
+    let mut done = 0.0;
+    for share in shares.chain([1.0]) {
+        needle.take_in(Pose::default().towards(&way.after(1), share), way.step() * (share - done))?;
+        done = share;
     }
-    for increment in 1..=way.increments.max(1) {
-        let (depth, place) = way.after(increment);
-        needle.advance(depth, place)?;
+    for increment in 2..=way.increments.max(1) {
+        needle.take_in(way.after(increment), way.step())?;
     }
     Ok(Inserted::Within { needle: Box::new(needle), punctured_at })
 }

@@ -22,7 +22,7 @@ impl SlippingNeedle<'_> {
     /// # Errors
     /// [`NeedleError`].
     pub fn actuation_jacobian(&mut self) -> Result<Matrix2<f64>, NeedleError> {
-        let depth = self.depth;
+        let depth = self.pose.depth;
         let failed = |source| NeedleError::Equilibrium { depth, source };
         let mut contacts: Vec<Station> = self.holding().0.into_iter().cloned().collect();
         self.respond(&mut contacts, true).map_err(failed)?;

@@ -5,21 +5,23 @@ use super::path::{CutPath, hat_integrals};
 use super::station::{Slide, Station, StationState, spread};
 use crate::geometry::Point2;
 use crate::mechanics::Constraints;
-use crate::model::TissueModel;
+use crate::model::{Pose, TissueModel};
 use crate::scene::Shaft;
 use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::Vector2;
 use serde::Serialize;
 
 /// Where the work at the needle's base and of the paddle went, since it is in:
-/// work + paddle = stored + friction + cutting.
+/// work + paddle + base = stored + friction + cutting.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct EnergyAccount {
     /// Work at the base.
     pub work: f64,
     /// Work of the paddle.
     pub paddle: f64,
-    /// Strain energy of the tissue now.
+    /// Work of the part that is immobile in a scene, where something moves it.
+    pub base: f64,
+    /// Strain energy of the tissue now; of tissue that relaxes what it has stored or lost, which is what is left of the work.
     pub stored: f64,
     /// Dissipated by friction.
     pub friction: f64,
@@ -52,8 +54,7 @@ pub struct SlippingNeedle<'m> {
     pub(super) equilibrium: Equilibrium<2>,
     /// Rows of the immobile part, which come first, and of the paddle.
     pub(super) rows: [usize; 2],
-    pub(super) paddle: Vector2<f64>,
-    pub(super) depth: f64,
+    pub(super) pose: Pose,
     /// The length that has been cut.
     pub(super) cut: f64,
     /// Arc length down to which the shaft holds tissue: less than the cut's on the way out.
@@ -64,8 +65,8 @@ pub struct SlippingNeedle<'m> {
     pub(super) tip_force: f64,
     /// Whether the tip neither cuts nor is withdrawn: its force is what holds it where it is.
     pub(super) tip_holds: bool,
-    /// Force of the paddle on the tissue at the end of the last increment.
-    pub(super) last_paddle_force: Vector2<f64>,
+    /// Forces of the paddle and of the base on the tissue at the end of the last increment.
+    pub(super) last_forces: [Vector2<f64>; 2],
     pub(super) energy: EnergyAccount,
     /// Coefficients at the end of the last increment.
     pub(super) last: Vec<f64>,
@@ -91,8 +92,7 @@ impl<'m> SlippingNeedle<'m> {
             shaft,
             equilibrium,
             rows: counts,
-            paddle: Vector2::zeros(),
-            depth: 0.0,
+            pose: Pose::default(),
             cut: 0.0,
             engaged: 0.0,
             path: CutPath::from(shaft.entry),
@@ -100,7 +100,7 @@ impl<'m> SlippingNeedle<'m> {
             tip: None,
             tip_force: 0.0,
             tip_holds: false,
-            last_paddle_force: Vector2::zeros(),
+            last_forces: [Vector2::zeros(); 2],
             energy: EnergyAccount::default(),
             last: vec![0.0; model.dofs()],
         };
@@ -185,9 +185,14 @@ impl<'m> SlippingNeedle<'m> {
         self.path.at(arc_length, self.axis())
     }
 
+    /// Where everything is that moves tissue.
+    pub fn pose(&self) -> Pose {
+        self.pose
+    }
+
     /// Depth of the tip.
     pub fn depth(&self) -> f64 {
-        self.depth
+        self.pose.depth
     }
 
     /// Arc length of the cut down to which the shaft holds tissue.
@@ -202,7 +207,7 @@ impl<'m> SlippingNeedle<'m> {
 
     /// Where the tip is.
     pub fn tip_position(&self) -> Point2 {
-        self.shaft.entry + self.axis() * self.depth
+        self.shaft.entry + self.axis() * self.pose.depth + self.normal() * self.pose.lateral
     }
 
     /// Force that pushes the tip.

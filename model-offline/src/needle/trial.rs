@@ -6,6 +6,7 @@ use super::path::hat_integrals;
 use super::state::SlippingNeedle;
 use super::station::{Slide, Station, add_force, spread};
 use crate::geometry::Point2;
+use crate::model::Pose;
 use crate::solver::equilibrium::Failure;
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
@@ -74,7 +75,7 @@ impl SlippingNeedle<'_> {
             station.clone()
         };
         (joined.across, joined.along) = (0.0, 0.0);
-        joined.slide = if depth >= self.depth { Slide::Forward } else { Slide::Backward };
+        joined.slide = if depth >= self.pose.depth { Slide::Forward } else { Slide::Backward };
         if let (Some(tip), true) = (&self.tip, station.arc_length <= self.engaged) {
             joined.known = true;
             joined.slide = tip.slide;
@@ -244,9 +245,9 @@ impl SlippingNeedle<'_> {
         for (k, contact) in contacts.iter().enumerate() {
             let u = contact.stencil.interpolate(coefficients);
             let rest = if self.is_small_strain() { 0.0 } else { normal.dot(&(contact.at - self.shaft.entry)) };
-            felt[k] = rest + normal.dot(&u);
+            felt[k] = rest + normal.dot(&u) - self.pose.lateral;
             if contact.known {
-                felt[m + k] = axis.dot(&u) - contact.axial - (depth - self.depth);
+                felt[m + k] = axis.dot(&u) - contact.axial - (depth - self.pose.depth);
             }
         }
         felt[2 * m] = at + self.tip_displacement(contacts, spread) - depth;
@@ -264,8 +265,8 @@ impl SlippingNeedle<'_> {
     pub(super) fn slipped(&self, contact: &Station, depth: f64, engaged: f64) -> f64 {
         let axial = self.axis().dot(&contact.stencil.interpolate(self.equilibrium.coefficients()));
         match contact.known {
-            true => depth - self.depth - (axial - contact.axial),
-            false if depth >= self.depth => (engaged - contact.arc_length).max(0.0),
+            true => depth - self.pose.depth - (axial - contact.axial),
+            false if depth >= self.pose.depth => (engaged - contact.arc_length).max(0.0),
             false => 0.0,
         }
     }
@@ -283,8 +284,9 @@ impl SlippingNeedle<'_> {
 
     pub(super) fn prescribed(&self) -> Vec<f64> {
         let [immobile, moved] = self.rows;
-        let still = std::iter::repeat_n([0.0, 0.0], immobile);
-        still.chain(std::iter::repeat_n([self.paddle.x, self.paddle.y], moved)).flatten().collect()
+        let Pose { base, paddle, .. } = self.pose;
+        let rows = |value: Point2, count: usize| std::iter::repeat_n([value.x, value.y], count);
+        rows(base, immobile).chain(rows(paddle, moved)).flatten().collect()
     }
 
     /// Computes the responses that are missing, or all of them anew.

@@ -3,7 +3,8 @@
 
 use super::controllability::best_direction;
 use crate::mechanics::ConstrainedRows;
-use crate::mechanics::assembly::{AssemblyState, internal_force, tangent};
+use crate::mechanics::assembly::{AssemblyState, Medium, internal_force, tangent};
+use crate::mechanics::history::Prestress;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::{ConstrainedSolver, Unknowns};
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
@@ -84,12 +85,12 @@ pub(super) fn for_each_paddle(
         .ok_or(ModelError::ImposedWeakly)?;
     let analysis = model.analysis();
     let stabilisation = analysis.stabilisation(rule, model.tissue());
-    let rule = (&**rule, &stabilisation);
+    let prestress = Prestress::default();
+    let medium = Medium { rule, stabilisation: &stabilisation, tissue: model.tissue(), prestress: &prestress };
     let (mut state, mut force) = (AssemblyState::default(), vec![0.0; unknowns]);
-    internal_force(rule, model.tissue(), &vec![0.0; unknowns], &mut state, &mut force)
-        .map_err(|_| singular("at rest"))?;
+    internal_force(medium, &vec![0.0; unknowns], &mut state, &mut force).map_err(|_| singular("at rest"))?;
     let mut at_rest = vec![0.0; analysis.pattern().entries()];
-    tangent(rule, model.tissue(), &state, analysis.blocks(), &mut at_rest);
+    tangent(medium, &state, analysis.blocks(), &mut at_rest);
 
     let mut solver = ConstrainedSolver::<2>::new(analysis, ConstrainedRows::default());
     let columns = RATES + if loads == Loads::OnTarget { 2 } else { 0 };

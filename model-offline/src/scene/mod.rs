@@ -100,6 +100,8 @@ pub struct Needle {
     pub depth: f64,
     /// Into how many increments the insertion is divided.
     pub increments: u32,
+    /// How fast it goes, length per second, where that matters: to friction, and to tissue that relaxes.
+    pub speed: f64,
     /// The shaft of a needle that slips; none where the tissue of the contact moves with it, as under skin that never gives
     /// way.
     pub shaft: Option<Shaft>,
@@ -266,6 +268,12 @@ impl Scene {
         if self.inclusions.is_empty() { TissueVariant::Homogeneous } else { TissueVariant::Inclusion }
     }
 
+    /// Whether stress relaxes anywhere in it.
+    pub fn relaxes(&self) -> bool {
+        let of_inclusions = self.inclusions.iter().filter_map(|inclusion| inclusion.material.as_ref());
+        [&self.material].into_iter().chain(of_inclusions).any(|law| law.relaxation().is_some())
+    }
+
     /// SHA-256 over everything that the model's numbers depend on, with the discretization.
     pub fn hash(&self) -> [u8; 32] {
         let point = |p: &Point2| [p.x, p.y];
@@ -290,6 +298,9 @@ impl Scene {
             },
         });
         // Scenes without a shaft keep the hashes that recordings and tables know.
+        if self.relaxes() {
+            content["speed"] = serde_json::json!(self.needle.speed);
+        }
         if let Some(shaft) = &self.needle.shaft {
             let inclusions: Vec<_> = self.inclusions.iter().map(|inclusion| inclusion.resistance).collect();
             content["shaft"] = serde_json::json!([shaft, inclusions]);

@@ -193,7 +193,8 @@ pub struct NeedleSection {
     pub kinetic_friction: Option<Located<f64>>,
     /// What a sliding shaft adds per length and speed (default 0).
     pub viscous_friction: Option<Located<f64>>,
-    /// Speed that friction is taken at, length units per second (default: the depth in five seconds).
+    /// Speed of the insertion, length units per second, where that matters: to friction along a shaft, and to tissue that
+    /// relaxes (default: the depth in five seconds).
     pub speed: Option<Located<f64>>,
 }
 

@@ -221,7 +221,8 @@ impl Validator<'_> {
                 "check the units of the depth",
             ));
         }
-        Ok(Needle { contact, axis: axis.normalize(), depth, increments, shaft: None })
+        let speed = section.speed.as_ref().map_or(Ok(0.2 * depth), |speed| self.positive(speed, "speed"))?;
+        Ok(Needle { contact, axis: axis.normalize(), depth, increments, speed, shaft: None })
     }
 
     fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {

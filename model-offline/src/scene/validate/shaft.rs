@@ -31,7 +31,7 @@ impl Validator<'_> {
             viscous_friction: &section.viscous_friction,
         };
         if section.mechanics == Mechanics::Patch {
-            let own = [&section.radius, &section.tip_length, &section.puncture_force, &section.speed];
+            let own = [&section.radius, &section.tip_length, &section.puncture_force];
             let given = own.into_iter().flatten().next().or(keys.first()).map(Located::span);
             return match given.or(section.entry.as_ref().map(Located::span)) {
                 None => Ok(None),
@@ -71,7 +71,6 @@ impl Validator<'_> {
         };
         let radius = positive(&section.radius, "radius", 0.01 * needle.depth)?;
         let tip_length = positive(&section.tip_length, "tip_length", 2.0 * radius)?;
-        let speed = positive(&section.speed, "speed", 0.2 * needle.depth)?;
         let puncture_force = match &section.puncture_force {
             None => 0.0,
             Some(value) if *value.get() >= 0.0 => *value.get(),
@@ -86,7 +85,7 @@ impl Validator<'_> {
         let resistance = self.resistance(&keys, &Resistance::default())?;
         // Skin that never gives way makes it a patch, to the last bit.
         let gives_way = puncture_force.is_finite();
-        Ok(gives_way.then_some(Shaft { entry, radius, tip_length, puncture_force, speed, resistance }))
+        Ok(gives_way.then_some(Shaft { entry, radius, tip_length, puncture_force, speed: needle.speed, resistance }))
     }
 
     /// What an inclusion resists a shaft with, where it says so.

@@ -22,8 +22,9 @@ use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
 use crate::mechanics::Tissue;
-use crate::mechanics::assembly::{self, AssemblyState, Inverted};
+use crate::mechanics::assembly::{self, AssemblyState, Inverted, Medium};
 use crate::mechanics::blocks::BlockPositions;
+use crate::mechanics::history::{History, Prestress};
 use crate::mechanics::stabilisation::Stabilisation;
 use crate::mechanics::{Constraints, WeaklyImposed};
 use std::sync::Arc;
@@ -51,6 +52,13 @@ pub struct Equilibrium<const D: usize> {
     solver: ConstrainedSolver<D>,
     weak: Option<Arc<dyn WeaklyImposed>>,
     settings: NewtonSettings,
+    /// What the past has left in tissue that relaxes, and what it is at the end of the present step.
+    history: Option<Box<History<D>>>,
+    prestress: Prestress<D>,
+    /// Length of the present step, s.
+    elapsed: f64,
+    /// Whether the energy has changed since it was last evaluated, because a step has begun.
+    time_passed: bool,
     /// Length that step tolerances are relative to.
     spacing: f64,
     /// Force that moves a node by a thousandth of the spacing: what residuals are relative to at rest.
@@ -124,8 +132,13 @@ impl<const D: usize> Equilibrium<D> {
             energy: 0.0,
             state: AssemblyState::default(),
         };
+        let history = History::at_rest(&rule, &tissue, |tissue| analysis.stabilisation(&rule, tissue), nodes * D);
         let mut body = Self {
             stabilisation: analysis.stabilisation(&rule, &tissue),
+            history: history.map(Box::new),
+            prestress: Prestress::default(),
+            elapsed: 0.0,
+            time_passed: false,
             rule,
             tissue,
             blocks: Arc::clone(&analysis.blocks),
@@ -231,9 +244,10 @@ impl<const D: usize> Equilibrium<D> {
             let last = self.at.clone();
             self.at.prescribed = between(&start, prescribed, next);
             self.at.external = between(&start_load, external, next);
-            let load_changed = self.at.external != last.external;
+            let load_changed = self.at.external != last.external || self.time_passed;
             match self.attempt(load_changed) {
                 Attempt::Converged => {
+                    self.time_passed = false;
                     reached = next;
                     // Grow back after success, so that one hard spot does not slow down the rest.
                     step *= 2.0;
@@ -251,6 +265,29 @@ impl<const D: usize> Equilibrium<D> {
             }
         }
         Ok(())
+    }
+
+    /// Begins a step of so many seconds, which [`remember`](Self::remember) ends: tissue that relaxes has the moduli of the
+    /// step and carries what its past has left. What is driven until then happens in the step; another beginning
+    /// before its end takes its place. Without a step time stands still, and moduli are those of a fast deformation.
+    pub fn begin(&mut self, elapsed: f64) {
+        let Some(history) = &self.history else { return };
+        self.prestress = history.prestress(&self.rule, elapsed);
+        if elapsed != self.elapsed {
+            let step = history.within(elapsed);
+            (self.tissue, self.stabilisation, self.elapsed) = (step.tissue, step.stabilisation, elapsed);
+            // One tangent serves every state of a linear tissue, but not other moduli.
+            self.factor_exists &= !self.tissue.is_linear();
+        }
+        self.factor_is_current = false;
+        self.time_passed = true;
+    }
+
+    /// Ends a step: the present state is what tissue that relaxes remembers.
+    pub fn remember(&mut self) {
+        if let Some(history) = &mut self.history {
+            history.remember(self.elapsed, &self.at.state, &self.at.coefficients);
+        }
     }
 
     /// Responses of the coefficients to rates of the prescribed values at the current state, one after the other for as
@@ -333,8 +370,7 @@ impl<const D: usize> Equilibrium<D> {
         }
         for step in [-length, length] {
             let moved: Vec<f64> = self.at.coefficients.iter().zip(direction).map(|(d, v)| d + step * v).collect();
-            let rule = (&*self.rule, &self.stabilisation);
-            assembly::internal_force(rule, &self.tissue, &moved, &mut state, &mut force)?;
+            assembly::internal_force(self.medium(), &moved, &mut state, &mut force)?;
             for (sum, onto) in sums.iter_mut().zip(onto) {
                 *sum += dot(&force, onto);
             }
@@ -343,15 +379,21 @@ impl<const D: usize> Equilibrium<D> {
         Ok(sums)
     }
 
+    /// What resists.
+    fn medium(&self) -> Medium<'_, D> {
+        let Self { rule, stabilisation, tissue, prestress, .. } = self;
+        Medium { rule, stabilisation, tissue, prestress }
+    }
+
     fn failure(&self, reason: FailureReason, reached: f64, detail: String) -> Failure {
         Failure { reason, reached, detail }
     }
 
     /// Potential energy and its gradient at the current coefficients.
     fn evaluate(&mut self) -> Result<(), Inverted> {
-        let at = &mut self.at;
-        let rule = (&*self.rule, &self.stabilisation);
-        at.energy = assembly::internal_force(rule, &self.tissue, &at.coefficients, &mut at.state, &mut at.force)?;
+        let Self { rule, stabilisation, tissue, prestress, at, .. } = self;
+        let medium = Medium { rule, stabilisation, tissue, prestress };
+        at.energy = assembly::internal_force(medium, &at.coefficients, &mut at.state, &mut at.force)?;
         if let Some(weak) = &self.weak {
             let values = &at.prescribed[at.multipliers.len()..];
             at.energy += weak.add_force(&self.tissue, &at.coefficients, values, &mut at.force);
@@ -365,10 +407,10 @@ impl<const D: usize> Equilibrium<D> {
 
     /// Assembles the tangent at the current state.
     fn assemble(&mut self) {
-        let rule = (&*self.rule, &self.stabilisation);
-        let (tissue, at, blocks, weak) = (&self.tissue, &self.at, &self.blocks, &self.weak);
-        self.solver.assemble(|pattern, values| {
-            assembly::tangent(rule, tissue, &at.state, blocks, values);
+        let Self { rule, stabilisation, tissue, prestress, at, blocks, weak, solver, .. } = self;
+        let medium = Medium { rule, stabilisation, tissue, prestress };
+        solver.assemble(|pattern, values| {
+            assembly::tangent(medium, &at.state, blocks, values);
             if let Some(weak) = weak {
                 weak.add_tangent(tissue, (&at.coefficients, &at.prescribed[at.multipliers.len()..]), pattern, values);
             }
