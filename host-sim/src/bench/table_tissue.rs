@@ -20,7 +20,9 @@ const ELSEWHERE: &str = " of another scene";
 impl TableTissue {
     /// What `table` believes in, where `scene` is simulated.
     pub fn believed(table: &Table<f64, 2>, scene: &Scene) -> Self {
-        let of_scene = |tissue: &TissueVariant| tissue.of(scene).hash() == table.scene_hash;
+        let simple = scene.without_a_past();
+        let of_scene =
+            |tissue: &TissueVariant| [scene, &simple].iter().any(|s| tissue.of(s).hash() == table.scene_hash);
         let named = |tissue: &TissueVariant| tissue.name() == table.tissue;
         // Without inclusions both tissues are one: the table's own name for it counts.
         let matching = || TissueVariant::ALL.into_iter().filter(of_scene);

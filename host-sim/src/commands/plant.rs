@@ -78,7 +78,10 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
         timeout: Duration::from_secs_f64(args.patience),
         on_death: if args.keep { OnDeath::AwaitNext } else { OnDeath::Stop },
         expected: (!args.allow_other_scene).then(|| Expected {
-            scene_hashes: TissueVariant::ALL.iter().map(|tissue| hex(&tissue.of(&whole).hash())).collect(),
+            scene_hashes: [&whole, &whole.without_a_past()]
+                .into_iter()
+                .flat_map(|scene| TissueVariant::ALL.iter().map(|tissue| hex(&tissue.of(scene).hash())))
+                .collect(),
             units: [scene.length_unit.clone(), scene.stress_unit.clone()],
         }),
     };

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use host_sim::SimError;
 use host_sim::bench::comparison::{Comparison, ComparisonOptions, EncodedTable};
 use host_sim::bench::insertion::Extras;
@@ -41,6 +41,9 @@ pub(crate) struct RunArgs {
     /// Use a table of another scene all the same; the report says so
     #[arg(long, requires = "table")]
     pub(crate) allow_other_scene: bool,
+    /// What the table knows of a world that is more than its model: a needle that slips and stress that relaxes, or nothing
+    #[arg(long, value_enum, default_value_t)]
+    pub(crate) table_world: TableWorld,
     /// What drives time [default: lockstep, then the dynamic strategy once more in free-run]
     #[arg(long, value_enum)]
     pub(crate) mode: Option<RunMode>,
@@ -77,6 +80,25 @@ pub(crate) struct RunArgs {
     pub(crate) threads: Option<usize>,
 }
 
+/// What a table knows of the world.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TableWorld {
+    /// What a table can know.
+    #[default]
+    Known,
+    /// A contact that moves with the needle, in elastic tissue.
+    Simple,
+}
+
+impl std::fmt::Display for TableWorld {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Known => "known",
+            Self::Simple => "simple",
+        })
+    }
+}
+
 impl RunArgs {
     fn options(&self) -> Result<ComparisonOptions, SimError> {
         let mut options = ComparisonOptions::new(std::env::current_exe().map_err(RuntimeError::Spawn)?);
@@ -84,6 +106,7 @@ impl RunArgs {
         options.table_tissue = self.table_tissue;
         options.table.clone_from(&self.table);
         options.allow_other_scene = self.allow_other_scene;
+        options.table_knows_the_world = self.table_world == TableWorld::Known;
         options.mode = self.mode;
         options.hardware = self.hardware;
         options.scalar = self.scalar;

@@ -9,7 +9,7 @@ use host_sim::world::error::OptionRange;
 use host_sim::world::loop_settings::LoopArgs;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::tissue::WantedPlant;
-use model_offline::scene::Scene;
+use model_offline::scene::{Effect, Scene};
 
 /// How long a silent peer is waited for.
 pub(super) const PATIENCE: OptionRange = OptionRange::new("--patience", 1e-3, 86_400.0, " s");
@@ -28,6 +28,10 @@ pub(crate) struct WorldArgs {
     /// Scene file, or the name of a bundled scene [default: paper]
     #[arg(long, value_name = "FILE")]
     pub(crate) scene: Option<PathBuf>,
+    /// What the world does that the scene does not say: the needle punctures, cuts and slips; stress relaxes; the patient
+    /// breathes
+    #[arg(long, value_enum, value_delimiter = ',', value_name = "EFFECT,..")]
+    pub(crate) world: Vec<Effect>,
     /// Rates, and what sees the target.
     #[command(flatten)]
     pub(crate) loop_args: LoopArgs,
@@ -61,7 +65,14 @@ impl WorldArgs {
     /// [`SimError::Scene`].
     pub(crate) fn scene(&self) -> Result<Scene, SimError> {
         let path = self.scene.as_deref().unwrap_or(Path::new("paper"));
-        Ok(Scene::read(path)?)
+        INSERTION_TIME.check(self.insertion_time)?;
+        let mut scene = Scene::read(path)?;
+        scene = self.world.iter().fold(scene, |scene, effect| scene.with_effect(*effect));
+        if scene.has_a_past() {
+            // Friction and relaxation are those of the insertion that is asked for, in the table too.
+            scene.set_speed(scene.needle.depth / self.insertion_time);
+        }
+        Ok(scene)
     }
 
     /// Checks the numbers and combines them with the scene's.

@@ -1,6 +1,7 @@
 //! Why a world cannot be simulated.
 
 use model_offline::model::ModelError;
+use model_offline::needle::NeedleError;
 use model_offline::number::length;
 use model_offline::reduction::train::TrainingError;
 use model_offline::solver::equilibrium::Failure;
@@ -43,6 +44,16 @@ pub enum WorldError {
         /// Highest rate that this tissue keeps, Hz.
         rate_hz: f64,
     },
+    /// Needle and tissue cannot go on.
+    #[error("the simulated needle cannot go on: {0}")]
+    #[diagnostic(help("insert more slowly or less deep ([needle] depth), or with less cutting force and friction"))]
+    Needle(NeedleError),
+    /// The condensed model of tissue that has a past.
+    #[error(
+        "tissue that has a past (a needle that slips, stress that relaxes, a patient that moves) has no condensed model"
+    )]
+    #[diagnostic(help("use --plant reduced, the default there, or --plant full"))]
+    CondensedHasNoPast,
     /// The scene asks for more than the simulated world has.
     #[error(transparent)]
     Scene(ModelError),

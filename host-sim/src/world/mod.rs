@@ -25,7 +25,7 @@ use self::error::WorldError;
 use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{Attachment, PlantAccount, Reductions, TissuePlant, TissueResponse};
+use self::tissue::{Attachment, Insertion, PlantAccount, Reductions, TissuePlant, TissueResponse};
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
@@ -76,8 +76,19 @@ impl<'m> World<TissuePlant<'m>> {
     ) -> Result<Self, WorldError> {
         let position =
             paddle_index.map(|index| model.paddle_position(index).ok_or(WorldError::NoPaddle { index })).transpose()?;
-        let choice = simulation.plant.unwrap_or_default();
-        let tissue = TissuePlant::sharing(model, attachment(position), choice, reductions)?;
+        let tissue = match model.scene().has_a_past() {
+            true => {
+                let insertion = Insertion {
+                    trajectory: NeedleTrajectory::new(simulation.depth, simulation.insertion_s),
+                    duration_s: simulation.duration_s,
+                };
+                TissuePlant::along(model, attachment(position), simulation.plant, insertion, reductions)?
+            }
+            false => {
+                let choice = simulation.plant.unwrap_or_default();
+                TissuePlant::sharing(model, attachment(position), choice, reductions)?
+            }
+        };
         Ok(Self::simulated(tissue, paddle_index.unwrap_or(0), simulation))
     }
 
@@ -164,7 +175,7 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
     pub fn advance(&mut self, tick: u64, time_ns: u64) -> Result<Truth, WorldError> {
         self.needle = self.drive.motion(self.since_start_s(time_ns));
         let (depth, paddle) = (self.needle.depth, self.actuator.position());
-        let target = self.tissue.step(depth, paddle)?;
+        let target = self.tissue.step_at(self.since_start_s(time_ns), depth, paddle)?;
         Ok(Truth { tick, time_ns, depth, target: target.into(), paddle: paddle.into() })
     }
 

@@ -8,8 +8,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ValueEnum;
-use model_offline::model::{Body, TissueModel};
+use model_offline::model::{Body, Pose, TissueModel};
+use model_offline::needle::Course;
 use model_offline::parallel;
+use model_offline::reduction::along_path::{AlongPath, PathBody, PathOptions, along};
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, Extrapolated, TrainingError, TrainingOptions, TrainingReport, train};
 use model_offline::scene::PlantModel;
@@ -19,6 +21,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::WorldError;
+use super::needle::NeedleTrajectory;
 
 /// Error of an extrapolated target displacement that is aimed at, over the depth that the scene inserts to: a thousandth of
 /// the noise that the target is seen with.
@@ -61,6 +64,9 @@ pub struct PlantAccount {
     /// Largest error of the target displacement that the reduced model estimated of itself, length.
     #[serde(default)]
     pub largest_estimate: Option<f64>,
+    /// States on the path that stands in for tissue that has a past.
+    #[serde(default)]
+    pub path_knots: Option<usize>,
     /// States that the full model was solved for, where it was extrapolated between.
     #[serde(default)]
     pub solves: Option<u64>,
@@ -83,6 +89,7 @@ impl Default for PlantAccount {
             first_fallback: None,
             full_step_us: None,
             largest_estimate: None,
+            path_knots: None,
             solves: None,
             extrapolation_error: None,
             error_at_end: None,
@@ -123,12 +130,30 @@ type Trained = Result<(Arc<ReducedModel>, TrainingReport), TrainingError>;
 /// Reduced models of one tissue, each trained when it is first asked for: insertions that differ in table, mode or loop
 /// alone share theirs. Refusals are remembered too.
 #[derive(Debug, Default)]
-pub struct Reductions(Mutex<Vec<(Attachment, Trained)>>);
+pub struct Reductions {
+    states: Mutex<Vec<(Attachment, Trained)>>,
+    paths: Mutex<Vec<(PathKey, Learnt)>>,
+}
+
+/// What a path depends on besides the tissue.
+type PathKey = (Attachment, Insertion);
+
+/// One insertion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Insertion {
+    /// How the needle goes.
+    pub trajectory: NeedleTrajectory,
+    /// Seconds from its start to the end.
+    pub duration_s: f64,
+}
+
+/// What learning a path found.
+type Learnt = Result<Arc<AlongPath>, TrainingError>;
 
 impl Reductions {
     /// The one for this attachment; `model` is the same at every call.
     fn of(&self, model: &TissueModel, attachment: Attachment) -> Trained {
-        let known = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let known = || self.states.lock().unwrap_or_else(PoisonError::into_inner);
         let found = known().iter().find(|(of, _)| *of == attachment).map(|(_, trained)| trained.clone());
         found.unwrap_or_else(|| {
             // Without the lock: a thread that waits for others to train may be given another insertion meanwhile, which
@@ -140,6 +165,27 @@ impl Reductions {
     }
 }
 
+impl Reductions {
+    /// The path of an insertion; `model` is the same at every call.
+    fn path(&self, model: &TissueModel, attachment: Attachment, insertion: Insertion) -> Learnt {
+        let key = (attachment, insertion);
+        let Insertion { trajectory, duration_s } = insertion;
+        let known = || self.paths.lock().unwrap_or_else(PoisonError::into_inner);
+        let found = known().iter().find(|(of, _)| *of == key).map(|(_, learnt)| learnt.clone());
+        found.unwrap_or_else(|| {
+            let way = |time: f64| model.pose_at(time, trajectory.at(time).depth);
+            let options = PathOptions {
+                steered: !attachment.held,
+                threads: parallel::available(),
+                ..PathOptions::new(duration_s)
+            };
+            let learnt = AlongPath::learn(model, attachment.paddle, &way, &options).map(Arc::new);
+            known().push((key, learnt.clone()));
+            learnt
+        })
+    }
+}
+
 /// What answers for the tissue.
 pub trait TissueResponse {
     /// Takes needle and paddle to where they are now; returns the target displacement, length.
@@ -147,6 +193,15 @@ pub trait TissueResponse {
     /// # Errors
     /// [`WorldError::Tissue`] when there is no equilibrium.
     fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError>;
+
+    /// The same so many seconds after the start of the needle (negative: not started), for tissue that has a past.
+    ///
+    /// # Errors
+    /// [`WorldError`].
+    fn step_at(&mut self, since_start_s: f64, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+        let _ = since_start_s;
+        self.step(depth, paddle)
+    }
 }
 
 /// The tissue of a scene, by the model that was chosen.
@@ -171,6 +226,29 @@ enum Kind<'m> {
         full_answers: bool,
     },
     Condensed(Condensed),
+    /// The full model of tissue that has a past, taken on in time.
+    Course {
+        course: Box<Course<'m>>,
+        since_start_s: f64,
+    },
+    /// The neighbourhood of one insertion of it.
+    Path(Box<AlongInsertion>),
+}
+
+/// A body beside the path of an insertion, and where the paddle was at the path's knots.
+#[derive(Debug)]
+struct AlongInsertion {
+    body: PathBody,
+    trajectory: NeedleTrajectory,
+    interval_s: f64,
+    paddle: Vec<Vector2<f64>>,
+}
+
+impl AlongInsertion {
+    /// The same insertion, from its start.
+    fn afresh(&self) -> Self {
+        Self { body: self.body.afresh(), paddle: Vec::new(), ..*self }
+    }
 }
 
 impl<'m> TissuePlant<'m> {
@@ -193,8 +271,10 @@ impl<'m> TissuePlant<'m> {
         choice: WantedPlant,
         reductions: &Reductions,
     ) -> Result<Self, WorldError> {
-        model.needs_a_patch().map_err(WorldError::Scene)?;
         let paddle = attachment.paddle;
+        if model.scene().has_a_past() {
+            return Self::on_course(model, paddle);
+        }
         let mut account = PlantAccount::default();
         let wanted = match (choice, model.scene().fit) {
             (WantedPlant::Full, _) => PlantModel::Full,
@@ -224,6 +304,48 @@ impl<'m> TissuePlant<'m> {
             },
         };
         Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account })
+    }
+
+    /// The full model of tissue that has a past: at every step it is taken on in time.
+    ///
+    /// # Errors
+    /// [`WorldError::Needle`] when the body is not held.
+    fn on_course(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, WorldError> {
+        let course = Course::at_rest(model, paddle).map_err(WorldError::Needle)?;
+        let kind = Kind::Course { course: Box::new(course), since_start_s: 0.0 };
+        Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account: PlantAccount::default() })
+    }
+
+    /// Tissue that has a past, as a scene has it, along one insertion: by the neighbourhood of it, which is learnt unless the full model is
+    /// asked for.
+    ///
+    /// # Errors
+    /// [`WorldError`].
+    pub fn along(
+        model: &'m TissueModel,
+        attachment: Attachment,
+        choice: Option<WantedPlant>,
+        insertion: Insertion,
+        reductions: &Reductions,
+    ) -> Result<Self, WorldError> {
+        match choice {
+            Some(WantedPlant::Full) => return Self::on_course(model, attachment.paddle),
+            Some(WantedPlant::Condensed) => return Err(WorldError::CondensedHasNoPast),
+            Some(WantedPlant::Reduced | WantedPlant::Auto) | None => {}
+        }
+        let path = reductions.path(model, attachment, insertion).map_err(WorldError::Training)?;
+        let mut plant = Self::on_course(model, attachment.paddle)?;
+        plant.account.model = PlantModel::Reduced;
+        plant.account.path_knots = Some(path.knots());
+        plant.account.largest_estimate = Some(0.0);
+        let interval_s = path.interval();
+        plant.kind = Kind::Path(Box::new(AlongInsertion {
+            body: path.body(),
+            trajectory: insertion.trajectory,
+            interval_s,
+            paddle: Vec::new(),
+        }));
+        Ok(plant)
     }
 
     /// Tissue at rest by a reduced model that has been trained on it with this paddle; the full one answers where the
@@ -257,8 +379,18 @@ impl<'m> TissuePlant<'m> {
     /// [`WorldError::Tissue`].
     pub fn aside(&mut self, act: impl FnOnce(&mut Self) -> Result<(), WorldError>) -> Result<(), WorldError> {
         let account = self.account.clone();
+        let past = match &self.kind {
+            Kind::Course { course, since_start_s } => {
+                Some(Kind::Course { course: course.clone(), since_start_s: *since_start_s })
+            }
+            Kind::Path(along) => Some(Kind::Path(Box::new(along.afresh()))),
+            _ => None,
+        };
         act(self)?;
-        self.step(0.0, Vector2::zeros())?;
+        match past {
+            Some(kind) => (self.kind, self.at) = (kind, (0.0, Vector2::zeros())),
+            None => drop(self.step(0.0, Vector2::zeros())?),
+        }
         self.account = account;
         Ok(())
     }
@@ -274,6 +406,8 @@ impl<'m> TissuePlant<'m> {
             }
             Kind::Reduced { body, .. } => into.extend(body.coefficients()),
             Kind::Condensed(_) => into.resize(self.model.dofs(), 0.0),
+            Kind::Course { course, .. } => into.extend_from_slice(course.coefficients()),
+            Kind::Path(along) => into.extend_from_slice(along.body.coefficients()),
         }
     }
 
@@ -284,6 +418,8 @@ impl<'m> TissuePlant<'m> {
             Kind::Extrapolated(body) => body.coefficients(),
             Kind::Reduced { full: Some(body), full_answers: true, .. } => body.equilibrium().coefficients().to_vec(),
             Kind::Reduced { body, .. } => body.coefficients(),
+            Kind::Course { course, .. } => course.coefficients().to_vec(),
+            Kind::Path(along) => along.body.coefficients().to_vec(),
             // The linear model has condensed the nodes out; the picture is the full model's.
             Kind::Condensed(_) => match self.solved_in_full() {
                 Ok(body) => body.equilibrium().coefficients().to_vec(),
@@ -308,7 +444,24 @@ impl<'m> TissuePlant<'m> {
             let _ = body.settle();
             account.solves = Some(body.account().solves);
             account.extrapolation_error = Some(body.account().largest_error);
-        } else if !matches!(self.kind, Kind::Full(_)) {
+        } else if let Kind::Path(taken) = &self.kind {
+            let (trajectory, model) = (taken.trajectory, self.model);
+            let way = |time: f64| model.pose_at(time, trajectory.at(time).depth);
+            // Where the full model cannot go the same way nothing is known.
+            if let Ok(full) = along(model, self.paddle, &way, taken.interval_s, &taken.paddle) {
+                let mut body = taken.body.afresh();
+                let errors: Vec<f64> = full
+                    .iter()
+                    .enumerate()
+                    .map(|(k, full)| {
+                        body.go_to(taken.interval_s * k as f64, taken.paddle[k]);
+                        (body.target_displacement() - full).norm()
+                    })
+                    .collect();
+                account.extrapolation_error = Some(errors.iter().copied().fold(0.0, f64::max));
+                account.error_at_end = errors.last().copied();
+            }
+        } else if !matches!(self.kind, Kind::Full(_) | Kind::Course { .. }) {
             let (depth, paddle) = self.at;
             let full = self.solved_in_full().map(|body| body.target_displacement());
             if let (Ok(full), Ok(own)) = (full, self.step(depth, paddle)) {
@@ -326,6 +479,31 @@ impl<'m> TissuePlant<'m> {
 }
 
 impl TissueResponse for TissuePlant<'_> {
+    fn step_at(&mut self, since_start_s: f64, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+        let moment_s = since_start_s.max(0.0);
+        match &mut self.kind {
+            Kind::Course { course, since_start_s: before_s } => {
+                self.at = (depth, paddle);
+                let pose = Pose { paddle, ..self.model.pose_at(moment_s, depth) };
+                if pose != course.pose() || moment_s > *before_s {
+                    course.take_in(pose, (moment_s - *before_s).max(0.0)).map_err(WorldError::Needle)?;
+                }
+                *before_s = moment_s;
+                Ok(course.target_displacement())
+            }
+            Kind::Path(along) => {
+                self.at = (depth, paddle);
+                along.body.go_to(moment_s, paddle);
+                while along.paddle.len() as f64 * along.interval_s <= moment_s {
+                    along.paddle.push(paddle);
+                }
+                self.account.largest_estimate = Some(along.body.error_estimate());
+                Ok(along.body.target_displacement())
+            }
+            _ => self.step(depth, paddle),
+        }
+    }
+
     fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
         self.at = (depth, paddle);
         match &mut self.kind {
@@ -336,6 +514,14 @@ impl TissueResponse for TissuePlant<'_> {
                 Ok(body.target_displacement())
             }
             Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
+            Kind::Course { since_start_s, .. } => {
+                let now_s = *since_start_s;
+                self.step_at(now_s, depth, paddle)
+            }
+            Kind::Path(along) => {
+                along.body.displace(paddle);
+                Ok(along.body.target_displacement())
+            }
             Kind::Reduced { body, full: behind, full_answers } => match body.drive(depth, paddle) {
                 Ok(()) => {
                     *full_answers = false;
@@ -424,7 +610,7 @@ mod tests {
         let again = of(Attachment::held(Some(2)));
         let reduced = |plant: &TissuePlant<'_>| plant.account.modes.zip(plant.account.points);
         assert_eq!(reduced(&again), reduced(&held));
-        assert_eq!(reductions.0.lock().unwrap().len(), 2);
+        assert_eq!(reductions.states.lock().unwrap().len(), 2);
     }
 
     /// Whoever trains waits for other threads, and may be given another insertion meanwhile, which trains as well.

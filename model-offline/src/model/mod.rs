@@ -16,7 +16,7 @@ use crate::discretization::{Essential, NodalCell, Planar, Quadrature, Resolution
 use crate::geometry::{Point2, distance_to_polyline};
 use crate::mechanics::nitsche::Nitsche;
 use crate::mechanics::{ConstrainedRows, Constraints, Tissue, WeaklyImposed};
-use crate::scene::Scene;
+use crate::scene::{Needle, Scene};
 use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
@@ -261,6 +261,14 @@ impl TissueModel {
     /// Position of a paddle in the scene's list, by its index.
     pub fn paddle_position(&self, index: u32) -> Option<usize> {
         self.scene.paddles.iter().position(|p| p.index == index)
+    }
+
+    /// Where patient and needle are so many seconds after the needle started, with its tip at a depth; the paddle at rest.
+    pub fn pose_at(&self, since_start: f64, depth: f64) -> Pose {
+        let Needle { depth: whole, deflection, .. } = self.scene.needle;
+        let share = depth / whole;
+        let base = self.scene.motion.displacement(since_start);
+        Pose { depth, lateral: deflection * share * share, base, paddle: Vector2::zeros() }
     }
 
     /// Refuses a needle that slips, for what is of a contact that moves with the needle.

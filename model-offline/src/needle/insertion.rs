@@ -1,14 +1,11 @@
 //! An insertion from the skin on.
 
+use super::course::enter;
 use super::error::NeedleError;
 use super::state::SlippingNeedle;
 use crate::model::{Body, Pose, TissueModel};
 use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
-
-/// The first increment grows by doublings, as many as this: the tip holds for a moment before it cuts, and the work at the
-/// base is summed over increments.
-const BEGINNING: i32 = 7;
 
 /// How often the increment that does not find an equilibrium before the puncture is halved.
 const HALVINGS: i32 = 8;
@@ -104,14 +101,8 @@ pub fn insert<'m>(model: &'m TissueModel, paddle: Option<usize>, way: Way) -> Re
         }
     }
     let mut needle = SlippingNeedle::at_rest(model, paddle)?;
-    let shares = (1..=BEGINNING).rev().map(|halvings| 0.5_f64.powi(halvings));
-    let mut done = 0.0;
-    for share in shares.chain([1.0]) {
-        needle.take_in(Pose::default().towards(&way.after(1), share), way.step() * (share - done))?;
-        done = share;
-    }
-    for increment in 2..=way.increments.max(1) {
-        needle.take_in(way.after(increment), way.step())?;
+    for increment in 1..=way.increments.max(1) {
+        enter(&mut needle, way.after(increment), way.step())?;
     }
     Ok(Inserted::Within { needle: Box::new(needle), punctured_at })
 }

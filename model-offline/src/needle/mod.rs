@@ -24,6 +24,7 @@
 
 mod advance;
 mod complementarity;
+mod course;
 mod energy;
 mod error;
 mod insertion;
@@ -33,6 +34,7 @@ mod state;
 mod station;
 mod trial;
 
+pub use course::Course;
 pub use error::NeedleError;
 pub use insertion::{Inserted, Way, insert};
 pub use state::{EnergyAccount, SlippingNeedle};

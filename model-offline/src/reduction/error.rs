@@ -1,6 +1,7 @@
 //! Why there is no reduced model.
 
 use crate::model::ModelError;
+use crate::needle::NeedleError;
 use crate::solver::equilibrium::Failure;
 
 /// Why there is no reduced model.
@@ -9,6 +10,14 @@ pub enum TrainingError {
     /// The full model fails.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The tissue cannot be taken along an insertion.
+    #[error("the insertion cannot be simulated beyond {time:.3} s after the needle's start: {source}")]
+    Path {
+        /// Seconds since the start of the needle.
+        time: f64,
+        /// Why.
+        source: Box<NeedleError>,
+    },
     /// The full model loses stability before any depth worth training.
     #[error(
         "the full model reaches depth {reached:.4} of {asked:.4} only: nothing to train on; ask for less depth, or give the law a barrier"

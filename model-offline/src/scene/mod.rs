@@ -1,8 +1,10 @@
 //! Scenes: the file format, its validation, and what other tools draw.
 
+mod effect;
 mod error;
 pub mod import;
 pub mod limits;
+mod motion;
 pub mod schema;
 mod sensor;
 mod shaft;
@@ -10,8 +12,10 @@ pub mod starter;
 mod tissue;
 mod validate;
 
+pub use effect::Effect;
 pub use error::{NoSuchPaddle, SceneError};
 pub use limits::LimitError;
+pub use motion::{Breathing, Motion, Surge};
 pub use schema::{FitSection, PlantModel, TableScalar};
 pub use sensor::{IDEAL_NOISE_PER_DEPTH, Outages, Sensor, SensorPreset, UnknownLength};
 pub use shaft::{Mechanics, Resistance, Shaft};
@@ -70,6 +74,8 @@ pub struct Scene {
     pub actuator: Actuator,
     /// What sees the target; not part of the tissue.
     pub sensor: Sensor,
+    /// What moves the immobile part in a simulation; not part of the tissue.
+    pub motion: Motion,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Discretization,
     /// What else a fit to a tolerance has chosen; not part of the tissue.
@@ -100,6 +106,8 @@ pub struct Needle {
     pub depth: f64,
     /// Into how many increments the insertion is divided.
     pub increments: u32,
+    /// How far off its line it is at its depth, length: it bends with the square of the depth. Tables do not know it.
+    pub deflection: f64,
     /// How fast it goes, length per second, where that matters: to friction, and to tissue that relaxes.
     pub speed: f64,
     /// The shaft of a needle that slips; none where the tissue of the contact moves with it, as under skin that never gives
@@ -272,6 +280,29 @@ impl Scene {
     pub fn relaxes(&self) -> bool {
         let of_inclusions = self.inclusions.iter().filter_map(|inclusion| inclusion.material.as_ref());
         [&self.material].into_iter().chain(of_inclusions).any(|law| law.relaxation().is_some())
+    }
+
+    /// Whether its state in a simulation depends on what was before, or on the time, and not on needle and paddle alone.
+    pub fn has_a_past(&self) -> bool {
+        self.needle.shaft.is_some() || self.relaxes() || !self.motion.is_none() || self.needle.deflection != 0.0
+    }
+
+    /// The same scene as a controller's model would have it at its simplest: the contact moves with the needle, nothing relaxes,
+    /// nobody breathes.
+    #[must_use]
+    pub fn without_a_past(&self) -> Self {
+        let elastic = |inclusion: &Inclusion| Inclusion {
+            material: inclusion.material.as_ref().map(Law::elastic),
+            resistance: None,
+            ..inclusion.clone()
+        };
+        Self {
+            material: self.material.elastic(),
+            inclusions: self.inclusions.iter().map(elastic).collect(),
+            needle: Needle { shaft: None, deflection: 0.0, ..self.needle.clone() },
+            motion: Motion::default(),
+            ..self.clone()
+        }
     }
 
     /// SHA-256 over everything that the model's numbers depend on, with the discretization.

@@ -79,6 +79,9 @@ pub struct SceneFile {
     /// What sees the target in a simulation (default: ultrasound where the unit of length is known, else ideal).
     #[serde(default)]
     pub sensor: SensorSection,
+    /// What moves the immobile part in a simulation (default: nothing).
+    #[serde(default)]
+    pub motion: MotionSection,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Located<DiscretizationSection>,
     /// What else a fit to a tolerance has chosen.
@@ -193,9 +196,50 @@ pub struct NeedleSection {
     pub kinetic_friction: Option<Located<f64>>,
     /// What a sliding shaft adds per length and speed (default 0).
     pub viscous_friction: Option<Located<f64>>,
+    /// How far off its line the needle is at its depth, length units: it bends with the square of the depth, to the side of
+    /// larger coordinates, in a simulation whose tables do not know it (default 0).
+    pub deflection: Option<Located<f64>>,
     /// Speed of the insertion, length units per second, where that matters: to friction along a shaft, and to tissue that
     /// relaxes (default: the depth in five seconds).
     pub speed: Option<Located<f64>>,
+}
+
+/// What moves the immobile part in a simulation, from the start of the needle on.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MotionSection {
+    /// Breathing, from the end of an exhalation on.
+    pub breathing: Option<BreathingSection>,
+    /// A cough, or a jerk: there and back once.
+    pub surge: Option<SurgeSection>,
+    /// A recorded motion: rows of time in s and displacement x, y, linear between them, its ends held.
+    pub recorded: Option<Located<Vec<[f64; 3]>>>,
+}
+
+/// Breathing: `amplitude · (1 − cos⁴(π t / period))`.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BreathingSection {
+    /// Seconds per breath.
+    pub period: Located<f64>,
+    /// From exhaled to inhaled, length units.
+    pub amplitude: Located<f64>,
+    /// Where the body goes with the breath; normalised on reading.
+    pub direction: Located<[f64; 2]>,
+}
+
+/// A cough, or a jerk: `amplitude · sin²(π (t − at) / last)` while it lasts.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SurgeSection {
+    /// Seconds after the start of the needle.
+    pub at: Located<f64>,
+    /// Seconds that it lasts.
+    pub last: Located<f64>,
+    /// Its largest displacement, length units.
+    pub amplitude: Located<f64>,
+    /// Where the body goes; normalised on reading.
+    pub direction: Located<[f64; 2]>,
 }
 
 fn ten() -> Located<u32> {

@@ -1,9 +1,11 @@
 //! The controller's table: Jacobians and the feed-forward paddle path along the insertion, from the nonlinear model.
 
+mod along_insertion;
 mod amplification;
 
 use self::amplification::largest_amplification;
 use crate::model::{Body, ModelError, TissueModel};
+use crate::needle::NeedleError;
 use crate::placement::controllability::best_direction;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use firmware::contract::{
@@ -81,6 +83,9 @@ pub enum TableBuildError {
         /// Condition number ‖J‖·‖J⁻¹‖ in the Frobenius norm.
         condition: f64,
     },
+    /// The needle cannot be taken along the insertion.
+    #[error(transparent)]
+    Needle(#[from] NeedleError),
     /// A label does not fit into the table.
     #[error("label {0:?} is too long for the table")]
     Label(String),
@@ -98,34 +103,17 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
     if !(2..=MAX_KNOTS).contains(&options.knots) {
         return Err(TableBuildError::Knots(options.knots));
     }
-    model.needs_a_patch()?;
     let scene = model.scene();
     let position = scene.paddle_position(paddle_index).map_err(ModelError::from)?;
-    let settings = NewtonSettings::default();
-    let mut still = model.body(Some(position), settings).map_err(ModelError::from)?;
-    let mut steered = model.body(Some(position), settings).map_err(ModelError::from)?;
-    let mut knots = heapless::Vec::new();
-    for k in 0..options.knots {
-        let depth = scene.needle.depth * k as f64 / (options.knots - 1) as f64;
-        match knot(&mut still, &mut steered, depth, paddle_index, scene.needle.orthogonal()) {
-            Ok(knot) => {
-                let condition = condition_number(&knot.jacobian);
-                if condition > CONDITION_LIMIT {
-                    return Err(TableBuildError::IllConditioned { paddle: paddle_index, depth, condition });
-                }
-                let needed = knot.paddle_path.norm();
-                let available = scene.actuator.max_displacement;
-                if needed > available {
-                    return Err(TableBuildError::OutOfReach { depth, needed, available });
-                }
-                // Capacity was checked above.
-                let _ = knots.push(knot);
-            }
-            Err(error) if knots.len() < 2 => return Err(error.into()),
-            Err(_) => break,
-        }
-    }
-    let amplification = largest_amplification(model, position, &knots).map_err(ModelError::from)?;
+    let slips_or_relaxes = scene.needle.shaft.is_some() || scene.relaxes();
+    let knots = match slips_or_relaxes {
+        true => along_insertion::knots(model, position, options.knots)?,
+        false => knots_of_states(model, position, options.knots)?,
+    };
+    let amplification = match slips_or_relaxes {
+        true => 1.0,
+        false => largest_amplification(model, position, &knots).map_err(ModelError::from)?,
+    };
     let lambda_max = options.lambda_max.max(amplification);
     let (first, last) = (&knots[0], &knots[knots.len() - 1]);
     let table = Table {
@@ -156,6 +144,48 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
     };
     table.validate().map_err(TableBuildError::Invalid)?;
     Ok(table)
+}
+
+/// Refuses a knot that no controller can work with.
+fn check(knot: &Knot<f64, 2>, paddle: u32, available: f64) -> Result<(), TableBuildError> {
+    let Knot { depth, jacobian, paddle_path, .. } = knot;
+    let condition = condition_number(jacobian);
+    if condition > CONDITION_LIMIT {
+        return Err(TableBuildError::IllConditioned { paddle, depth: *depth, condition });
+    }
+    let needed = paddle_path.norm();
+    if needed > available {
+        return Err(TableBuildError::OutOfReach { depth: *depth, needed, available });
+    }
+    Ok(())
+}
+
+/// Knots of tissue whose state is that of needle and paddle, down to where it is stable.
+fn knots_of_states(
+    model: &TissueModel,
+    position: usize,
+    count: usize,
+) -> Result<heapless::Vec<Knot<f64, 2>, MAX_KNOTS>, TableBuildError> {
+    let scene = model.scene();
+    let (paddle, available) = (scene.paddles[position].index, scene.actuator.max_displacement);
+    let settings = NewtonSettings::default();
+    let mut still = model.body(Some(position), settings).map_err(ModelError::from)?;
+    let mut steered = model.body(Some(position), settings).map_err(ModelError::from)?;
+    let mut knots = heapless::Vec::new();
+    for k in 0..count {
+        let depth = scene.needle.depth * k as f64 / (count - 1) as f64;
+        match knot(&mut still, &mut steered, depth, paddle, scene.needle.orthogonal()) {
+            Ok(knot) => {
+                // Before the next one, which may fail because of it.
+                check(&knot, paddle, available)?;
+                // Capacity was checked before.
+                let _ = knots.push(knot);
+            }
+            Err(error) if knots.len() < 2 => return Err(error.into()),
+            Err(_) => break,
+        }
+    }
+    Ok(knots)
 }
 
 /// The bytes of a table file.

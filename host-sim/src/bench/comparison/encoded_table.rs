@@ -40,7 +40,10 @@ pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -
     Err(SimError::TableUnits { path: path.to_owned(), found, expected: expected.clone() })
 }
 
-/// Whether a table was computed from this scene, with or without its inclusions.
+/// Whether a table was computed from this scene, with or without its inclusions, and with or without what a simple model
+/// leaves out.
 pub fn is_of(table: &Table<f64, 2>, scene: &Scene) -> bool {
-    TissueVariant::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash)
+    let simple = scene.without_a_past();
+    let is = |scene: &Scene| TissueVariant::ALL.iter().any(|tissue| tissue.of(scene).hash() == table.scene_hash);
+    is(scene) || is(&simple)
 }

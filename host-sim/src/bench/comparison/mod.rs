@@ -9,11 +9,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use firmware::Controller;
-use model_offline::model::ModelError;
+use model_offline::model::{ModelError, TissueModel};
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
 use model_offline::placement::study::steps;
-use model_offline::placement::{PlacementOptions, PlacementStudy};
+use model_offline::placement::{PlacementOptions, PlacementStudy, discretise};
 use model_offline::scene::{Scene, TableScalar};
 use model_offline::table::{TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
@@ -48,6 +48,9 @@ pub struct ComparisonOptions {
     pub table: Option<PathBuf>,
     /// Whether a table of another scene is used all the same.
     pub allow_other_scene: bool,
+    /// Whether the table knows of the world what a table can know: a needle that slips, and stress that relaxes. Else it is
+    /// that of a contact that moves with the needle in elastic tissue.
+    pub table_knows_the_world: bool,
     /// What drives time; none: lockstep, then the dynamic strategy once more in free-run.
     pub mode: Option<RunMode>,
     /// What computes the controller's steps.
@@ -70,6 +73,7 @@ impl ComparisonOptions {
             table_tissue: None,
             table: None,
             allow_other_scene: false,
+            table_knows_the_world: true,
             mode: None,
             hardware: Hardware::default(),
             scalar: TableScalar::default(),
@@ -85,7 +89,16 @@ impl ComparisonOptions {
 struct Studied {
     tissue: TissueVariant,
     study: PlacementStudy,
+    /// The simulated tissue, where it has a past that the study does not know.
+    world: Option<TissueModel>,
     reductions: Reductions,
+}
+
+impl Studied {
+    /// What is simulated.
+    fn plant(&self) -> &TissueModel {
+        self.world.as_ref().unwrap_or(&self.study.model)
+    }
 }
 
 /// `none` and `static` of a case.
@@ -210,7 +223,7 @@ impl<'p> Comparison<'p> {
     /// The last case's scene, and the table with its tissue, to go on from.
     pub fn last_case(&self) -> Option<(&Scene, TissueVariant, &EncodedTable)> {
         let (case, table) = self.cases.iter().zip(&self.tables).next_back()?;
-        Some((self.studied(case.tissue).study.model.scene(), case.table_tissue, table))
+        Some((self.studied(case.tissue).plant().scene(), case.table_tissue, table))
     }
 
     /// Its options.
@@ -237,9 +250,11 @@ impl<'p> Comparison<'p> {
             self.progress.say(&format!("{tissue}: placement"));
             let step = || self.progress.step();
             let options = PlacementOptions { threads: self.options.threads, progress: &step, newton: None };
-            let study = PlacementStudy::run(&tissue.of(&self.scene), &options)?;
+            let simulated = tissue.of(&self.scene);
+            let study = PlacementStudy::run(&simulated.without_a_past(), &options)?;
             signals::check()?;
-            self.studied.push(Studied { tissue, study, reductions: Reductions::default() });
+            let world = simulated.has_a_past().then(|| discretise(&simulated)).transpose()?.map(|(model, _)| model);
+            self.studied.push(Studied { tissue, study, world, reductions: Reductions::default() });
         }
         Ok(())
     }
@@ -277,10 +292,11 @@ impl<'p> Comparison<'p> {
     }
 
     fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
-        let studied = &self.studied(tissue).study;
-        let paddle = studied.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
+        let studied = self.studied(tissue);
+        let paddle = studied.study.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
         let needle_speed = self.simulation.needle_speed();
-        let table = build(&studied.model, paddle, &TableOptions { needle_speed, ..TableOptions::default() })?;
+        let model = if self.options.table_knows_the_world { studied.plant() } else { &studied.study.model };
+        let table = build(model, paddle, &TableOptions { needle_speed, ..TableOptions::default() })?;
         let bytes = to_bytes(&table)?;
         Ok(EncodedTable { table, bytes })
     }
@@ -320,7 +336,7 @@ impl<'p> Comparison<'p> {
     fn insertion<'a>(&'a self, case: &Case, label: Label, progress: &'a dyn Fn()) -> SimulatedInsertion<'a> {
         let studied = self.studied(case.tissue);
         SimulatedInsertion {
-            model: &studied.study.model,
+            model: studied.plant(),
             reductions: Some(&studied.reductions),
             simulation: &self.simulation,
             label,

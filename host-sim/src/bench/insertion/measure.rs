@@ -86,6 +86,9 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Bod
     let (Ok(mut tissue), Some(last)) = (TissuePlant::new(model, position, WantedPlant::Full), truths.last()) else {
         return Vec::new();
     };
+    // The last tick at which the needle was at rest.
+    let started = truths.partition_point(|truth| truth.depth <= 0.0).saturating_sub(1);
+    let started_ns = truths.get(started).map_or(0, |truth| truth.time_ns);
     let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
     // A millionth of the depth is beyond any drawing.
     let places = 10f64.powi(6 - last.depth.abs().max(1e-9).log10().floor() as i32);
@@ -95,7 +98,8 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Bod
         let depth = last.depth * i as f64 / count as f64;
         // The last one is the end, with what the controller removed after the needle had arrived.
         let truth = if i == count { last } else { &truths[truths.partition_point(|truth| truth.depth < depth)] };
-        if tissue.step(truth.depth, Vector2::from(truth.paddle)).is_err() {
+        let since_start_s = truth.time_ns.saturating_sub(started_ns) as f64 * 1e-9;
+        if tissue.step_at(since_start_s, truth.depth, Vector2::from(truth.paddle)).is_err() {
             break;
         }
         frames.push(BodyFrame {

@@ -1,5 +1,6 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
+mod motion;
 mod sensor;
 mod shaft;
 
@@ -85,6 +86,7 @@ impl Validator<'_> {
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, &outline)?,
             sensor: self.sensor(needle.depth)?,
+            motion: self.motion()?,
             fit: file.fit,
             needle,
             outline,
@@ -222,7 +224,15 @@ impl Validator<'_> {
             ));
         }
         let speed = section.speed.as_ref().map_or(Ok(0.2 * depth), |speed| self.positive(speed, "speed"))?;
-        Ok(Needle { contact, axis: axis.normalize(), depth, increments, speed, shaft: None })
+        let deflection = section.deflection.as_ref().map_or(Ok(0.0), |located| match *located.get() {
+            value if value.abs() <= depth => Ok(value),
+            value => Err(self.error(
+                located.span(),
+                format!("deflection is {value}"),
+                "give a length, positive or negative, no more than the depth",
+            )),
+        })?;
+        Ok(Needle { contact, axis: axis.normalize(), depth, increments, deflection, speed, shaft: None })
     }
 
     fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {

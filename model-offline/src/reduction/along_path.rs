@@ -1,0 +1,369 @@
+//! A body whose state depends on its past, reduced to the neighbourhood of one insertion.
+//!
+//! Needle and patient go their way whatever the paddle does. Along that way the full model is solved once, the paddle
+//! steered so that the target stays on the needle's line as well as one step's delay allows; what a paddle does that goes
+//! another way is the actuation Jacobian there times the difference. A step costs a lookup. How far off that is, which no
+//! state of the model itself can tell, is learnt from ways that the paddle does not go in training, and estimated with every
+//! step from how far it has been off the path so far.
+
+use super::error::TrainingError;
+use crate::model::{Pose, TissueModel};
+use crate::needle::{Course, NeedleError};
+use crate::parallel;
+use crate::random::SplitMix64;
+use nalgebra::{Matrix2, Vector2};
+use std::sync::Arc;
+
+/// How an insertion is learnt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathOptions {
+    /// Seconds from the start of the needle to the end.
+    pub duration: f64,
+    /// Steps of time.
+    pub steps: usize,
+    /// Whether the paddle is steered; else it stays where it rests, and nothing is learnt of what it does.
+    pub steered: bool,
+    /// Ways that errors are learnt from.
+    pub trials: usize,
+    /// Threads.
+    pub threads: usize,
+}
+
+impl PathOptions {
+    /// For an insertion of so many seconds.
+    pub fn new(duration: f64) -> Self {
+        Self { duration, steps: 110, steered: true, trials: 4, threads: 1 }
+    }
+}
+
+/// A state on the path.
+#[derive(Debug, Clone)]
+struct Knot {
+    paddle: Vector2<f64>,
+    target: Vector2<f64>,
+    jacobian: Matrix2<f64>,
+    base_force: f64,
+    coefficients: Vec<f64>,
+}
+
+/// What errors grow with: the largest distance from the path so far, and its square.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct ErrorGrowth {
+    /// Length: of the path itself, by what lies between its knots.
+    still: f64,
+    linear: f64,
+    /// Per length.
+    square: f64,
+}
+
+impl ErrorGrowth {
+    fn at(&self, distance: f64) -> f64 {
+        self.still + distance * (self.linear + distance * self.square)
+    }
+}
+
+/// The neighbourhood of one insertion.
+#[derive(Debug, Clone)]
+pub struct AlongPath {
+    interval: f64,
+    knots: Vec<Knot>,
+    growth: ErrorGrowth,
+    /// Largest distance from the path that errors were learnt at, length.
+    reach: f64,
+}
+
+/// Where on the path.
+struct Between {
+    knot: usize,
+    share: f64,
+}
+
+impl AlongPath {
+    /// Learns an insertion; `way` says where patient and needle are at a time since its start.
+    ///
+    /// # Errors
+    /// [`TrainingError::Path`] where the tissue cannot be taken along it.
+    pub fn learn(
+        model: &TissueModel,
+        paddle: Option<usize>,
+        way: &(dyn Fn(f64) -> Pose + Sync),
+        options: &PathOptions,
+    ) -> Result<Self, TrainingError> {
+        let walk = Walk { model, paddle, way, interval: options.duration / options.steps as f64, steps: options.steps };
+        let normal = model.scene().needle.orthogonal();
+        let steered = options.steered && paddle.is_some();
+        let knots = walk.knots(|knots| {
+            let [.., before, last] = knots else { return Vector2::zeros() };
+            if !steered {
+                return Vector2::zeros();
+            }
+            // Where the last step leads to, less what it left: what a controller does that knows the tissue.
+            let Some(inverse) = last.jacobian.try_inverse() else { return last.paddle };
+            let error = |knot: &Knot| normal.dot(&knot.target);
+            2.0 * last.paddle - before.paddle - inverse * normal * (2.0 * error(last) - error(before))
+        })?;
+        let mut path = Self { interval: walk.interval, knots, growth: ErrorGrowth::default(), reach: 0.0 };
+        path.growth.still = path.between_knots();
+        if steered && options.trials > 0 {
+            path.learn_errors(&walk, options)?;
+        }
+        Ok(path)
+    }
+
+    /// What cubics between knots leave out: an eighth of second differences is what straight lines would, of fourth ones 3/128
+    /// what cubics do.
+    fn between_knots(&self) -> f64 {
+        let fourth = |k: usize| {
+            let at = |i: usize| self.knots[k + i].target;
+            (at(0) - at(1) * 4.0 + at(2) * 6.0 - at(3) * 4.0 + at(4)).norm()
+        };
+        (0..self.knots.len().saturating_sub(4)).map(fourth).fold(0.0, f64::max) * 3.0 / 128.0
+    }
+
+    /// Takes the full model along ways beside the path and sees how far off the reduction is.
+    fn learn_errors(&mut self, walk: &Walk<'_>, options: &PathOptions) -> Result<(), TrainingError> {
+        let travel = self.knots.iter().map(|knot| knot.paddle.norm()).fold(0.0, f64::max);
+        let moved = self.knots.iter().map(|knot| knot.target.norm()).fold(0.0, f64::max);
+        let far = 0.5 * travel.max(moved);
+        let path = &*self;
+        let trials = parallel::map(options.trials, options.threads, |trial| {
+            // Alternately near and far, so that what grows with the distance is told from what grows with its square.
+            let size = if trial % 2 == 0 { 0.1 * far } else { far };
+            path.errors_beside(walk, size, trial as u64 + 1)
+        });
+        let mut seen: Vec<(f64, f64)> = Vec::new();
+        for trial in trials {
+            seen.extend(trial?);
+        }
+        let still = self.growth.still;
+        let beyond = |error: f64, known: f64| (error - known).max(0.0);
+        let near = seen.iter().filter(|(distance, _)| *distance > 0.0 && *distance < 0.3 * far);
+        let linear = near.map(|(distance, error)| beyond(*error, still) / distance).fold(0.0, f64::max);
+        let apart = seen.iter().filter(|(distance, _)| *distance > 0.3 * far);
+        let square = apart
+            .map(|(distance, error)| beyond(*error, still + linear * distance) / distance.powi(2))
+            .fold(0.0, f64::max);
+        // Half as much again: the worst of a few trials is not the worst there is.
+        self.growth = ErrorGrowth { still, linear: 1.5 * linear, square: 1.5 * square };
+        self.reach = far;
+        Ok(())
+    }
+
+    /// Largest distance from the path so far and error now, knot by knot, on a random way beside it.
+    fn errors_beside(&self, walk: &Walk<'_>, size: f64, seed: u64) -> Result<Vec<(f64, f64)>, TrainingError> {
+        let beside = RandomWay::new(size, seed, walk.interval * walk.steps as f64);
+        let at = |k: usize| self.knots[k].paddle + beside.at(walk.interval * k as f64);
+        let found = walk.targets(&at)?;
+        let mut farthest = 0.0_f64;
+        let errors = found.into_iter().enumerate().map(|(k, target)| {
+            let off = at(k) - self.knots[k].paddle;
+            farthest = farthest.max(off.norm());
+            let own = self.knots[k].target + self.knots[k].jacobian * off;
+            (farthest, (own - target).norm())
+        });
+        Ok(errors.collect())
+    }
+
+    fn between(&self, since_start: f64) -> Between {
+        let place = (since_start / self.interval).clamp(0.0, (self.knots.len() - 1) as f64);
+        let knot = (place as usize).min(self.knots.len() - 2);
+        Between { knot, share: place - knot as f64 }
+    }
+
+    /// A cubic through the knots around, its slopes those of their differences.
+    fn cubic(&self, Between { knot, share }: &Between, of: impl Fn(&Knot) -> Vector2<f64>) -> Vector2<f64> {
+        let at = |k: usize| of(&self.knots[k]);
+        let last = self.knots.len() - 1;
+        let slope = |k: usize| match k {
+            0 => at(1) - at(0),
+            k if k == last => at(k) - at(k - 1),
+            k => 0.5 * (at(k + 1) - at(k - 1)),
+        };
+        let (s, a, b) = (*share, at(*knot), at(knot + 1));
+        let (da, db) = (slope(*knot), slope(knot + 1));
+        a + da * s + (3.0 * (b - a) - 2.0 * da - db) * s.powi(2) + (da + db - 2.0 * (b - a)) * s.powi(3)
+    }
+
+    /// A body of this model, at the start.
+    pub fn body(self: &Arc<Self>) -> PathBody {
+        PathBody { path: Arc::clone(self), time: 0.0, off: Vector2::zeros(), farthest: 0.0 }
+    }
+
+    /// Number of knots.
+    pub fn knots(&self) -> usize {
+        self.knots.len()
+    }
+
+    /// Time between knots, s.
+    pub fn interval(&self) -> f64 {
+        self.interval
+    }
+
+    /// Where the paddle is on the path, at a time since its start.
+    pub fn paddle(&self, since_start: f64) -> Vector2<f64> {
+        self.cubic(&self.between(since_start), |knot| knot.paddle)
+    }
+
+    /// Force at the needle's base on the path, at a time since its start.
+    pub fn base_force(&self, since_start: f64) -> f64 {
+        let Between { knot, share } = self.between(since_start);
+        self.knots[knot].base_force * (1.0 - share) + self.knots[knot + 1].base_force * share
+    }
+}
+
+/// A body beside the path.
+#[derive(Debug, Clone)]
+pub struct PathBody {
+    path: Arc<AlongPath>,
+    time: f64,
+    off: Vector2<f64>,
+    farthest: f64,
+}
+
+impl PathBody {
+    /// Goes to a time since the start of the needle, with the paddle displaced.
+    pub fn go_to(&mut self, since_start: f64, paddle: Vector2<f64>) {
+        self.time = since_start;
+        self.off = paddle - self.path.cubic(&self.path.between(since_start), |knot| knot.paddle);
+        self.farthest = self.farthest.max(self.off.norm());
+    }
+
+    /// The same path, from its start.
+    pub fn afresh(&self) -> Self {
+        self.path.body()
+    }
+
+    /// Moves the paddle at the same time.
+    pub fn displace(&mut self, paddle: Vector2<f64>) {
+        self.go_to(self.time, paddle);
+    }
+
+    /// Target displacement.
+    pub fn target_displacement(&self) -> Vector2<f64> {
+        let between = self.path.between(self.time);
+        let [before, after] = [&self.path.knots[between.knot], &self.path.knots[between.knot + 1]];
+        let jacobian = before.jacobian * (1.0 - between.share) + after.jacobian * between.share;
+        self.path.cubic(&between, |knot| knot.target) + jacobian * self.off
+    }
+
+    /// Error of the target displacement that it is estimated to have, length; infinite far beyond what it was learnt for.
+    pub fn error_estimate(&self) -> f64 {
+        self.path.growth.at(self.farthest)
+    }
+
+    /// Largest distance from the path so far over that which errors were learnt at.
+    pub fn beyond_reach(&self) -> f64 {
+        if self.farthest > 0.0 { self.farthest / self.path.reach } else { 0.0 }
+    }
+
+    /// Coefficients of the path's nearest knot: what a picture shows.
+    pub fn coefficients(&self) -> &[f64] {
+        let Between { knot, share } = self.path.between(self.time);
+        &self.path.knots[if share < 0.5 { knot } else { knot + 1 }].coefficients
+    }
+}
+
+/// The full model's way through an insertion, step by step.
+struct Walk<'w> {
+    model: &'w TissueModel,
+    paddle: Option<usize>,
+    way: &'w (dyn Fn(f64) -> Pose + Sync),
+    interval: f64,
+    steps: usize,
+}
+
+impl<'w> Walk<'w> {
+    fn course(&self) -> Result<Course<'w>, TrainingError> {
+        Course::at_rest(self.model, self.paddle).map_err(failed(0.0))
+    }
+
+    fn step(&self, course: &mut Course<'_>, k: usize, paddle: Vector2<f64>) -> Result<(), TrainingError> {
+        let time = self.interval * k as f64;
+        course.take_in(Pose { paddle, ..(self.way)(time) }, self.interval).map_err(failed(time))
+    }
+
+    /// The knots of a way whose paddle is decided step by step.
+    fn knots(&self, mut decide: impl FnMut(&[Knot]) -> Vector2<f64>) -> Result<Vec<Knot>, TrainingError> {
+        let mut course = self.course()?;
+        let mut knots = Vec::with_capacity(self.steps + 1);
+        for k in 0..=self.steps {
+            let paddle = decide(&knots);
+            if k > 0 {
+                self.step(&mut course, k, paddle)?;
+            }
+            let time = self.interval * k as f64;
+            let jacobian = match self.paddle {
+                Some(_) => course.actuation_jacobian().map_err(failed(time))?,
+                None => Matrix2::zeros(),
+            };
+            knots.push(Knot {
+                paddle: course.pose().paddle,
+                target: course.target_displacement(),
+                jacobian,
+                base_force: course.base_force(),
+                coefficients: course.coefficients().to_vec(),
+            });
+        }
+        Ok(knots)
+    }
+
+    /// Target displacements of a way whose paddle is known.
+    fn targets(&self, paddle: &dyn Fn(usize) -> Vector2<f64>) -> Result<Vec<Vector2<f64>>, TrainingError> {
+        let mut course = self.course()?;
+        (0..=self.steps)
+            .map(|k| {
+                if k > 0 {
+                    self.step(&mut course, k, paddle(k))?;
+                }
+                Ok(course.target_displacement())
+            })
+            .collect()
+    }
+}
+
+/// Where the full model ends when the paddle goes its own way.
+///
+/// # Errors
+/// [`TrainingError::Path`] where the tissue cannot be taken along it.
+pub fn along(
+    model: &TissueModel,
+    attached: Option<usize>,
+    way: &(dyn Fn(f64) -> Pose + Sync),
+    interval: f64,
+    paddle: &[Vector2<f64>],
+) -> Result<Vec<Vector2<f64>>, TrainingError> {
+    let walk = Walk { model, paddle: attached, way, interval, steps: paddle.len().saturating_sub(1) };
+    walk.targets(&|k| paddle[k])
+}
+
+fn failed(time: f64) -> impl FnOnce(NeedleError) -> TrainingError {
+    move |source| TrainingError::Path { time, source: Box::new(source) }
+}
+
+/// A smooth random way that begins at rest: three waves of random phases and directions.
+struct RandomWay {
+    waves: [(Vector2<f64>, f64, f64); 3],
+    /// Seconds until it is at its full size.
+    rise: f64,
+}
+
+impl RandomWay {
+    fn new(size: f64, seed: u64, duration: f64) -> Self {
+        let mut random = SplitMix64(seed);
+        let mut uniform = || random.unit();
+        let waves = std::array::from_fn(|_| {
+            let angle = std::f64::consts::TAU * uniform();
+            let direction = Vector2::new(angle.cos(), angle.sin()) * (size / 3.0);
+            // From one wave in the insertion to eight.
+            let frequency = std::f64::consts::TAU * 8.0_f64.powf(uniform()) / duration;
+            (direction, frequency, std::f64::consts::TAU * uniform())
+        });
+        Self { waves, rise: 0.1 * duration }
+    }
+
+    fn at(&self, time: f64) -> Vector2<f64> {
+        let sum: Vector2<f64> =
+            self.waves.iter().map(|(way, frequency, phase)| way * (frequency * time + phase).sin()).sum();
+        sum * (time / self.rise).clamp(0.0, 1.0)
+    }
+}

@@ -1,0 +1,107 @@
+//! What moves a patient while the needle goes in.
+
+use crate::geometry::Point2;
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// What moves the immobile part, from the start of the needle on: the sum of all there is.
+///
+/// # Example
+/// ```
+/// use model_offline::scene::{Breathing, Motion};
+///
+/// let breathing = Breathing { period: 4.0, amplitude: 3.0, direction: [0.0, 1.0].into() };
+/// let motion = Motion { breathing: Some(breathing), ..Motion::default() };
+/// assert_eq!(motion.displacement(-1.0).y, 0.0); // exhaled, before the needle starts
+/// assert!((motion.displacement(2.0).y - 3.0).abs() < 1e-12); // inhaled
+/// assert!(motion.displacement(4.0).y.abs() < 1e-12);
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Motion {
+    /// Breathing.
+    pub breathing: Option<Breathing>,
+    /// A cough, or a jerk.
+    pub surge: Option<Surge>,
+    /// Rows of time in s, and displacement.
+    pub recorded: Vec<(f64, Point2)>,
+}
+
+/// `amplitude · (1 − cos⁴(π t / period))`, from the end of an exhalation on: long at rest exhaled, short inhaled (Lujan et
+/// al., Medical Physics 26, 1999).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Breathing {
+    /// Seconds per breath.
+    pub period: f64,
+    /// From exhaled to inhaled, length.
+    pub amplitude: f64,
+    /// Unit vector.
+    pub direction: Point2,
+}
+
+/// `amplitude · sin²(π (t − at) / last)` while it lasts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Surge {
+    /// Seconds after the start of the needle.
+    pub at: f64,
+    /// Seconds that it lasts.
+    pub last: f64,
+    /// Largest displacement, length.
+    pub amplitude: f64,
+    /// Unit vector.
+    pub direction: Point2,
+}
+
+impl Motion {
+    /// Whether nothing moves.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Displacement of the immobile part so many seconds after the start of the needle; none before.
+    pub fn displacement(&self, since_start: f64) -> Point2 {
+        if since_start <= 0.0 {
+            return Point2::zeros();
+        }
+        let breathed = self.breathing.map_or_else(Point2::zeros, |Breathing { period, amplitude, direction }| {
+            direction * (amplitude * (1.0 - (PI * since_start / period).cos().powi(4)))
+        });
+        let surged = self.surge.map_or_else(Point2::zeros, |Surge { at, last, amplitude, direction }| {
+            let share = ((since_start - at) / last).clamp(0.0, 1.0);
+            direction * (amplitude * (PI * share).sin().powi(2))
+        });
+        breathed + surged + self.recorded_at(since_start)
+    }
+
+    fn recorded_at(&self, time: f64) -> Point2 {
+        let after = self.recorded.partition_point(|(at, _)| *at <= time);
+        match (after.checked_sub(1).map(|before| self.recorded[before]), self.recorded.get(after).copied()) {
+            (None, None) => Point2::zeros(),
+            (None, Some((_, only))) | (Some((_, only)), None) => only,
+            (Some((from, a)), Some((to, b))) => a + (b - a) * ((time - from) / (to - from)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_that_moves_adds_up_and_nothing_moves_before_the_needle() {
+        let motion = Motion {
+            breathing: Some(Breathing { period: 4.0, amplitude: 2.0, direction: Point2::new(0.0, 1.0) }),
+            surge: Some(Surge { at: 1.0, last: 0.5, amplitude: 5.0, direction: Point2::new(1.0, 0.0) }),
+            recorded: vec![(0.5, Point2::new(0.1, 0.0)), (1.5, Point2::new(0.3, 0.2))],
+        };
+        assert_eq!(motion.displacement(0.0), Point2::zeros());
+        // cos⁴ = 1/4 at an eighth of a turn; the middle of the cough; half way between the rows.
+        let at_once = motion.displacement(1.25);
+        let breath = 2.0 * (1.0 - (PI * 1.25 / 4.0).cos().powi(4));
+        assert!((at_once - Point2::new(5.0 + 0.25, breath + 0.15)).norm() < 1e-12, "{at_once}");
+        assert!((motion.displacement(1.0).y - (2.0 * 0.75 + 0.1)).abs() < 1e-12);
+        // Its ends are held.
+        assert!((motion.displacement(9.0).x - 0.3).abs() < 1e-12);
+        assert!((motion.displacement(0.1).x - 0.1).abs() < 1e-12);
+        assert!(!motion.is_none() && Motion::default().is_none());
+    }
+}

@@ -1,0 +1,53 @@
+//! The rules of what moves a patient.
+
+use super::{Checked, Validator};
+use crate::geometry::Point2;
+use crate::scene::schema::Located;
+use crate::scene::{Breathing, Motion, Surge};
+
+impl Validator<'_> {
+    pub(super) fn motion(&self) -> Checked<Motion> {
+        let section = &self.file.motion;
+        let breathing = section.breathing.as_ref().map(|breathing| {
+            Ok(Breathing {
+                period: self.positive(&breathing.period, "period")?,
+                amplitude: self.positive(&breathing.amplitude, "amplitude")?,
+                direction: self.direction(&breathing.direction)?,
+            })
+        });
+        let surge = section.surge.as_ref().map(|surge| {
+            Ok(Surge {
+                at: self.not_negative(&surge.at, "at")?,
+                last: self.positive(&surge.last, "last")?,
+                amplitude: self.positive(&surge.amplitude, "amplitude")?,
+                direction: self.direction(&surge.direction)?,
+            })
+        });
+        Ok(Motion {
+            breathing: breathing.transpose()?,
+            surge: surge.transpose()?,
+            recorded: section.recorded.as_ref().map_or(Ok(Vec::new()), |rows| self.recorded(rows))?,
+        })
+    }
+
+    fn direction(&self, direction: &Located<[f64; 2]>) -> Checked<Point2> {
+        let vector = self.point(direction.get(), direction.span(), "direction")?;
+        if vector.norm() < 1e-12 {
+            return Err(self.error(direction.span(), "this motion has no direction", "e.g. direction = [0.0, 1.0]"));
+        }
+        Ok(vector.normalize())
+    }
+
+    fn recorded(&self, rows: &Located<Vec<[f64; 3]>>) -> Checked<Vec<(f64, Point2)>> {
+        let given = rows.get();
+        let finite = given.iter().flatten().all(|value| value.is_finite());
+        if !finite || given.is_empty() || given.windows(2).any(|pair| pair[1][0] <= pair[0][0]) {
+            return Err(self.error(
+                rows.span(),
+                "recorded is no motion",
+                "give rows [time in s, x, y] of finite numbers whose times grow",
+            ));
+        }
+        Ok(given.iter().map(|&[time, x, y]| (time, Point2::new(x, y))).collect())
+    }
+}

@@ -1,0 +1,115 @@
+//! Knots of tissue whose state depends on its past: along the insertion that the scene says, at its speed.
+
+use super::{TableBuildError, check};
+use crate::model::{ModelError, Pose, TissueModel};
+use crate::needle::Course;
+use crate::placement::controllability::best_direction;
+use firmware::contract::{Knot, MAX_KNOTS};
+use nalgebra::Vector2;
+
+/// Orthogonal error over the depth that the paddle path leaves at a knot.
+const ENOUGH: f64 = 1e-7;
+/// Positions of the paddle that are tried at a knot.
+const ROUNDS: usize = 12;
+/// Steps of the insertion between two knots: what is elastic, cut and relaxed needs small ones, the table does not.
+const STEPS: usize = 4;
+
+/// The knots down to where the tissue can be taken. Nobody breathes: a table knows no time.
+///
+/// # Errors
+/// [`TableBuildError`] where there are not two.
+pub(super) fn knots(
+    model: &TissueModel,
+    position: usize,
+    count: usize,
+) -> Result<heapless::Vec<Knot<f64, 2>, MAX_KNOTS>, TableBuildError> {
+    let scene = model.scene();
+    let (normal, depth) = (scene.needle.orthogonal(), scene.needle.depth);
+    let interval = depth / (count - 1) as f64;
+    let seconds = interval / scene.needle.speed / STEPS as f64;
+    let mut still = Course::at_rest(model, Some(position))?;
+    let mut steered = still.clone();
+    let mut knots: heapless::Vec<Knot<f64, 2>, MAX_KNOTS> = heapless::Vec::new();
+    // Paddle travel per step, as the last ones needed it.
+    let mut ahead = Vector2::zeros();
+    for k in 0..count {
+        let outcome = (|| {
+            for step in 1..=if k > 0 { STEPS } else { 0 } {
+                let share = step as f64 / STEPS as f64;
+                let at = if k + 1 == count && step == STEPS { depth } else { interval * ((k - 1) as f64 + share) };
+                still.take_in(Pose { depth: at, ..Pose::default() }, seconds)?;
+                ahead =
+                    steer(&mut steered, at, seconds, ahead, normal * (ENOUGH * depth), scene.paddles[position].index)?;
+            }
+            let jacobian = steered.actuation_jacobian()?;
+            Ok::<_, TableBuildError>(Knot {
+                depth: steered.pose().depth,
+                jacobian,
+                paddle_path: steered.pose().paddle,
+                paddle_path_slope: Vector2::zeros(),
+                target_displacement: steered.target_displacement(),
+                target_displacement_slope: Vector2::zeros(),
+                static_target_displacement: still.target_displacement(),
+            })
+        })();
+        match outcome {
+            Ok(knot) => {
+                check(&knot, scene.paddles[position].index, scene.actuator.max_displacement)?;
+                // Capacity was checked before.
+                let _ = knots.push(knot);
+            }
+            Err(error) if knots.len() < 2 => return Err(error),
+            Err(_) => break,
+        }
+    }
+    slopes(&mut knots);
+    Ok(knots)
+}
+
+/// One step with the paddle where the target is on the needle's line after it; the paddle's travel.
+fn steer(
+    course: &mut Course<'_>,
+    depth: f64,
+    seconds: f64,
+    ahead: Vector2<f64>,
+    enough: Vector2<f64>,
+    index: u32,
+) -> Result<Vector2<f64>, TableBuildError> {
+    let before = course.clone();
+    let from = before.pose().paddle;
+    let normal = enough.normalize();
+    let mut paddle = from + ahead;
+    let mut best = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        let mut tried = before.clone();
+        tried.take_in(Pose { depth, paddle, ..Pose::default() }, seconds)?;
+        let error = normal.dot(&tried.target_displacement());
+        let done = error.abs() <= enough.norm() || error.abs() > 0.9 * best;
+        if error.abs() < best {
+            *course = tried;
+            best = error.abs();
+        }
+        if done {
+            break;
+        }
+        let jacobian = course.actuation_jacobian()?;
+        let direction = best_direction(&jacobian, normal)
+            .map_err(|singular| ModelError::Uncontrollable { paddle: index, condition: singular.condition })?;
+        paddle -= direction * error;
+    }
+    Ok(course.pose().paddle - from)
+}
+
+/// Slopes along the depth from the knots around.
+fn slopes(knots: &mut [Knot<f64, 2>]) {
+    let slope = |knots: &[Knot<f64, 2>], k: usize, of: fn(&Knot<f64, 2>) -> Vector2<f64>| {
+        let (a, b) = (k.saturating_sub(1), (k + 1).min(knots.len() - 1));
+        (of(&knots[b]) - of(&knots[a])) / (knots[b].depth - knots[a].depth)
+    };
+    let found: Vec<_> = (0..knots.len())
+        .map(|k| (slope(knots, k, |knot| knot.paddle_path), slope(knots, k, |knot| knot.target_displacement)))
+        .collect();
+    for (knot, (paddle, target)) in knots.iter_mut().zip(found) {
+        (knot.paddle_path_slope, knot.target_displacement_slope) = (paddle, target);
+    }
+}
