@@ -16,3 +16,4 @@ pub mod table_tissue;
 pub mod tables;
 pub mod timing;
 pub mod usage;
+pub mod worlds;

@@ -16,6 +16,7 @@ mod tables;
 mod timing;
 mod timing_peer;
 mod world_args;
+mod worlds;
 
 use std::path::{Path, PathBuf};
 
@@ -40,6 +41,7 @@ use self::stability::{LoopStabilityArgs, stability};
 use self::tables::{TablesArgs, tables};
 use self::timing::{TimingArgs, timing};
 use self::timing_peer::{PeerArgs, timing_peer};
+use self::worlds::{WorldsArgs, worlds};
 
 /// Simulates needle insertions with a paddle that holds the target still. Without a command: `run` on the paper's scene
 #[derive(Debug, Parser)]
@@ -94,6 +96,10 @@ pub(crate) enum Command {
     /// Charts what a table's size is worth: closed-loop error and time of a step against knots and number type
     #[command(after_help = "Example: host-sim tables --scene paper --tissue homogeneous --out charts")]
     Tables(TablesArgs),
+    /// Tries the loop in worlds that are more than the table's model: needles that slip, tissue that creeps, patients that
+    /// breathe
+    #[command(after_help = "Example: host-sim worlds --scene prostate --seeds 20")]
+    Worlds(WorldsArgs),
     /// Runs the controller again on recorded inputs and compares bit by bit
     #[command(after_help = "Example: host-sim replay stillpoint-report/inclusion-dynamic.rec")]
     Replay(ReplayArgs),
@@ -152,6 +158,7 @@ pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
             signals::install();
             signals::ends_at_once(|| tables(&args))
         }
+        Command::Worlds(args) => worlds(&args),
         Command::Replay(args) => replay(&args),
         Command::Board(args) => {
             signals::install();

@@ -69,7 +69,7 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let (model, paddle) = signals::ends_at_once(|| model_with_paddle(&scene, args.paddle))?;
     let world = signals::ends_at_once(|| match args.mode {
         RunMode::Lockstep => World::new(&model, Some(paddle), &simulation),
-        RunMode::FreeRun => world_in_time(&model, Some(paddle), &simulation, &Reductions::default()),
+        RunMode::FreeRun => world_in_time(&model, Some(paddle), &simulation, None, &Reductions::default()),
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let visit = Visit {

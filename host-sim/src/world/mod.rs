@@ -15,7 +15,7 @@ pub mod simulation;
 pub mod tissue;
 pub mod truth;
 
-use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
+use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
 use firmware::{Inputs, Mode};
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
@@ -25,7 +25,7 @@ use self::error::WorldError;
 use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{Attachment, Insertion, PlantAccount, Reductions, TissuePlant, TissueResponse};
+use self::tissue::{Attachment, Insertion, PaddlePlan, PlantAccount, Reductions, TissuePlant, TissueResponse};
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
@@ -60,10 +60,10 @@ impl<'m> World<TissuePlant<'m>> {
     /// [`WorldError`].
     pub fn new(model: &'m TissueModel, paddle_index: Option<u32>, simulation: &Simulation) -> Result<Self, WorldError> {
         let reductions = Reductions::default();
-        Self::sharing(model, paddle_index, Attachment::moved, simulation, &reductions)
+        Self::sharing(model, paddle_index, Attachment::moved, simulation, None, &reductions)
     }
 
-    /// The same with a paddle that is moved or held, and reduced models that others of this tissue have asked for, or will.
+    /// The same with a paddle that is moved or held, as a table plans it where there is one, and reduced models that others of this tissue have asked for, or will.
     ///
     /// # Errors
     /// [`WorldError`].
@@ -72,6 +72,7 @@ impl<'m> World<TissuePlant<'m>> {
         paddle_index: Option<u32>,
         attachment: fn(Option<usize>) -> Attachment,
         simulation: &Simulation,
+        plan: Option<&Table<f64, 2>>,
         reductions: &Reductions,
     ) -> Result<Self, WorldError> {
         let position =
@@ -81,6 +82,7 @@ impl<'m> World<TissuePlant<'m>> {
                 let insertion = Insertion {
                     trajectory: NeedleTrajectory::new(simulation.depth, simulation.insertion_s),
                     duration_s: simulation.duration_s,
+                    plan: plan.map(PaddlePlan::of).unwrap_or_default(),
                 };
                 TissuePlant::along(model, attachment(position), simulation.plant, insertion, reductions)?
             }

@@ -8,6 +8,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::ValueEnum;
+use firmware::contract::Table;
 use model_offline::model::{Body, Pose, TissueModel};
 use model_offline::needle::Course;
 use model_offline::parallel;
@@ -139,12 +140,36 @@ pub struct Reductions {
 type PathKey = (Attachment, Insertion);
 
 /// One insertion.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Insertion {
     /// How the needle goes.
     pub trajectory: NeedleTrajectory,
     /// Seconds from its start to the end.
     pub duration_s: f64,
+    /// Where the paddle is planned to be.
+    pub plan: PaddlePlan,
+}
+
+/// Where a paddle is planned to be along the depth; nowhere else than at rest by default.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PaddlePlan(Vec<(f64, Vector2<f64>)>);
+
+impl PaddlePlan {
+    /// A table's feed-forward path.
+    pub fn of(table: &Table<f64, 2>) -> Self {
+        Self(table.knots.iter().map(|knot| (knot.depth, knot.paddle_path)).collect())
+    }
+
+    /// At a depth, length; its ends are held.
+    fn at(&self, depth: f64) -> Vector2<f64> {
+        let after = self.0.partition_point(|(knot, _)| *knot <= depth);
+        match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {
+            (None, None) => Vector2::zeros(),
+            (None, Some((_, only))) => *only,
+            (Some((_, only)), None) => only,
+            (Some((from, a)), Some((to, b))) => a + (b - a) * ((depth - from) / (to - from)),
+        }
+    }
 }
 
 /// What learning a path found.
@@ -167,17 +192,21 @@ impl Reductions {
 
 impl Reductions {
     /// The path of an insertion; `model` is the same at every call.
-    fn path(&self, model: &TissueModel, attachment: Attachment, insertion: Insertion) -> Learnt {
-        let key = (attachment, insertion);
-        let Insertion { trajectory, duration_s } = insertion;
+    fn path(&self, model: &TissueModel, attachment: Attachment, insertion: &Insertion) -> Learnt {
+        let Insertion { trajectory, duration_s, plan } = insertion;
+        let key = (attachment, insertion.clone());
         let known = || self.paths.lock().unwrap_or_else(PoisonError::into_inner);
         let found = known().iter().find(|(of, _)| *of == key).map(|(_, learnt)| learnt.clone());
         found.unwrap_or_else(|| {
-            let way = |time: f64| model.pose_at(time, trajectory.at(time).depth);
+            let way = |time: f64| {
+                let depth = trajectory.at(time).depth;
+                let paddle = if attachment.held { Vector2::zeros() } else { plan.at(depth) };
+                Pose { paddle, ..model.pose_at(time, depth) }
+            };
             let options = PathOptions {
                 steered: !attachment.held,
                 threads: parallel::available(),
-                ..PathOptions::new(duration_s)
+                ..PathOptions::new(*duration_s)
             };
             let learnt = AlongPath::learn(model, attachment.paddle, &way, &options).map(Arc::new);
             known().push((key, learnt.clone()));
@@ -333,7 +362,7 @@ impl<'m> TissuePlant<'m> {
             Some(WantedPlant::Condensed) => return Err(WorldError::CondensedHasNoPast),
             Some(WantedPlant::Reduced | WantedPlant::Auto) | None => {}
         }
-        let path = reductions.path(model, attachment, insertion).map_err(WorldError::Training)?;
+        let path = reductions.path(model, attachment, &insertion).map_err(WorldError::Training)?;
         let mut plant = Self::on_course(model, attachment.paddle)?;
         plant.account.model = PlantModel::Reduced;
         plant.account.path_knots = Some(path.knots());
@@ -354,6 +383,11 @@ impl<'m> TissuePlant<'m> {
         let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
         let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
         Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account }
+    }
+
+    /// Largest error of the target displacement so far that the model estimated of itself, length.
+    pub fn largest_estimate(&self) -> Option<f64> {
+        self.account.largest_estimate
     }
 
     /// Solves the full model at every step from now on, where it answers.

@@ -170,24 +170,34 @@ impl SlippingNeedle<'_> {
         let mut engaged = (self.engaged + depth - self.pose.depth).max(0.0);
         let mut last: Option<(f64, f64)> = None;
         // Between these the root lies: the tissue jumps a little where a station is passed, maybe over it.
-        let (mut behind, mut beyond) = (0.0, f64::INFINITY);
+        let (mut behind, mut beyond) = ((0.0, None), (f64::INFINITY, None));
         for _ in 0..ROUNDS {
             let bounds = Bounds::exactly(self.cutting_force(force, engaged));
             let trial = self.trial(depth, ahead, Tip { engaged, bounds })?;
             let off = self.ahead_of_entry(engaged, ahead, &trial) + trial.tip_displacement - depth;
+            let before = last.map(|(_, off)| off);
+            // An end that stays counts half, so that the other one moves past the root (Illinois).
+            let halved =
+                |end: (f64, Option<f64>), stays: bool| if stays { (end.0, end.1.map(|off| 0.5 * off)) } else { end };
             if off > 0.0 {
-                beyond = f64::min(beyond, engaged);
+                (behind, beyond) = (halved(behind, before.is_some_and(|before| before > 0.0)), (engaged, Some(off)));
             } else {
-                behind = f64::max(behind, engaged);
+                (beyond, behind) = (halved(beyond, before.is_some_and(|before| before <= 0.0)), (engaged, Some(off)));
             }
-            if off.abs() <= enough || beyond - behind <= enough && off.abs() <= JUMP * self.model.spacing() {
+            let narrow = beyond.0 - behind.0 <= enough;
+            if off.abs() <= enough || narrow && off.abs() <= JUMP * self.model.spacing() {
                 return Ok((engaged, trial));
             }
-            let slope = last.map_or(1.0, |(there, then)| ((off - then) / (engaged - there)).clamp(0.2, 5.0));
+            let next = match (behind, beyond) {
+                ((low, Some(below)), (high, Some(above))) => low + (high - low) * below / (below - above),
+                _ => {
+                    let slope = last.map_or(1.0, |(there, then)| ((off - then) / (engaged - there)).clamp(0.2, 5.0));
+                    engaged - off / slope
+                }
+            };
             last = Some((engaged, off));
-            let next = engaged - off / slope;
-            let inside = behind < next && next < beyond;
-            engaged = if inside { next } else { 0.5 * (behind + beyond) };
+            let inside = behind.0 < next && next < beyond.0;
+            engaged = if inside { next } else { 0.5 * (behind.0 + beyond.0) };
         }
         Err(NeedleError::NoForces { depth })
     }

@@ -72,6 +72,11 @@ pub struct AlongPath {
     reach: f64,
 }
 
+/// The direction J⁻¹n in which a paddle moves the target across the needle alone.
+fn across(rest: &Knot, normal: Vector2<f64>) -> Option<Vector2<f64>> {
+    rest.jacobian.try_inverse().map(|inverse| (inverse * normal).normalize())
+}
+
 /// Where on the path.
 struct Between {
     knot: usize,
@@ -79,7 +84,8 @@ struct Between {
 }
 
 impl AlongPath {
-    /// Learns an insertion; `way` says where patient and needle are at a time since its start.
+    /// Learns an insertion; `way` says where patient and needle are at a time since its start, and where the paddle is
+    /// planned to be. Where it is steered, it leaves the plan by as much as the target's way off the line asks for.
     ///
     /// # Errors
     /// [`TrainingError::Path`] where the tissue cannot be taken along it.
@@ -92,15 +98,22 @@ impl AlongPath {
         let walk = Walk { model, paddle, way, interval: options.duration / options.steps as f64, steps: options.steps };
         let normal = model.scene().needle.orthogonal();
         let steered = options.steered && paddle.is_some();
+        // How far it is off the plan, along the one direction that moves the target across the needle and not along it: steered
+        // by the Jacobians on the way it would drift where no controller goes.
+        let (mut now, mut then) = (0.0, 0.0);
         let knots = walk.knots(|knots| {
-            let [.., before, last] = knots else { return Vector2::zeros() };
-            if !steered {
+            let ([.., before, last], Some(direction)) = (knots, knots.first().and_then(|rest| across(rest, normal)))
+            else {
                 return Vector2::zeros();
+            };
+            if steered {
+                // What the last step added, and what it left: what a controller does that knows the tissue.
+                let error = |knot: &Knot| normal.dot(&knot.target);
+                let answer = normal.dot(&(last.jacobian * direction));
+                let next = 2.0 * now - then - (2.0 * error(last) - error(before)) / answer;
+                (then, now) = (now, if next.is_finite() { next } else { now });
             }
-            // Where the last step leads to, less what it left: what a controller does that knows the tissue.
-            let Some(inverse) = last.jacobian.try_inverse() else { return last.paddle };
-            let error = |knot: &Knot| normal.dot(&knot.target);
-            2.0 * last.paddle - before.paddle - inverse * normal * (2.0 * error(last) - error(before))
+            direction * now
         })?;
         let mut path = Self { interval: walk.interval, knots, growth: ErrorGrowth::default(), reach: 0.0 };
         path.growth.still = path.between_knots();
@@ -287,8 +300,8 @@ impl<'w> Walk<'w> {
         let mut course = self.course()?;
         let mut knots = Vec::with_capacity(self.steps + 1);
         for k in 0..=self.steps {
-            let paddle = decide(&knots);
             if k > 0 {
+                let paddle = (self.way)(self.interval * k as f64).paddle + decide(&knots);
                 self.step(&mut course, k, paddle)?;
             }
             let time = self.interval * k as f64;

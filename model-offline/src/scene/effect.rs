@@ -31,9 +31,9 @@ const STICKING: f64 = 0.3;
 /// a judgement.
 const SHARES: [(f64, f64); 2] = [(0.3, 3.2), (0.2, 42.0)];
 
-/// Seconds of a breath, and its amplitude over the depth of the insertion: 2 to 3 mm of the 1 to 10 mm reported.
+/// Seconds of a breath, and its amplitude over the depth of the insertion: 1.5 to 2 mm for the bundled scenes, of the 1 to 10 mm reported.
 const PERIOD: f64 = 4.0;
-const AMPLITUDE: f64 = 0.25;
+const AMPLITUDE: f64 = 0.15;
 
 impl Scene {
     /// The same scene with an effect, unless it has it already.

@@ -183,7 +183,7 @@ impl<'a> SimulatedInsertion<'a> {
         let Self { model, simulation, label, reductions, extras, progress } = *self;
         let own = Reductions::default();
         let reductions = reductions.unwrap_or(&own);
-        let world = World::sharing(model, paddle, Attachment::held, simulation, reductions)?;
+        let world = World::sharing(model, paddle, Attachment::held, simulation, None, reductions)?;
         let mut plant = PlantLoop::new(world, simulation);
         plant.world().start_needle(0);
         let period_ns = simulation.loop_settings.period_ns();
@@ -317,9 +317,10 @@ impl<'a> SimulatedInsertion<'a> {
         let paddle = Some(controller.table.paddle.index);
         let own = Reductions::default();
         let reductions = reductions.unwrap_or(&own);
+        let plan = Some(controller.table);
         let world = match controller.mode {
-            RunMode::Lockstep => World::sharing(model, paddle, Attachment::moved, simulation, reductions)?,
-            RunMode::FreeRun => world_in_time(model, paddle, simulation, reductions)?,
+            RunMode::Lockstep => World::sharing(model, paddle, Attachment::moved, simulation, plan, reductions)?,
+            RunMode::FreeRun => world_in_time(model, paddle, simulation, plan, reductions)?,
         };
         Ok(PlantLoop::new(world, simulation))
     }

@@ -2,6 +2,7 @@
 
 use std::time::Instant;
 
+use firmware::contract::Table;
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
@@ -50,10 +51,11 @@ pub fn world_in_time<'m>(
     model: &'m TissueModel,
     paddle_index: Option<u32>,
     simulation: &Simulation,
+    plan: Option<&Table<f64, 2>>,
     reductions: &Reductions,
 ) -> Result<World<TissuePlant<'m>>, WorldError> {
     let at_rest =
-        |simulation: &Simulation| World::sharing(model, paddle_index, Attachment::moved, simulation, reductions);
+        |simulation: &Simulation| World::sharing(model, paddle_index, Attachment::moved, simulation, plan, reductions);
     let mut world = at_rest(simulation)?;
     world.tissue.solve_every_step()?;
     let full = rehearse(&mut world.tissue, simulation)?;
@@ -130,10 +132,10 @@ mod tests {
             Simulation { loop_settings, plant, ..Simulation::new(&scene) }
         };
         for plant in [None, Some(WantedPlant::Full)] {
-            let refused = world_in_time(&model, Some(2), &at(5e5, plant), &Reductions::default());
+            let refused = world_in_time(&model, Some(2), &at(5e5, plant), None, &Reductions::default());
             assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
         }
-        let mut world = world_in_time(&model, Some(2), &at(0.02, None), &Reductions::default()).unwrap();
+        let mut world = world_in_time(&model, Some(2), &at(0.02, None), None, &Reductions::default()).unwrap();
         assert_eq!(world.plant_account(), PlantAccount::default(), "a rehearsal leaves no trace");
         assert!(world.advance(0, 0).unwrap().target.iter().all(|x| x.abs() < 1e-9), "at rest again");
     }

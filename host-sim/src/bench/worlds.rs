@@ -1,0 +1,304 @@
+//! What a richer world than the table's leaves of a compensation: every combination of effects, every sensor, no paddle,
+//! the best fixture, and the controller with a table that knows the world and with one that does not.
+//!
+//! The loop is the firmware's own controller in this process and in simulated time; the tissue is the neighbourhood of each
+//! insertion in its world, whose error against the full model is part of the result.
+
+use firmware::contract::Table;
+use firmware::{Controller, Mode, State};
+use model_offline::model::{ModelError, TissueModel};
+use model_offline::parallel;
+use model_offline::placement::{PlacementOptions, PlacementStudy, discretise};
+use model_offline::scene::{Effect, Scene, Sensor, SensorPreset};
+use model_offline::table::{TableOptions, build};
+use nalgebra::Vector2;
+use serde::Serialize;
+
+use super::error::SimError;
+use crate::runtime::signals;
+use crate::world::World;
+use crate::world::loop_settings::LoopSettings;
+use crate::world::simulation::Simulation;
+use crate::world::tissue::{Attachment, Reductions};
+
+/// Effects of a world: all combinations are tried.
+const EFFECTS: [Effect; 3] = [Effect::Shaft, Effect::Creep, Effect::Breathing];
+
+/// Orthogonal error of one insertion, length.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Errors {
+    /// Largest.
+    pub peak: f64,
+    /// Root mean square.
+    pub rms: f64,
+}
+
+/// A number over many seeds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Nine in ten are not below.
+    pub low: f64,
+    /// Half are not above.
+    pub median: f64,
+    /// Nine in ten, with those below, are not above.
+    pub high: f64,
+}
+
+/// The controller with one table, over all seeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Controlled {
+    /// Largest orthogonal error, length.
+    pub peak: Spread,
+    /// Its root mean square, length.
+    pub rms: Spread,
+    /// Least part of an insertion in RUN.
+    pub run_share: f64,
+    /// Largest error of the tissue's target displacement that it estimated of itself, length.
+    pub tissue_estimate: f64,
+    /// Largest error that the full model found along the first seed's insertion, length; none where it cannot go there.
+    pub tissue_error: Option<f64>,
+}
+
+/// One sensor in one world.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SensorRow {
+    /// What sees the target.
+    pub sensor: SensorPreset,
+    /// The controller with a table of the world: of its needle, its tissue, not of its breath.
+    pub known: Option<Controlled>,
+    /// The controller with a table of a contact that moves with the needle in elastic tissue.
+    pub simple: Controlled,
+}
+
+/// One world.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct WorldRow {
+    /// Its effects.
+    pub effects: Vec<Effect>,
+    /// Without a paddle.
+    pub none: Errors,
+    /// With the best fixture.
+    pub fixture: Errors,
+    /// The controller, sensor by sensor.
+    pub sensors: Vec<SensorRow>,
+    /// Why there is no table that knows the world, where there is none.
+    pub no_table: Option<String>,
+}
+
+/// All worlds of a scene.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Worlds {
+    /// The scene.
+    pub scene: String,
+    /// Unit of its lengths.
+    pub length_unit: String,
+    /// Seeds of the sensors' noise, from 1.
+    pub seeds: u64,
+    /// Paddles: best fixture, best to control.
+    pub paddles: [u32; 2],
+    /// The worlds, from the simplest.
+    pub rows: Vec<WorldRow>,
+}
+
+/// Everything that all worlds of a scene share.
+struct Basis<'a> {
+    scene: &'a Scene,
+    paddles: [u32; 2],
+    simple: Table<f64, 2>,
+    sensors: Vec<Sensor>,
+    seeds: u64,
+}
+
+/// Tries all worlds; `progress` is called after each.
+///
+/// # Errors
+/// [`SimError`]: tissue that cannot be modelled, or that fails in one of the worlds.
+pub fn compare(scene: &Scene, seeds: u64, threads: usize, progress: &(dyn Fn() + Sync)) -> Result<Worlds, SimError> {
+    let study = PlacementStudy::run(&scene.without_a_past(), &PlacementOptions { threads, ..Default::default() })?;
+    let dynamic = study.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
+    let basis = Basis {
+        scene,
+        paddles: [study.placement.optimum.static_paddle, dynamic],
+        simple: build(&study.model, dynamic, &options(&Simulation::new(scene)))?,
+        sensors: sensors(scene),
+        seeds,
+    };
+    let combinations = 1_usize << EFFECTS.len();
+    let rows = parallel::map(combinations, threads, |set| {
+        let chosen = |k: &usize| set >> k & 1 == 1;
+        let effects: Vec<Effect> = (0..EFFECTS.len()).filter(chosen).map(|k| EFFECTS[k]).collect();
+        let row = signals::check().map_err(SimError::from).and_then(|()| basis.world(effects));
+        progress();
+        row
+    });
+    let rows = rows.into_iter().collect::<Result<_, _>>()?;
+    let Basis { paddles, .. } = basis;
+    Ok(Worlds { scene: scene.name.clone(), length_unit: scene.length_unit.clone(), seeds, paddles, rows })
+}
+
+/// Number of worlds that are tried.
+pub fn count() -> u64 {
+    1 << EFFECTS.len()
+}
+
+/// A good sensor and one of practice, where the scene's unit of length is known.
+fn sensors(scene: &Scene) -> Vec<Sensor> {
+    let of = |preset: SensorPreset| preset.sensor(scene.needle.depth, &scene.length_unit).ok();
+    let practical: Vec<Sensor> = [SensorPreset::Camera, SensorPreset::Ultrasound].into_iter().filter_map(of).collect();
+    if practical.is_empty() { of(SensorPreset::Ideal).into_iter().collect() } else { practical }
+}
+
+fn options(simulation: &Simulation) -> TableOptions {
+    TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() }
+}
+
+impl Basis<'_> {
+    fn world(&self, effects: Vec<Effect>) -> Result<WorldRow, SimError> {
+        let mut scene = effects.iter().fold(self.scene.clone(), |scene, effect| scene.with_effect(*effect));
+        let simulation = Simulation::new(&scene);
+        scene.set_speed(scene.needle.depth / simulation.insertion_s);
+        let (model, _) = discretise(&scene)?;
+        let reductions = Reductions::default();
+        let [fixture, dynamic] = self.paddles;
+        let uncontrolled = |paddle| insertion(&model, &simulation, paddle, None, &reductions).map(|run| run.errors);
+        let table = match effects.iter().any(|effect| *effect != Effect::Breathing) {
+            true => Some(build(&model, dynamic, &options(&simulation))),
+            false => None,
+        };
+        let (known, no_table) = match table {
+            Some(Ok(table)) => (Some(table), None),
+            Some(Err(error)) => (None, Some(error.to_string())),
+            // Of a world whose needle and tissue are the simple ones it is the simple one.
+            None => (Some(self.simple.clone()), None),
+        };
+        let sensors = self.sensors.iter().map(|sensor| {
+            let controlled = |table| self.controlled(&model, sensor, table, &reductions);
+            Ok(SensorRow {
+                sensor: sensor.preset,
+                known: known.as_ref().map(controlled).transpose()?,
+                simple: controlled(&self.simple)?,
+            })
+        });
+        let sensors = sensors.collect::<Result<_, SimError>>()?;
+        Ok(WorldRow { effects, none: uncontrolled(None)?, fixture: uncontrolled(Some(fixture))?, sensors, no_table })
+    }
+
+    fn controlled(
+        &self,
+        model: &TissueModel,
+        sensor: &Sensor,
+        table: &Table<f64, 2>,
+        reductions: &Reductions,
+    ) -> Result<Controlled, SimError> {
+        let runs = (1..=self.seeds).map(|seed| {
+            signals::check()?;
+            let simulation = Simulation {
+                seed,
+                sensor: *sensor,
+                loop_settings: LoopSettings::of(sensor),
+                ..Simulation::new(model.scene())
+            };
+            insertion(model, &simulation, Some(table.paddle.index), Some((table, seed == 1)), reductions)
+        });
+        let runs: Vec<Run> = runs.collect::<Result<_, SimError>>()?;
+        Ok(Controlled {
+            peak: spread(runs.iter().map(|run| run.errors.peak)),
+            rms: spread(runs.iter().map(|run| run.errors.rms)),
+            run_share: runs.iter().map(|run| run.run_share).fold(1.0, f64::min),
+            tissue_estimate: runs.iter().map(|run| run.tissue_estimate).fold(0.0, f64::max),
+            tissue_error: runs.first().and_then(|run| run.tissue_error),
+        })
+    }
+}
+
+/// What became of one insertion.
+struct Run {
+    errors: Errors,
+    run_share: f64,
+    tissue_estimate: f64,
+    tissue_error: Option<f64>,
+}
+
+/// One insertion: with a controller where there is a table, whose tissue is held against the full model where that is asked
+/// for; else with a paddle that is held, or none.
+fn insertion(
+    model: &TissueModel,
+    simulation: &Simulation,
+    paddle: Option<u32>,
+    table: Option<(&Table<f64, 2>, bool)>,
+    reductions: &Reductions,
+) -> Result<Run, SimError> {
+    let settings = simulation.loop_settings.settings(simulation.depth);
+    let attachment = if table.is_some() { Attachment::moved } else { Attachment::held };
+    let plan = table.map(|(table, _)| table);
+    let mut world = World::sharing(model, paddle, attachment, simulation, plan, reductions)?;
+    let controller = plan.map(|table| Controller::new(table, &settings)).transpose()?;
+    let mut state = State::new();
+    let mut command = None;
+    let normal = model.scene().needle.orthogonal();
+    let (mut peak, mut squares, mut ticks, mut in_run) = (0.0_f64, 0.0, 0_u64, 0_u64);
+    if controller.is_none() {
+        world.start_needle(0);
+    }
+    for tick in 0..simulation.ticks() {
+        let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns)?;
+        let since_start_s = world.since_start_s(truth.time_ns);
+        if since_start_s >= simulation.duration_s {
+            break;
+        }
+        command = controller.as_ref().map(|controller| controller.step(&mut state, &inputs));
+        if since_start_s >= 0.0 {
+            let error = normal.dot(&Vector2::from(truth.target));
+            (peak, squares, ticks) = (peak.max(error.abs()), squares + error * error, ticks + 1);
+            in_run += u64::from(command.as_ref().is_some_and(|command| command.state == Mode::Run as u32));
+        }
+    }
+    let account = match table {
+        Some((_, true)) => Some(world.plant_account()),
+        _ => None,
+    };
+    let estimate = world.tissue.largest_estimate();
+    Ok(Run {
+        errors: Errors { peak, rms: (squares / ticks.max(1) as f64).sqrt() },
+        run_share: in_run as f64 / ticks.max(1) as f64,
+        tissue_estimate: estimate.unwrap_or(0.0),
+        tissue_error: account.and_then(|account| account.extrapolation_error),
+    })
+}
+
+/// Median, and the range of the middle nine tenths.
+fn spread(values: impl Iterator<Item = f64>) -> Spread {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    let at = |share: f64| sorted[((sorted.len() - 1) as f64 * share).round() as usize];
+    Spread { low: at(0.05), median: at(0.5), high: at(0.95) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_spread_of_twenty_is_their_middle_eighteen() {
+        let Spread { low, median, high } = spread((1..=20).rev().map(f64::from));
+        assert_eq!((low, median, high), (2.0, 11.0, 19.0));
+        assert_eq!(spread(std::iter::once(3.0)), Spread { low: 3.0, median: 3.0, high: 3.0 });
+    }
+
+    /// Of the simplest world there is nothing that the simple table does not know, and a fixture is what it always was.
+    #[test]
+    fn in_the_simplest_world_both_tables_are_one() {
+        let scene = Scene::bundled("paper").unwrap();
+        let worlds = compare(&scene, 2, 2, &|| {}).unwrap();
+        assert_eq!(worlds.rows.len() as u64, count());
+        let simplest = &worlds.rows[0];
+        assert!(simplest.effects.is_empty() && simplest.no_table.is_none());
+        for row in &simplest.sensors {
+            assert_eq!(row.known.as_ref(), Some(&row.simple));
+            assert!(row.simple.peak.median < 0.1 * simplest.fixture.peak, "{row:?}");
+        }
+        // Whoever breathes moves the target without a needle.
+        let breathing = worlds.rows.iter().find(|row| row.effects == [Effect::Breathing]).unwrap();
+        assert!(breathing.none.peak > 1.5 * simplest.none.peak);
+    }
+}
