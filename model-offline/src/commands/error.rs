@@ -6,6 +6,7 @@ use model_offline::needle::NeedleError;
 use model_offline::output::{OutputError, OutputRefused};
 use model_offline::scene::{LimitError, Scene, SceneError};
 use model_offline::solver::equilibrium::Failure;
+use model_offline::study::effects::EffectsError;
 use model_offline::table::TableBuildError;
 use std::path::{Path, PathBuf};
 
@@ -67,6 +68,15 @@ impl From<TableBuildError> for CliError {
         match error {
             TableBuildError::Model(error) => Self::Model(error),
             other => Self::Table(other),
+        }
+    }
+}
+
+impl From<EffectsError> for CliError {
+    fn from(error: EffectsError) -> Self {
+        match error {
+            EffectsError::Model(error) => Self::Model(error),
+            EffectsError::Needle(error) => Self::Needle(error),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The command line of `model-offline`: one file per command.
 
 mod common;
+mod compare;
 mod completions;
 mod error;
 mod fit;
@@ -59,6 +60,9 @@ enum Command {
     /// The smallest model that keeps a tolerance, chosen from the cheapest up; what was rejected, and by which number.
     #[command(after_help = "Example:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json")]
     Fit(fit::FitArgs),
+    /// Which effects a scene needs: what a needle that slips, tissue that creeps and a patient that breathes add.
+    #[command(after_help = "Example:\n  model-offline compare breast --svg effects.svg")]
+    Compare(compare::CompareArgs),
     /// A commented scene to start from, also from an SVG drawing or a Gmsh mesh.
     #[command(
         after_help = "Examples:\n  model-offline new -o my.toml\n  model-offline new --svg outline.svg --size 120 -o my.toml\n  model-offline new --msh body.msh -o my.toml"
@@ -91,6 +95,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
         Command::Pareto(args) => pareto::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::New(args) => new::run(&args),
         Command::Completions(args) => completions::run(&args, &mut Cli::command()),
         Command::Man(args) => man::run(&args, Cli::command()),
@@ -99,8 +104,20 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 11] =
-    ["run", "controller", "plant", "rearm", "timing", "faults", "tables", "replay", "board", "export", "report"];
+const ELSEWHERE: [&str; 12] = [
+    "worlds",
+    "run",
+    "controller",
+    "plant",
+    "rearm",
+    "timing",
+    "faults",
+    "tables",
+    "replay",
+    "board",
+    "export",
+    "report",
+];
 
 /// Options of the discretization that studies do not take.
 const VARIED: [&str; 4] = ["--integration", "--support", "--basis", "--tolerance"];

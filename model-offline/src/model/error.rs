@@ -77,8 +77,8 @@ pub enum ModelError {
     RelaxesHeldWeakly,
     /// What is asked for is not known of a needle that slips.
     #[error(
-        "this needle slips (mechanics = \"shaft\"), and placements, tables and simulations are of a contact that moves with the \
-         needle so far: use `model-offline solve`, or mechanics = \"patch\""
+        "this needle slips (mechanics = \"shaft\"), and placements, studies and reduced models are of a contact that moves with \
+         the needle: use mechanics = \"patch\"; `solve`, `table`, `compare` and `host-sim run` take the needle as it is"
     )]
     NeedleSlips,
     /// A law that was changed on the way is none.

@@ -32,7 +32,7 @@ pub struct PathOptions {
 impl PathOptions {
     /// For an insertion of so many seconds.
     pub fn new(duration: f64) -> Self {
-        Self { duration, steps: 110, steered: true, trials: 4, threads: 1 }
+        Self { duration, steps: 110, steered: true, trials: 6, threads: 1 }
     }
 }
 
@@ -71,6 +71,9 @@ pub struct AlongPath {
     /// Largest distance from the path that errors were learnt at, length.
     reach: f64,
 }
+
+/// The worst of a few trials is not the worst there is.
+const UNSEEN: f64 = 3.0;
 
 /// The direction J⁻¹n in which a paddle moves the target across the needle alone.
 fn across(rest: &Knot, normal: Vector2<f64>) -> Option<Vector2<f64>> {
@@ -156,8 +159,7 @@ impl AlongPath {
         let square = apart
             .map(|(distance, error)| beyond(*error, still + linear * distance) / distance.powi(2))
             .fold(0.0, f64::max);
-        // Half as much again: the worst of a few trials is not the worst there is.
-        self.growth = ErrorGrowth { still, linear: 1.5 * linear, square: 1.5 * square };
+        self.growth = ErrorGrowth { still, linear: UNSEEN * linear, square: UNSEEN * square };
         self.reach = far;
         Ok(())
     }

@@ -62,6 +62,31 @@ impl Scene {
         scene
     }
 
+    /// The simplest model of the scene with these effects alone: with the scene's own numbers where it has them.
+    #[must_use]
+    pub fn with_only(&self, effects: &[Effect]) -> Self {
+        let mut scene = self.without_a_past();
+        for effect in effects {
+            let with = self.with_effect(*effect);
+            match effect {
+                Effect::Shaft => {
+                    (scene.needle.shaft, scene.needle.deflection) = (with.needle.shaft, with.needle.deflection);
+                    for (own, with) in scene.inclusions.iter_mut().zip(&with.inclusions) {
+                        own.resistance = with.resistance;
+                    }
+                }
+                Effect::Creep => {
+                    scene.material = with.material;
+                    for (own, with) in scene.inclusions.iter_mut().zip(with.inclusions) {
+                        own.material = with.material;
+                    }
+                }
+                Effect::Breathing => scene.motion = with.motion,
+            }
+        }
+        scene
+    }
+
     /// Has the needle go at this speed, length per second.
     pub fn set_speed(&mut self, speed: f64) {
         self.needle.speed = speed;

@@ -1,7 +1,8 @@
 //! Studies of the methods themselves: which is fast, which is accurate, and where each stops working.
 
 pub mod candidates;
-pub mod extent;
+pub mod effects;
+mod extent;
 pub mod fit;
 pub mod insertion;
 mod looks;
