@@ -180,6 +180,23 @@ mod tests {
         assert_eq!((underway(0.1), underway(-0.1)), (goal, Vector2::new(0.4, 0.0)));
     }
 
+    #[test]
+    fn a_paddle_that_one_tick_brings_there_is_not_on_its_way() {
+        let (zero, correction) = (Vector2::zeros(), Vector2::new(0.3, 0.0));
+        // One tick goes 0.1.
+        for (goal, taken) in [(0.099, 0.3), (0.101, 0.0)] {
+            let integral = LIMITS.integrate(&Vector2::new(goal, 0.0), &correction, &zero, &zero);
+            assert!((integral.x - (goal + taken)).abs() < 1e-15, "{goal}: {integral}");
+        }
+    }
+
+    #[test]
+    fn at_the_boundary_feed_forward_and_integral_are_the_position_together() {
+        let feed_forward = Vector2::new(0.0, 0.6);
+        let integral = LIMITS.integrate(&Vector2::zeros(), &Vector2::new(8.0, 5.4), &feed_forward, &feed_forward);
+        assert!((integral - Vector2::new(0.8, 0.0)).norm() < 1e-15, "{integral}");
+    }
+
     proptest! {
         #[test]
         fn what_is_cut_differs_and_the_rest_is_left_alone(angle in 0.0..6.3f64, limit in 0.1..10.0f64, ulps in -9..9i32) {

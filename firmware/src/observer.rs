@@ -270,6 +270,38 @@ mod tests {
         assert!(followed < 0.5 && wider < 1.5, "{followed} {wider}");
     }
 
+    #[test]
+    fn surprise_widens_the_slope_up_to_eight_times_what_was_thought() {
+        for (part, grows) in [(63.9, true), (64.0, false), (64.1, false)] {
+            let slope_variance = part * BELIEF.slope;
+            let mut observer = Observer {
+                surprise: 100.0,
+                level_variance: 2.0,
+                slope_variance,
+                covariance: 1e-3,
+                ..Observer::default()
+            };
+            observer.widen_if_surprised(&BELIEF, 0.0);
+            let growth = if grows { SURPRISE_GROWTH } else { 1.0 };
+            assert_eq!(observer.level_variance, 2.0 * SURPRISE_GROWTH);
+            assert_eq!(
+                (observer.slope_variance, observer.covariance),
+                (growth * slope_variance, growth * 1e-3),
+                "{part}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_gain_that_the_loop_does_not_bear_is_lowered_for_level_and_slope_alike() {
+        let belief = Belief { max_gain: 0.25, ..BELIEF };
+        // Kalman's: 0.48/(0.48 + 0.16) = 3/4 and 0.08/(0.48 + 0.16) = 1/8.
+        let observer = Observer { level_variance: 0.48, covariance: 0.08, ..Observer::default() };
+        let (level, slope) = observer.gains(&belief, 0.0);
+        assert_eq!(level, 0.25);
+        assert!((slope - 1.0 / 24.0).abs() < 1e-15, "{slope}");
+    }
+
     /// After a paddle has been placed by somebody, the estimate begins with what they claim, and lets go of it.
     #[test]
     fn a_claim_holds_until_the_sensor_speaks() {

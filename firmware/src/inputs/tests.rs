@@ -9,7 +9,7 @@ use super::sample::Measurement;
 use super::stream::StreamGate;
 use crate::contract::Faults;
 use crate::contract::example::table;
-use crate::detection::{NEEDLE_WINDOW_NS, RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
+use crate::detection::{NEEDLE_JUMP_FLOOR, NEEDLE_WINDOW_NS, RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
 use crate::settings::{Runtime, Settings};
 
 const MS: u64 = 1_000_000;
@@ -198,6 +198,8 @@ fn values_are_normal_and_within_the_geometry() {
     assert_eq!((needle(-0.0999, 0.0), needle(-0.1001, 0.0)), (Ok(()), Err(Discard::OutOfRange)));
     assert_eq!((needle(0.1999, 0.0), needle(0.2001, 0.0)), (Ok(()), Err(Discard::OutOfRange)));
     assert_eq!((needle(0.0, 0.999), needle(0.0, -1.001)), (Ok(()), Err(Discard::OutOfRange)));
+    let fastest = runtime.plausible_speed;
+    assert_eq!((needle(0.0, fastest), needle(0.0, -fastest)), (Ok(()), Ok(())), "the limit itself is plausible");
 }
 
 #[test]
@@ -222,6 +224,20 @@ fn a_depth_jumps_by_what_speed_and_resolution_explain() {
             assert!(!refused(before, velocity, ticks, sign * jump * 0.999), "{before} {velocity} {ticks}");
         }
     }
+}
+
+#[test]
+fn a_depth_may_jump_by_the_limit_itself() {
+    let table = table();
+    let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+    // Nothing but the resolution is left, so that the limit is known to the last bit.
+    let resting = Runtime { needle_speed: 0.0, ..runtime };
+    let most = NEEDLE_JUMP_FLOOR * resting.depth_range();
+    let is_jump = |depth: f64| {
+        let (now, then) = (at(990 * MS, [depth, 0.0]), at(989 * MS, [0.0; 2]));
+        checks_of(&resting).needle(&now, Some(&then), &NeedleMonitor::default()) == Err(Discard::Innovation)
+    };
+    assert_eq!((is_jump(most), is_jump(most.next_up())), (false, true));
 }
 
 /// The window of depth against velocity begins with the sample that opens it.

@@ -303,6 +303,16 @@ mod tests {
     }
 
     #[test]
+    fn every_late_frame_is_counted() {
+        let frames = frames(6);
+        for late in 0..5 {
+            let order = [0, 5].into_iter().chain(1..=late);
+            let (_, ledger) = read(order.flat_map(|i| frames[i].clone()));
+            assert_eq!(ledger.late(), late as u64);
+        }
+    }
+
+    #[test]
     fn a_sender_that_starts_anew_is_heard() {
         let (numbers, ledger) = read(frames(3).concat().into_iter().chain(frames(2).concat()));
         assert_eq!(numbers, [0, 1, 2, 0, 1]);

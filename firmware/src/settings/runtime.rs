@@ -218,6 +218,16 @@ mod tests {
         assert_eq!((runtime.delay_samples, runtime.gain, runtime.paddle_index), (1, 0.25, 3));
     }
 
+    #[cfg(feature = "switches")]
+    #[test]
+    fn codes_of_monitors_that_are_off_are_not_seen_and_all_others_are() {
+        let runtime = Runtime::new(&table(), &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+        let faults = Faults::FROZEN | Faults::INNOVATION;
+        assert_eq!(runtime.seen(faults), faults);
+        let switched = Runtime { off: Faults::FROZEN | Faults::OVERRUN, ..runtime };
+        assert_eq!(switched.seen(faults), Faults::INNOVATION);
+    }
+
     #[test]
     fn settings_are_refused_at_their_limits() {
         let good = Settings::new(MS, 20 * MS, 20 * MS);

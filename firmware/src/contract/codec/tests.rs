@@ -93,6 +93,9 @@ fn every_truncation_and_any_tail_is_refused() {
     for length in 0..bytes.len() {
         assert!(decode::<f64, 2>(&bytes[..length]).is_err(), "length {length}");
     }
+    for missing in [1, 7, bytes.len() - HEADER_BYTES - CHECKSUM_BYTES] {
+        assert_eq!(refusal(&bytes[..bytes.len() - missing]), TableError::Truncated { missing });
+    }
     let mut longer = bytes.clone();
     longer.push(0);
     assert_eq!(refusal(&longer), TableError::TrailingBytes { extra: 1 });

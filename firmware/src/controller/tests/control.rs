@@ -1,6 +1,9 @@
 //! How well the target is held, and where the loop stops being stable.
 
 use super::*;
+use crate::controller::feedback::Setting;
+use crate::controller::state::Underway;
+use crate::inputs::sample::Measurement;
 use crate::law::Feedback;
 
 #[test]
@@ -128,6 +131,81 @@ fn a_sign_error_is_found_before_saturation() {
         assert!(closed.plant.tick < 5000, "never found");
     }
     assert!(closed.state.faults().contains(Faults::DIVERGENCE) && !limited);
+}
+
+/// What saturation swallows proves nothing about the sign of the plant.
+#[test]
+fn monitors_hear_of_corrections_that_act_by_more_than_half() {
+    let table = table();
+    let controller = Controller::new(&table, &Settings { feedback: Feedback::Integral, ..settings() }).unwrap();
+    // A quarter of the error is to be removed.
+    let (error, size) = (-4e-3, 1e-3);
+    let correction = jacobian().try_inverse().unwrap() * Vector2::new(size, 0.0);
+    let sample = Measurement { sequence: 0, time_ns: 0, values: [error, 0.0] };
+    for (room, heard) in [(2.0, true), (0.6, true), (0.4, false), (0.0, false)] {
+        let previous = correction.normalize() * 0.05 - correction * room;
+        let state = State { integral: Some(previous), ..State::new() };
+        let setting = Setting {
+            time_ns: 0,
+            location: table.locate(0.0).unwrap(),
+            feed_forward: Vector2::zeros(),
+            previous,
+            limits: controller.runtime.limits,
+        };
+        let found = controller.integrate(&state, Some(sample), &setting).correction;
+        assert_eq!(found.map(|found| (found.error, found.size)), heard.then_some((error, size)), "room for {room}");
+    }
+}
+
+/// The table's path where the needle will be once the command acts, and what the feedback adds to it.
+#[test]
+fn a_command_is_the_path_ahead_of_the_needle_and_the_feedback() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings { actuator_delay_ns: 3 * MS, ..settings() });
+    assert_eq!(closed.state.added(), None);
+    closed.plant.push = 0.03;
+    closed.run(1000);
+    let [depth, velocity] = closed.state.needle.accepted.unwrap().values;
+    for silence in 1..=4 {
+        let command = closed.tick(|inputs| inputs.needle = None);
+        assert!(!closed.state.faults().contains(Faults::RATE_LIMITED));
+        let ahead = depth + velocity * 1e-3 * f64::from(silence + 3);
+        let expected = table.knots[0].paddle_path_slope * ahead + Vector2::from(closed.state.added().unwrap());
+        let off = (Vector2::from(command.displacement) - expected).norm();
+        assert!(off < 1e-15, "{silence} ticks after the last sample: {off}");
+    }
+}
+
+#[test]
+fn a_motion_at_full_rate_is_one_as_long_as_no_tick_is_without_it() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.plant.speed = 0.0;
+    closed.plant.offset = 8e-3;
+    let (mut begun, mut longest) = (None, 0);
+    for tick in 0..1000 {
+        closed.tick(|_| {});
+        if !closed.state.faults().contains(Faults::RATE_LIMITED) {
+            begun = None;
+            continue;
+        }
+        let since = *begun.get_or_insert(tick);
+        let underway = closed.state.underway.unwrap();
+        // Its last step shows after a tick and the delay of the actuator, which is as long.
+        assert_eq!((underway.since_ns, underway.until_ns), (since * MS, (tick + 2) * MS));
+        longest = longest.max(tick - since);
+    }
+    assert!(longest > 10, "{longest}");
+}
+
+#[test]
+fn a_motion_explains_corrections_that_were_measured_in_it_and_ask_for_more_of_it() {
+    let motion = Underway { since_ns: 10, until_ns: 20, step: Vector2::new(1.0, 0.0) };
+    let more = Vector2::new(0.5, -3.0);
+    for (time_ns, explained) in [(9, false), (10, false), (11, true), (19, true), (20, false), (21, false)] {
+        assert_eq!(motion.explains(time_ns, &more), explained, "{time_ns}");
+    }
+    assert!(!motion.explains(15, &-more) && !motion.explains(15, &Vector2::new(0.0, 1.0)));
 }
 
 /// The ways of the paddle that the gate for jumps of the target allows for.

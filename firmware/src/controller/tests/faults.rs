@@ -37,7 +37,9 @@ fn the_ends_of_the_table_are_still_inside_of_it() {
 #[test]
 fn ages_lead_to_hold_and_safe_and_safe_needs_rearming() {
     let table = table();
-    for stream in 0..3 {
+    // Silent ticks before HOLD and before SAFE. On the first one the last sample is 1 ms old, of the target 40 ms; limits
+    // are 5 and 250 ms, for the target 80 and 320 ms.
+    for (stream, to_hold, to_safe) in [(0, 5, 250), (1, 41, 281), (2, 5, 250)] {
         let silence = |inputs: &mut Inputs| match stream {
             0 => inputs.needle = None,
             1 => inputs.target = None,
@@ -47,8 +49,8 @@ fn ages_lead_to_hold_and_safe_and_safe_needs_rearming() {
         closed.run(1000);
         let held = (0..200).find(|_| closed.tick(silence).state == Mode::Hold as u32).unwrap();
         let position = closed.last.unwrap().displacement;
-        assert!(held <= 100, "stream {stream}: {held}");
-        closed.until_safe(silence).unwrap();
+        let safe = held + 1 + closed.until_safe(silence).unwrap();
+        assert_eq!((held, safe), (to_hold, to_safe), "stream {stream}");
         closed.run(100);
         assert_eq!(closed.state.mode(), Mode::Safe);
         assert_eq!(closed.last.unwrap().displacement, position);
@@ -158,6 +160,44 @@ fn lost_target_holds_and_the_return_keeps_the_rate() {
         closed.tick(hide);
     }
     assert_eq!(closed.state.mode(), Mode::Safe);
+}
+
+#[test]
+fn a_lost_target_is_lost_until_it_is_seen_again() {
+    let table = table();
+    let mut closed = Loop::new(&table, &settings());
+    closed.run(1000);
+    for tick in 1000..1060 {
+        closed.tick(|inputs| match (tick, &mut inputs.target) {
+            (1000, Some(target)) => target.flags = 0,
+            // One that is refused shows nothing.
+            (1020, Some(target)) => target.displacement[0] = f64::NAN,
+            _ => {}
+        });
+        assert_eq!(closed.state.faults().contains(Faults::TARGET_LOST), tick < 1040, "{tick}");
+    }
+}
+
+/// Otherwise every right one after it would be a jump.
+#[test]
+fn a_wrong_first_sample_from_long_ago_is_forgotten_before_the_start() {
+    let table = table();
+    for stream in 0..2 {
+        let mut closed = Loop::new(&table, &settings());
+        closed.plant.tick = 20_000;
+        for _ in 0..100 {
+            closed.tick(|inputs| match (stream, &mut inputs.needle, &mut inputs.target) {
+                (0, Some(needle), _) if needle.sequence == 0 => {
+                    (needle.time_ns, needle.depth) = (needle.time_ns - 1000 * MS, 0.1);
+                }
+                (1, _, Some(target)) if target.sequence == 0 => {
+                    (target.time_ns, target.displacement) = (target.time_ns - 1000 * MS, [0.02, 0.0]);
+                }
+                _ => {}
+            });
+        }
+        assert_eq!(closed.state.mode(), Mode::Run, "stream {stream}: {}", closed.state.faults());
+    }
 }
 
 #[test]

@@ -204,6 +204,8 @@ fn divergence_needs_growth_and_corrections() {
     assert_eq!(trips(&[start, 1.6 * floor, 1.9 * floor, 2.0 * start], 0.0), None, "exactly twice its start");
     assert_eq!(trips(&[0.5 * floor, 0.9 * floor, 1.2 * floor, 1.9 * floor], 0.0), None, "less than twice the floor");
     assert_eq!(trips(&[1.1 * floor, 1.0 * floor, 2.3 * floor], 0.0), None, "a smaller one begins a new window");
+    let again = [2.0 * floor, 1.1 * floor, 1.6 * floor, 1.9 * floor, 2.3 * floor];
+    assert_eq!(trips(&again, 0.0), Some(4), "twice the start of the new window");
     assert_eq!(trips(&[1.1 * floor, 2.3 * floor], 0.0), None, "the corrections have not removed the floor yet");
     // A window ends after 3/g = 12 samples: slow growth is drift.
     let slow: Vec<f64> = (0..60).map(|i| floor * 1.02f64.powi(i)).collect();

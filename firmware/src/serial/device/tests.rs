@@ -289,6 +289,18 @@ fn no_request_ends_or_resets_a_run_in_run() {
     }
 }
 
+/// Before a run as in it: an old frame sent again.
+#[test]
+fn frame_0_with_anything_but_a_hello_asks_for_nothing() {
+    for request in [Request::Account, Request::Rearm, Request::TestWatchdog] {
+        let frame = FrameWriter::new().encode(&request).unwrap().to_vec();
+        let mut bench = Bench { to_device: frame.into(), ..Bench::default() };
+        let replies = answers_of::<f64>(&mut bench);
+        assert!(!bench.hung, "the proof test of the watchdog ran");
+        assert!(matches!(replies[..], [Reply::Hello(_)]), "{request:?}: {replies:?}");
+    }
+}
+
 /// A step that was asked for too late is not made: its time has passed.
 #[test]
 fn a_request_to_step_that_comes_after_the_next_frame_is_no_step() {
