@@ -19,7 +19,7 @@ use crate::runtime::signals;
 use crate::world::World;
 use crate::world::loop_settings::LoopSettings;
 use crate::world::simulation::Simulation;
-use crate::world::tissue::{Attachment, Reductions};
+use crate::world::tissue::{AttachedPaddle, Reductions};
 
 /// Effects of a world: all combinations are tried.
 const EFFECTS: [Effect; 3] = [Effect::Shaft, Effect::Creep, Effect::Breathing];
@@ -160,7 +160,7 @@ impl Basis<'_> {
         let (model, _) = discretise(&scene)?;
         let reductions = Reductions::default();
         let [fixture, dynamic] = self.paddles;
-        let uncontrolled = |paddle| insertion(&model, &simulation, paddle, None, &reductions).map(|run| run.errors);
+        let uncontrolled = |paddle| insertion(&model, &simulation, paddle, false, &reductions).map(|run| run.errors);
         let table = match effects.iter().any(|effect| *effect != Effect::Breathing) {
             true => Some(build(&model, dynamic, &options(&simulation))),
             false => None,
@@ -180,7 +180,13 @@ impl Basis<'_> {
             })
         });
         let sensors = sensors.collect::<Result<_, SimError>>()?;
-        Ok(WorldRow { effects, none: uncontrolled(None)?, fixture: uncontrolled(Some(fixture))?, sensors, no_table })
+        Ok(WorldRow {
+            effects,
+            none: uncontrolled(AttachedPaddle::None)?,
+            fixture: uncontrolled(AttachedPaddle::Held(fixture))?,
+            sensors,
+            no_table,
+        })
     }
 
     fn controlled(
@@ -198,7 +204,7 @@ impl Basis<'_> {
                 loop_settings: LoopSettings::of(sensor),
                 ..Simulation::new(model.scene())
             };
-            insertion(model, &simulation, Some(table.paddle.index), Some((table, seed == 1)), reductions)
+            insertion(model, &simulation, AttachedPaddle::Steered(table), seed == 1, reductions)
         });
         let runs: Vec<Run> = runs.collect::<Result<_, SimError>>()?;
         Ok(Controlled {
@@ -219,20 +225,21 @@ struct Run {
     tissue_error: Option<f64>,
 }
 
-/// One insertion: with a controller where there is a table, whose tissue is held against the full model where that is asked
-/// for; else with a paddle that is held, or none.
+/// One insertion: with a controller where the paddle is steered. The tissue is held against the full model where that is
+/// asked for.
 fn insertion(
     model: &TissueModel,
     simulation: &Simulation,
-    paddle: Option<u32>,
-    table: Option<(&Table<f64, 2>, bool)>,
+    paddle: AttachedPaddle<'_>,
+    is_verified: bool,
     reductions: &Reductions,
 ) -> Result<Run, SimError> {
     let settings = simulation.loop_settings.settings(simulation.depth);
-    let attachment = if table.is_some() { Attachment::moved } else { Attachment::held };
-    let plan = table.map(|(table, _)| table);
-    let mut world = World::sharing(model, paddle, attachment, simulation, plan, reductions)?;
-    let controller = plan.map(|table| Controller::new(table, &settings)).transpose()?;
+    let mut world = World::sharing(model, paddle, simulation, reductions)?;
+    let controller = match paddle {
+        AttachedPaddle::Steered(table) => Some(Controller::new(table, &settings)?),
+        _ => None,
+    };
     let mut state = State::new();
     let mut command = None;
     let normal = model.scene().needle.orthogonal();
@@ -253,10 +260,7 @@ fn insertion(
             in_run += u64::from(command.as_ref().is_some_and(|command| command.state == Mode::Run as u32));
         }
     }
-    let account = match table {
-        Some((_, true)) => Some(world.plant_account()),
-        _ => None,
-    };
+    let account = is_verified.then(|| world.plant_account());
     let estimate = world.tissue.largest_estimate();
     Ok(Run {
         errors: Errors { peak, rms: (squares / ticks.max(1) as f64).sqrt() },

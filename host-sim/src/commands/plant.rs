@@ -13,7 +13,7 @@ use host_sim::runtime::plant::rehearsal::world_in_time;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::World;
-use host_sim::world::tissue::Reductions;
+use host_sim::world::tissue::{AttachedPaddle, Reductions};
 use model_offline::output::table_text::hex;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::TissueVariant;
@@ -69,7 +69,7 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     let (model, paddle) = signals::ends_at_once(|| model_with_paddle(&scene, args.paddle))?;
     let world = signals::ends_at_once(|| match args.mode {
         RunMode::Lockstep => World::new(&model, Some(paddle), &simulation),
-        RunMode::FreeRun => world_in_time(&model, Some(paddle), &simulation, None, &Reductions::default()),
+        RunMode::FreeRun => world_in_time(&model, AttachedPaddle::Moved(paddle), &simulation, &Reductions::default()),
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let visit = Visit {

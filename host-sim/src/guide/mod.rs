@@ -1,4 +1,4 @@
-//! Guides: run simulations, check timing, inject faults, run the controller on a microcontroller, and what may be relied on.
+//! Guides: run simulations, what is in the simulated world, check timing, inject faults, run the controller on a microcontroller, and what may be relied on.
 //!
 //! For whoever precomputes tables, and for how it all works with the equations, see [`model_offline::guide`]. Every command
 //! line on these pages is run by `cargo test -p host-sim --test documentation`, but for those marked in their source.
@@ -7,6 +7,9 @@
 
 #[doc = include_str!("run_simulations.md")]
 pub mod run_simulations {}
+
+#[doc = include_str!("worlds.md")]
+pub mod worlds {}
 
 #[doc = include_str!("check_timing.md")]
 pub mod check_timing {}

@@ -15,7 +15,7 @@ pub mod simulation;
 pub mod tissue;
 pub mod truth;
 
-use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
+use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::{Inputs, Mode};
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
@@ -25,7 +25,7 @@ use self::error::WorldError;
 use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
-use self::tissue::{Attachment, Insertion, PaddlePlan, PlantAccount, Reductions, TissuePlant, TissueResponse};
+use self::tissue::{AttachedPaddle, Insertion, PlantAccount, Reductions, TissuePlant, TissueResponse};
 use self::truth::Truth;
 
 /// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
@@ -60,38 +60,37 @@ impl<'m> World<TissuePlant<'m>> {
     /// [`WorldError`].
     pub fn new(model: &'m TissueModel, paddle_index: Option<u32>, simulation: &Simulation) -> Result<Self, WorldError> {
         let reductions = Reductions::default();
-        Self::sharing(model, paddle_index, Attachment::moved, simulation, None, &reductions)
+        let paddle = paddle_index.map_or(AttachedPaddle::None, AttachedPaddle::Moved);
+        Self::sharing(model, paddle, simulation, &reductions)
     }
 
-    /// The same with a paddle that is moved or held, as a table plans it where there is one, and reduced models that others of this tissue have asked for, or will.
+    /// The same with what becomes of the paddle, and with reduced models that others of this tissue have asked for, or will.
     ///
     /// # Errors
     /// [`WorldError`].
     pub fn sharing(
         model: &'m TissueModel,
-        paddle_index: Option<u32>,
-        attachment: fn(Option<usize>) -> Attachment,
+        paddle: AttachedPaddle<'_>,
         simulation: &Simulation,
-        plan: Option<&Table<f64, 2>>,
         reductions: &Reductions,
     ) -> Result<Self, WorldError> {
-        let position =
-            paddle_index.map(|index| model.paddle_position(index).ok_or(WorldError::NoPaddle { index })).transpose()?;
+        let place = |index: u32| model.paddle_position(index).ok_or(WorldError::NoPaddle { index });
+        let attachment = paddle.attachment(paddle.index().map(place).transpose()?);
         let tissue = match model.scene().has_a_past() {
             true => {
                 let insertion = Insertion {
                     trajectory: NeedleTrajectory::new(simulation.depth, simulation.insertion_s),
                     duration_s: simulation.duration_s,
-                    plan: plan.map(PaddlePlan::of).unwrap_or_default(),
+                    plan: paddle.plan(),
                 };
-                TissuePlant::along(model, attachment(position), simulation.plant, insertion, reductions)?
+                TissuePlant::along(model, attachment, simulation.plant, insertion, reductions)?
             }
             false => {
                 let choice = simulation.plant.unwrap_or_default();
-                TissuePlant::sharing(model, attachment(position), choice, reductions)?
+                TissuePlant::sharing(model, attachment, choice, reductions)?
             }
         };
-        Ok(Self::simulated(tissue, paddle_index.unwrap_or(0), simulation))
+        Ok(Self::simulated(tissue, paddle.index().unwrap_or(0), simulation))
     }
 
     /// Which model answered for the tissue, and how well.

@@ -150,6 +150,44 @@ pub struct Insertion {
     pub plan: PaddlePlan,
 }
 
+/// What is attached to the tissue of a world, and what becomes of it.
+#[derive(Clone, Copy, Debug)]
+pub enum AttachedPaddle<'t> {
+    /// Nothing.
+    None,
+    /// The paddle of this index, which stays where it rests.
+    Held(u32),
+    /// The paddle of this index, which moves nobody knows where to.
+    Moved(u32),
+    /// A table's paddle, which moves as it plans, and as a controller corrects it.
+    Steered(&'t Table<f64, 2>),
+}
+
+impl AttachedPaddle<'_> {
+    /// Its index.
+    pub fn index(&self) -> Option<u32> {
+        match self {
+            Self::None => None,
+            Self::Held(index) | Self::Moved(index) => Some(*index),
+            Self::Steered(table) => Some(table.paddle.index),
+        }
+    }
+
+    pub(super) fn attachment(&self, position: Option<usize>) -> Attachment {
+        match self {
+            Self::None | Self::Held(_) => Attachment::held(position),
+            Self::Moved(_) | Self::Steered(_) => Attachment::moved(position),
+        }
+    }
+
+    pub(super) fn plan(&self) -> PaddlePlan {
+        match self {
+            Self::Steered(table) => PaddlePlan::of(table),
+            _ => PaddlePlan::default(),
+        }
+    }
+}
+
 /// Where a paddle is planned to be along the depth; nowhere else than at rest by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PaddlePlan(Vec<(f64, Vector2<f64>)>);

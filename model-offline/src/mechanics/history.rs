@@ -5,7 +5,6 @@
 //! and that does not depend on the strain (Simo & Hughes, Computational Inelasticity, 1998, section 10.3). A step is therefore an
 //! equilibrium like any other, of the energy `γ W + R : E`: line search and Cholesky factors mean what they always do.
 
-use super::assembly::AssemblyState;
 use super::stabilisation::Stabilisation;
 use super::tissue::Tissue;
 use crate::discretization::Quadrature;
@@ -160,13 +159,14 @@ impl<const D: usize> History<D> {
         Prestress { points, nodal }
     }
 
-    /// Remembers the end of a step of so many seconds.
-    pub fn remember(&mut self, elapsed: f64, state: &AssemblyState<D>, coefficients: &[f64]) {
+    /// Remembers the end of a step of so many seconds, by the displacement gradients of all integration points and the
+    /// coefficients.
+    pub fn remember(&mut self, elapsed: f64, gradients: &[Matrix<D>], coefficients: &[f64]) {
         for of in &mut self.relaxing {
             let Some(relaxation) = of.law.relaxation() else { continue };
             let law = &of.law;
             let stress = |q: u32| {
-                let h = &state.displacement_gradients()[q as usize];
+                let h = &gradients[q as usize];
                 if law.is_linear() { law.respond(h).pk1_stress } else { law.pk2_stress(h) }
             };
             let elastic: Vec<Matrix<D>> = of.points.iter().map(|&(q, _)| stress(q)).collect();

@@ -167,7 +167,7 @@ impl SlippingNeedle<'_> {
             return Ok((engaged, trial));
         }
         let enough = 1e-6 * self.model.spacing();
-        let mut engaged = (self.engaged + depth - self.pose.depth).max(0.0);
+        let mut engaged = (self.engaged + self.tip_rate * (depth - self.pose.depth)).max(0.0);
         let mut last: Option<(f64, f64)> = None;
         // Between these the root lies: the tissue jumps a little where a station is passed, maybe over it.
         let (mut behind, mut beyond) = ((0.0, None), (f64::INFINITY, None));
@@ -184,6 +184,11 @@ impl SlippingNeedle<'_> {
             } else {
                 (beyond, behind) = (halved(beyond, before.is_some_and(|before| before <= 0.0)), (engaged, Some(off)));
             }
+            if let Some((there, then)) = last
+                && engaged != there
+            {
+                self.tip_slope = ((off - then) / (engaged - there)).clamp(0.2, 50.0);
+            }
             let narrow = beyond.0 - behind.0 <= enough;
             if off.abs() <= enough || narrow && off.abs() <= JUMP * self.model.spacing() {
                 return Ok((engaged, trial));
@@ -191,8 +196,8 @@ impl SlippingNeedle<'_> {
             let next = match (behind, beyond) {
                 ((low, Some(below)), (high, Some(above))) => low + (high - low) * below / (below - above),
                 _ => {
-                    let slope = last.map_or(1.0, |(there, then)| ((off - then) / (engaged - there)).clamp(0.2, 5.0));
-                    engaged - off / slope
+                    let found = |(there, then): (f64, f64)| ((off - then) / (engaged - there)).clamp(0.2, 50.0);
+                    engaged - off / last.map_or(self.tip_slope, found)
                 }
             };
             last = Some((engaged, off));
@@ -226,6 +231,9 @@ impl SlippingNeedle<'_> {
         let gives = self.energy.friction < rounding || self.energy.cutting < rounding;
         if is_in && (gives || depth <= tip_displacement) {
             return Err(NeedleError::Outrun { depth });
+        }
+        if depth != self.pose.depth {
+            self.tip_rate = ((engaged - self.engaged) / (depth - self.pose.depth)).clamp(0.0, 2.0);
         }
         self.engaged = engaged;
         for contact in &contacts {

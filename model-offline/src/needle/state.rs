@@ -63,6 +63,9 @@ pub struct SlippingNeedle<'m> {
     pub(super) stations: Vec<Station>,
     pub(super) tip: Option<Station>,
     pub(super) tip_force: f64,
+    /// How the last increment's tip went: arc length per depth, and how the tissue's place at the tip changes with it.
+    pub(super) tip_rate: f64,
+    pub(super) tip_slope: f64,
     /// Whether the tip neither cuts nor is withdrawn: its force is what holds it where it is.
     pub(super) tip_holds: bool,
     /// Forces of the paddle and of the base on the tissue at the end of the last increment.
@@ -99,6 +102,8 @@ impl<'m> SlippingNeedle<'m> {
             stations: Vec::new(),
             tip: None,
             tip_force: 0.0,
+            tip_rate: 1.0,
+            tip_slope: 1.0,
             tip_holds: false,
             last_forces: [Vector2::zeros(); 2],
             energy: EnergyAccount::default(),

@@ -27,6 +27,8 @@ pub(super) fn knots(
     let (normal, depth) = (scene.needle.orthogonal(), scene.needle.depth);
     let interval = depth / (count - 1) as f64;
     let seconds = interval / scene.needle.speed / STEPS as f64;
+    let index = scene.paddles[position].index;
+    let steering = Steering { seconds, normal, enough: ENOUGH * depth, index };
     let mut still = Course::at_rest(model, Some(position))?;
     let mut steered = still.clone();
     let mut knots: heapless::Vec<Knot<f64, 2>, MAX_KNOTS> = heapless::Vec::new();
@@ -38,8 +40,7 @@ pub(super) fn knots(
                 let share = step as f64 / STEPS as f64;
                 let at = if k + 1 == count && step == STEPS { depth } else { interval * ((k - 1) as f64 + share) };
                 still.take_in(Pose { depth: at, ..Pose::default() }, seconds)?;
-                ahead =
-                    steer(&mut steered, at, seconds, ahead, normal * (ENOUGH * depth), scene.paddles[position].index)?;
+                ahead = steering.step(&mut steered, at, ahead)?;
             }
             let jacobian = steered.actuation_jacobian()?;
             Ok::<_, TableBuildError>(Knot {
@@ -54,7 +55,7 @@ pub(super) fn knots(
         })();
         match outcome {
             Ok(knot) => {
-                check(&knot, scene.paddles[position].index, scene.actuator.max_displacement)?;
+                check(&knot, index, scene.actuator.max_displacement)?;
                 // Capacity was checked before.
                 let _ = knots.push(knot);
             }
@@ -66,38 +67,43 @@ pub(super) fn knots(
     Ok(knots)
 }
 
-/// One step with the paddle where the target is on the needle's line after it; the paddle's travel.
-fn steer(
-    course: &mut Course<'_>,
-    depth: f64,
+/// How a paddle is steered.
+struct Steering {
+    /// What a step takes, s.
     seconds: f64,
-    ahead: Vector2<f64>,
-    enough: Vector2<f64>,
+    normal: Vector2<f64>,
+    /// Orthogonal error that may be left, length.
+    enough: f64,
+    /// The paddle, as the scene calls it.
     index: u32,
-) -> Result<Vector2<f64>, TableBuildError> {
-    let before = course.clone();
-    let from = before.pose().paddle;
-    let normal = enough.normalize();
-    let mut paddle = from + ahead;
-    let mut best = f64::INFINITY;
-    for _ in 0..ROUNDS {
-        let mut tried = before.clone();
-        tried.take_in(Pose { depth, paddle, ..Pose::default() }, seconds)?;
-        let error = normal.dot(&tried.target_displacement());
-        let done = error.abs() <= enough.norm() || error.abs() > 0.9 * best;
-        if error.abs() < best {
-            *course = tried;
-            best = error.abs();
+}
+
+impl Steering {
+    /// One step with the paddle where the target is on the needle's line after it; the paddle's travel.
+    fn step(&self, course: &mut Course<'_>, depth: f64, ahead: Vector2<f64>) -> Result<Vector2<f64>, TableBuildError> {
+        let before = course.clone();
+        let from = before.pose().paddle;
+        let mut paddle = from + ahead;
+        let mut best = f64::INFINITY;
+        for _ in 0..ROUNDS {
+            let mut tried = before.clone();
+            tried.take_in(Pose { depth, paddle, ..Pose::default() }, self.seconds)?;
+            let error = self.normal.dot(&tried.target_displacement());
+            let done = error.abs() <= self.enough || error.abs() > 0.9 * best;
+            if error.abs() < best {
+                *course = tried;
+                best = error.abs();
+            }
+            if done {
+                break;
+            }
+            let jacobian = course.actuation_jacobian()?;
+            let direction = best_direction(&jacobian, self.normal)
+                .map_err(|singular| ModelError::Uncontrollable { paddle: self.index, condition: singular.condition })?;
+            paddle -= direction * error;
         }
-        if done {
-            break;
-        }
-        let jacobian = course.actuation_jacobian()?;
-        let direction = best_direction(&jacobian, normal)
-            .map_err(|singular| ModelError::Uncontrollable { paddle: index, condition: singular.condition })?;
-        paddle -= direction * error;
+        Ok(course.pose().paddle - from)
     }
-    Ok(course.pose().paddle - from)
 }
 
 /// Slopes along the depth from the knots around.

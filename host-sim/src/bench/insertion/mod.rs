@@ -38,7 +38,7 @@ use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::World;
 use crate::world::simulation::Simulation;
-use crate::world::tissue::{Attachment, Reductions};
+use crate::world::tissue::{AttachedPaddle, Reductions};
 use crate::world::truth::Truth;
 use model_offline::output::table_text::hex;
 
@@ -183,7 +183,8 @@ impl<'a> SimulatedInsertion<'a> {
         let Self { model, simulation, label, reductions, extras, progress } = *self;
         let own = Reductions::default();
         let reductions = reductions.unwrap_or(&own);
-        let world = World::sharing(model, paddle, Attachment::held, simulation, None, reductions)?;
+        let world =
+            World::sharing(model, paddle.map_or(AttachedPaddle::None, AttachedPaddle::Held), simulation, reductions)?;
         let mut plant = PlantLoop::new(world, simulation);
         plant.world().start_needle(0);
         let period_ns = simulation.loop_settings.period_ns();
@@ -314,13 +315,12 @@ impl<'a> SimulatedInsertion<'a> {
     /// [`SimError`].
     pub(super) fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<'a>, SimError> {
         let Self { model, simulation, reductions, .. } = *self;
-        let paddle = Some(controller.table.paddle.index);
+        let paddle = AttachedPaddle::Steered(controller.table);
         let own = Reductions::default();
         let reductions = reductions.unwrap_or(&own);
-        let plan = Some(controller.table);
         let world = match controller.mode {
-            RunMode::Lockstep => World::sharing(model, paddle, Attachment::moved, simulation, plan, reductions)?,
-            RunMode::FreeRun => world_in_time(model, paddle, simulation, plan, reductions)?,
+            RunMode::Lockstep => World::sharing(model, paddle, simulation, reductions)?,
+            RunMode::FreeRun => world_in_time(model, paddle, simulation, reductions)?,
         };
         Ok(PlantLoop::new(world, simulation))
     }

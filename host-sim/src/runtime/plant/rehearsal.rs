@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use firmware::contract::Table;
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
@@ -10,7 +9,7 @@ use crate::world::World;
 use crate::world::error::WorldError;
 use crate::world::needle::NeedleTrajectory;
 use crate::world::simulation::Simulation;
-use crate::world::tissue::{Attachment, Reductions, TissuePlant, TissueResponse as _, WantedPlant};
+use crate::world::tissue::{AttachedPaddle, Reductions, TissuePlant, TissueResponse as _, WantedPlant};
 
 /// Steps that are timed.
 const STEPS: usize = 101;
@@ -49,13 +48,11 @@ impl Rehearsal {
 /// [`WorldError`]; [`WorldError::TooSlow`] when no model keeps the period.
 pub fn world_in_time<'m>(
     model: &'m TissueModel,
-    paddle_index: Option<u32>,
+    paddle: AttachedPaddle<'_>,
     simulation: &Simulation,
-    plan: Option<&Table<f64, 2>>,
     reductions: &Reductions,
 ) -> Result<World<TissuePlant<'m>>, WorldError> {
-    let at_rest =
-        |simulation: &Simulation| World::sharing(model, paddle_index, Attachment::moved, simulation, plan, reductions);
+    let at_rest = |simulation: &Simulation| World::sharing(model, paddle, simulation, reductions);
     let mut world = at_rest(simulation)?;
     world.tissue.solve_every_step()?;
     let full = rehearse(&mut world.tissue, simulation)?;
@@ -132,10 +129,11 @@ mod tests {
             Simulation { loop_settings, plant, ..Simulation::new(&scene) }
         };
         for plant in [None, Some(WantedPlant::Full)] {
-            let refused = world_in_time(&model, Some(2), &at(5e5, plant), None, &Reductions::default());
+            let refused = world_in_time(&model, AttachedPaddle::Moved(2), &at(5e5, plant), &Reductions::default());
             assert!(matches!(refused, Err(WorldError::TooSlow { .. })), "{plant:?}: {refused:?}");
         }
-        let mut world = world_in_time(&model, Some(2), &at(0.02, None), None, &Reductions::default()).unwrap();
+        let mut world =
+            world_in_time(&model, AttachedPaddle::Moved(2), &at(0.02, None), &Reductions::default()).unwrap();
         assert_eq!(world.plant_account(), PlantAccount::default(), "a rehearsal leaves no trace");
         assert!(world.advance(0, 0).unwrap().target.iter().all(|x| x.abs() < 1e-9), "at rest again");
     }

@@ -286,7 +286,7 @@ impl<const D: usize> Equilibrium<D> {
     /// Ends a step: the present state is what tissue that relaxes remembers.
     pub fn remember(&mut self) {
         if let Some(history) = &mut self.history {
-            history.remember(self.elapsed, &self.at.state, &self.at.coefficients);
+            history.remember(self.elapsed, self.at.state.displacement_gradients(), &self.at.coefficients);
         }
     }
 
