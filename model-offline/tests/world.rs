@@ -1,9 +1,10 @@
 //! Worlds that are not the controller's model: what their effects do, and what is reduced of them.
 
+use model_offline::material::Relaxation;
 use model_offline::model::{Pose, TissueModel};
-use model_offline::needle::Course;
+use model_offline::needle::{Course, SlippingNeedle};
 use model_offline::reduction::along_path::{AlongPath, PathOptions, along};
-use model_offline::scene::{Effect, Scene};
+use model_offline::scene::{Effect, Scene, Surge};
 use model_offline::study::effects::{Variation, compare};
 use model_offline::table::{TableOptions, build};
 use nalgebra::Vector2;
@@ -164,4 +165,101 @@ fn a_scene_needs_what_changes_its_answers() {
     let added = creep.added.unwrap();
     assert!(!creep.is_needed && added.orthogonal < 1e-6 && added.axial < 1e-6, "{creep:?}");
     assert!(added.base_force < -0.05, "{creep:?}");
+}
+
+/// Skin that is open from the first touch on: at depth 0 the needle holds the point that it touches.
+#[test]
+fn a_needle_through_open_skin_has_a_jacobian_from_the_start_and_a_table() {
+    for name in ["paper", "breast"] {
+        let mut scene = scene(name, &[Effect::Shaft]);
+        scene.needle.shaft.as_mut().unwrap().puncture_force = 0.0;
+        let model = TissueModel::new(&scene).unwrap();
+        let mut course = Course::at_rest(&model, Some(0)).unwrap();
+        let free = course.actuation_jacobian().unwrap();
+        let step = 1e-4 * scene.needle.depth;
+        for axis in 0..2 {
+            let mut moved = course.clone();
+            moved.take_in(Pose { paddle: Vector2::ith(axis, step), ..Pose::default() }, 0.0).unwrap();
+            let off = (moved.target_displacement() / step - free.column(axis)).norm();
+            // Where the tip begins to slide, it does not hold the point along the axis any more.
+            assert!(off < 0.02 * free.norm(), "{name} {axis}: {off}");
+        }
+        let table =
+            build(&model, scene.paddles[2].index, &TableOptions { knots: 5, ..TableOptions::default() }).unwrap();
+        assert_eq!(table.knots.len(), 5);
+    }
+}
+
+/// With hardly any relaxation the table along the insertion is that of the states.
+#[test]
+fn tissue_that_hardly_relaxes_has_the_table_of_elastic_tissue() {
+    for (name, paddle) in [("breast", 3), ("prostate", 3)] {
+        let elastic = Scene::bundled(name).unwrap();
+        let mut hardly = elastic.clone();
+        hardly.material = elastic.material.clone().relaxing(Relaxation::new([(1e-9, 1.0)]).unwrap());
+        let of = |scene: &Scene| {
+            build(&TissueModel::new(scene).unwrap(), paddle, &TableOptions { knots: 11, ..TableOptions::default() })
+                .unwrap()
+        };
+        let (states, along) = (of(&elastic), of(&hardly));
+        let largest = states.knots.iter().map(|knot| knot.paddle_path.norm()).fold(0.0, f64::max);
+        for (one, other) in states.knots.iter().zip(&along.knots) {
+            // The way of the paddle along which the target stays is walked in other steps.
+            let off = (one.paddle_path - other.paddle_path).norm();
+            assert!(off < 0.03 * largest, "{name} at {}: {off} of {largest}", one.depth);
+            let off = (one.jacobian - other.jacobian).norm();
+            assert!(off < 0.02 * one.jacobian.norm(), "{name} at {}: {off}", one.depth);
+            let off = (one.static_target_displacement - other.static_target_displacement).norm();
+            assert!(off < 1e-6 * (1.0 + one.static_target_displacement.norm()), "{name} at {}: {off}", one.depth);
+        }
+    }
+}
+
+/// The balance of a needle in elastic tissue whose base moves.
+#[test]
+fn the_work_of_a_moving_base_is_in_the_balance() {
+    for name in ["breast", "prostate"] {
+        let mut scene = scene(name, &[Effect::Shaft]);
+        scene.needle.shaft.as_mut().unwrap().puncture_force = 0.0;
+        let model = TissueModel::new(&scene).unwrap();
+        let (depth, normal) = (scene.needle.depth, scene.needle.orthogonal());
+        let mut needle = SlippingNeedle::at_rest(&model, Some(0)).unwrap();
+        for k in 1..=60 {
+            needle.advance(depth * f64::from(k) / 60.0, Vector2::zeros()).unwrap();
+        }
+        let before = needle.energy();
+        for k in 1..=40 {
+            let base = normal * (0.05 * depth * f64::from(k) / 40.0);
+            needle.take_in(Pose { depth, base, ..Pose::default() }, 0.0).unwrap();
+        }
+        let now = needle.energy();
+        let work = now.work + now.base + now.paddle - before.work - before.base - before.paddle;
+        let spent = now.stored + now.friction + now.cutting - before.stored - before.friction - before.cutting;
+        println!("{name}: {work} {spent}");
+        assert!(
+            (now.base - before.base).abs() > 0.0 && (work - spent).abs() < 0.02 * work.abs(),
+            "{name}: {work} {spent}"
+        );
+    }
+}
+
+/// Steps follow what moves the patient, or there is no path.
+#[test]
+fn a_cough_between_two_steps_is_no_less_a_cough() {
+    let mut scene = Scene::bundled("paper").unwrap();
+    let surge = Surge { at: 2.51, last: 0.03, amplitude: 0.02, direction: Vector2::new(1.0, 0.0) };
+    scene.motion.surge = Some(surge);
+    let model = TissueModel::new(&scene).unwrap();
+    let options = PathOptions { steered: false, ..PathOptions::new(5.5) };
+    let path =
+        Arc::new(AlongPath::learn(&model, None, &way(&model), &options.following(&scene.motion).unwrap()).unwrap());
+    let mut body = path.body();
+    let at = |body: &mut model_offline::reduction::PathBody, time: f64| {
+        body.go_to(time, Vector2::zeros());
+        body.target_displacement()
+    };
+    let (still, coughs) = (at(&mut body, 2.5), at(&mut body, 2.525));
+    assert!((coughs - still).x > 0.2 * surge.amplitude, "{still} {coughs}");
+    scene.motion.surge = Some(Surge { last: 1e-4, ..surge });
+    assert!(options.following(&scene.motion).is_err());
 }

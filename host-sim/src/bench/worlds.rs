@@ -154,7 +154,7 @@ fn options(simulation: &Simulation) -> TableOptions {
 
 impl Basis<'_> {
     fn world(&self, effects: Vec<Effect>) -> Result<WorldRow, SimError> {
-        let mut scene = effects.iter().fold(self.scene.clone(), |scene, effect| scene.with_effect(*effect));
+        let mut scene = self.scene.with_only(&effects);
         let simulation = Simulation::new(&scene);
         scene.set_speed(scene.needle.depth / simulation.insertion_s);
         let (model, _) = discretise(&scene)?;

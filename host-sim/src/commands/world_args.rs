@@ -35,9 +35,9 @@ pub(crate) struct WorldArgs {
     /// Rates, and what sees the target.
     #[command(flatten)]
     pub(crate) loop_args: LoopArgs,
-    /// Duration of the insertion, s
-    #[arg(long, default_value_t = 5.0, value_name = "S")]
-    pub(crate) insertion_time: f64,
+    /// Duration of the insertion, s [default: at the speed of the scene's needle, 5 where it names none]
+    #[arg(long, value_name = "S")]
+    pub(crate) insertion_time: Option<f64>,
     /// Time simulated from the start of the needle, s [default: the insertion and half a second]
     #[arg(long, value_name = "S")]
     pub(crate) duration: Option<f64>,
@@ -50,12 +50,21 @@ pub(crate) struct WorldArgs {
     /// Ticks that a command waits before the paddle acts
     #[arg(long, default_value_t = 0, value_name = "TICKS")]
     pub(crate) paddle_delay: u32,
-    /// What answers for the tissue at every tick [default: full; in free-run reduced where full cannot keep the period]
+    /// What answers for the tissue at every tick [default: full; reduced in free-run where full cannot keep the period, and for
+    /// tissue that has a past]
     #[arg(long, value_enum)]
     pub(crate) plant: Option<WantedPlant>,
     /// Part of its command that the paddle reaches
     #[arg(long, default_value_t = 1.0, value_name = "FACTOR")]
     pub(crate) paddle_gain: f64,
+}
+
+/// Seconds of an insertion at the speed of the scene's needle.
+fn own_insertion_time(scene: &Scene) -> f64 {
+    const USUAL_S: f64 = 5.0;
+    let own_s = scene.needle.depth / scene.needle.speed;
+    // The speed of a scene that names none is the depth in five seconds, but for rounding.
+    if (own_s - USUAL_S).abs() < 1e-9 { USUAL_S } else { own_s }
 }
 
 impl WorldArgs {
@@ -65,12 +74,12 @@ impl WorldArgs {
     /// [`SimError::Scene`].
     pub(crate) fn scene(&self) -> Result<Scene, SimError> {
         let path = self.scene.as_deref().unwrap_or(Path::new("paper"));
-        INSERTION_TIME.check(self.insertion_time)?;
         let mut scene = Scene::read(path)?;
         scene = self.world.iter().fold(scene, |scene, effect| scene.with_effect(*effect));
-        if scene.has_a_past() {
+        if let Some(insertion_s) = self.insertion_time {
+            INSERTION_TIME.check(insertion_s)?;
             // Friction and relaxation are those of the insertion that is asked for, in the table too.
-            scene.set_speed(scene.needle.depth / self.insertion_time);
+            scene.set_speed(scene.needle.depth / insertion_s);
         }
         Ok(scene)
     }
@@ -82,11 +91,12 @@ impl WorldArgs {
     pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
         let sensor = self.loop_args.sensor(&scene.sensor, scene.needle.depth, &scene.length_unit)?;
         let loop_settings = self.loop_args.settings(&sensor)?;
-        INSERTION_TIME.check(self.insertion_time)?;
+        let insertion_s = self.insertion_time.unwrap_or_else(|| own_insertion_time(scene));
+        INSERTION_TIME.check(insertion_s)?;
         PADDLE_LAG.check(self.paddle_lag)?;
         PADDLE_DELAY.check(f64::from(self.paddle_delay))?;
         PADDLE_GAIN.check(self.paddle_gain)?;
-        let mut simulation = Simulation::new(scene).with_insertion(self.insertion_time);
+        let mut simulation = Simulation::new(scene).with_insertion(insertion_s);
         simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
         DURATION.check(simulation.duration_s)?;
         let ticks = simulation.duration_s * loop_settings.rate;

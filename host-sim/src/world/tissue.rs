@@ -34,7 +34,8 @@ pub enum WantedPlant {
     /// The full nonlinear model: solved at every tick in free-run, else as often as an error of 1e-7 of the depth asks
     #[default]
     Full,
-    /// A reduced nonlinear model, trained before the run; the full one where it does not hold
+    /// A reduced nonlinear model, trained before the run; the full one where it does not hold; of tissue that has a past the
+    /// neighbourhood of the insertion
     Reduced,
     /// The linear model, statically condensed: exact for small depths only
     Condensed,
@@ -246,7 +247,9 @@ impl Reductions {
                 threads: parallel::available(),
                 ..PathOptions::new(*duration_s)
             };
-            let learnt = AlongPath::learn(model, attachment.paddle, &way, &options).map(Arc::new);
+            let options = options.following(&model.scene().motion);
+            let learnt = options.and_then(|options| AlongPath::learn(model, attachment.paddle, &way, &options));
+            let learnt = learnt.map(Arc::new);
             known().push((key, learnt.clone()));
             learnt
         })
@@ -302,7 +305,7 @@ enum Kind<'m> {
     Path(Box<AlongInsertion>),
 }
 
-/// A body beside the path of an insertion, and where the paddle was at the path's knots.
+/// A body beside the path of an insertion, and where the paddle was at its knots and half way between.
 #[derive(Debug)]
 struct AlongInsertion {
     body: PathBody,
@@ -405,7 +408,8 @@ impl<'m> TissuePlant<'m> {
         plant.account.model = PlantModel::Reduced;
         plant.account.path_knots = Some(path.knots());
         plant.account.largest_estimate = Some(0.0);
-        let interval_s = path.interval();
+        // The full model is held against it in half of its steps.
+        let interval_s = 0.5 * path.interval();
         plant.kind = Kind::Path(Box::new(AlongInsertion {
             body: path.body(),
             trajectory: insertion.trajectory,
@@ -558,7 +562,9 @@ impl TissueResponse for TissuePlant<'_> {
                 self.at = (depth, paddle);
                 let pose = Pose { paddle, ..self.model.pose_at(moment_s, depth) };
                 if pose != course.pose() || moment_s > *before_s {
-                    course.take_in(pose, (moment_s - *before_s).max(0.0)).map_err(WorldError::Needle)?;
+                    // To the nanosecond: steps of one length have one set of moduli.
+                    let elapsed_s = ((moment_s - *before_s).max(0.0) * 1e9).round() * 1e-9;
+                    course.take_in(pose, elapsed_s).map_err(WorldError::Needle)?;
                 }
                 *before_s = moment_s;
                 Ok(course.target_displacement())

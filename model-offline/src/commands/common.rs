@@ -23,8 +23,17 @@ pub(super) struct SceneArgs {
 impl SceneArgs {
     /// The scene, whose needle may not slip.
     pub(super) fn read(&self) -> Result<Scene, CliError> {
-        let scene = self.read_any()?;
+        let scene = self.read_still()?;
         if scene.needle.shaft.is_some() { Err(ModelError::NeedleSlips.into()) } else { Ok(scene) }
+    }
+
+    /// The scene for what knows no patient that moves and no needle that bends, which it says.
+    pub(super) fn read_still(&self) -> Result<Scene, CliError> {
+        let scene = self.read_any()?;
+        if !scene.motion.is_none() || scene.needle.deflection != 0.0 {
+            eprintln!("note: [motion] and deflection are left out here; `compare` and `host-sim run` take them");
+        }
+        Ok(scene)
     }
 
     /// The scene as its file has it.

@@ -54,7 +54,7 @@ pub(super) struct SolveArgs {
 }
 
 pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
-    let scene = args.discretization.over(args.scene.read_any()?)?;
+    let scene = args.discretization.over(args.scene.read_still()?)?;
     let displacement = match args.paddle_displacement.as_deref() {
         None => Vector2::zeros(),
         Some([x, y]) if x.is_finite() && y.is_finite() => Vector2::new(*x, *y),

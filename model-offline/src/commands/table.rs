@@ -29,7 +29,7 @@ pub(super) struct TableArgs {
 }
 
 pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
-    let scene = args.discretization.over(args.scene.read_any()?)?;
+    let scene = args.discretization.over(args.scene.read_still()?)?;
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
     let (model, paddle) = model_with_paddle(&scene, args.paddle)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };

@@ -113,9 +113,9 @@ mod tests {
     #[test]
     fn a_ramp_of_strain_is_the_integral_of_the_series() {
         // ∫ G over the ramp's time, for a rate of one: in closed form and by one step.
-        let (g, tau, time) = (0.4, 2.0, 5.0);
+        let (g, tau, time) = (0.4_f64, 2.0_f64, 5.0_f64);
         let relaxation = Relaxation::new([(g, tau)]).unwrap();
-        let integral: f64 = (1.0 - g) * time + g * tau * (1.0 - (-time / tau as f64).exp());
+        let integral: f64 = (1.0 - g) * time + g * tau * (1.0 - (-time / tau).exp());
         assert!((relaxation.stiffness(time) * time - integral).abs() < 1e-14);
     }
 

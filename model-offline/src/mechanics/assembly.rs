@@ -146,11 +146,9 @@ pub fn tangent<const D: usize>(
             }
         }
         if let Some(pk2) = prestress.geometric(q) {
-            for i in 0..D {
-                for j in 0..D {
-                    for l in 0..D {
-                        a[i][j][i][l] += pk2[(j, l)];
-                    }
+            for (i, of_row) in a.iter_mut().enumerate() {
+                for (j, of_column) in of_row.iter_mut().enumerate() {
+                    of_column[i].iter_mut().enumerate().for_each(|(l, entry)| *entry += pk2[(j, l)]);
                 }
             }
         }

@@ -227,7 +227,8 @@ impl SlippingNeedle<'_> {
         self.energy.cutting += cutting;
         // On the first lengths of a tip every force moves tissue further than the needle has gone.
         let is_in = engaged >= self.shaft.tip_length;
-        let rounding = -1e-6 * self.energy.work.abs();
+        let EnergyAccount { work, paddle: by_paddle, base: by_base, .. } = self.energy;
+        let rounding = -1e-6 * (work.abs() + by_paddle.abs() + by_base.abs());
         let gives = self.energy.friction < rounding || self.energy.cutting < rounding;
         if is_in && (gives || depth <= tip_displacement) {
             return Err(NeedleError::Outrun { depth });

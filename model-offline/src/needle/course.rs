@@ -50,7 +50,12 @@ impl<'m> Course<'m> {
         }
         let puncture_force = shaft.map(|shaft| shaft.puncture_force);
         let state = match puncture_force {
-            Some(force) if force <= 0.0 => State::Within(Box::new(SlippingNeedle::at_rest(model, paddle)?)),
+            Some(force) if force <= 0.0 => {
+                let mut needle = SlippingNeedle::at_rest(model, paddle)?;
+                // The tip touches the skin, and holds the point that it touches.
+                needle.take_in(Pose::default(), 0.0)?;
+                State::Within(Box::new(needle))
+            }
             puncture_force => {
                 let body = model.body(paddle, NewtonSettings::default()).map_err(failed(0.0))?;
                 State::Pushing { body: Box::new(body), puncture_force, so_far: Vec::new() }
@@ -65,18 +70,25 @@ impl<'m> Course<'m> {
     /// that was open.
     ///
     /// # Errors
-    /// [`NeedleError`]; a needle that is in is then where it was.
+    /// [`NeedleError`]; a needle that is in is then where it was, one that pushes the skin where its last equilibrium was.
     pub fn take_in(&mut self, pose: Pose, seconds: f64) -> Result<(), NeedleError> {
         match &mut self.state {
-            State::Within(needle) => enter(needle, pose, seconds),
+            State::Within(needle) => {
+                let before = needle.clone();
+                let outcome = enter(needle, pose, seconds);
+                if outcome.is_err() {
+                    *needle = before;
+                }
+                outcome
+            }
             State::Pushing { body, puncture_force, so_far } => {
                 body.take_in(pose, seconds).map_err(failed(pose.depth))?;
                 let Some(force) = *puncture_force else { return Ok(()) };
                 so_far.push((pose, seconds));
                 if body.contact_force() >= force {
                     let mut needle = SlippingNeedle::at_rest(self.model, self.paddle)?;
-                    for (pose, seconds) in so_far.drain(..) {
-                        enter(&mut needle, pose, seconds)?;
+                    for (pose, seconds) in so_far.iter() {
+                        enter(&mut needle, *pose, *seconds)?;
                     }
                     self.state = State::Within(Box::new(needle));
                 }

@@ -61,7 +61,7 @@ impl SlippingNeedle<'_> {
         for (column, response) in responses.iter().enumerate() {
             compliance.set_column(column, &felt(response));
         }
-        let largest = compliance.diagonal().amax();
+        let largest = if rows.is_empty() { 0.0 } else { compliance.diagonal().amax() };
         (0..rows.len()).for_each(|i| compliance[(i, i)] += 1e-13 * largest);
         let target = self.model.target_row();
         let mut jacobian = Matrix2::zeros();
@@ -73,8 +73,13 @@ impl SlippingNeedle<'_> {
                 .flatten()
                 .collect();
             let free = self.equilibrium.sensitivities(&rates).map_err(failed)?;
-            let held = compliance.clone().lu().solve(&-felt(&free)).ok_or(NeedleError::NoForces { depth })?;
             let mut moved = target.interpolate(&free);
+            if rows.is_empty() {
+                // The needle holds nothing yet.
+                jacobian.set_column(axis, &moved);
+                continue;
+            }
+            let held = compliance.clone().lu().solve(&-felt(&free)).ok_or(NeedleError::NoForces { depth })?;
             for (response, force) in responses.iter().zip(held.iter()) {
                 moved += target.interpolate(response) * *force;
             }

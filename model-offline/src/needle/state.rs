@@ -12,7 +12,8 @@ use nalgebra::Vector2;
 use serde::Serialize;
 
 /// Where the work at the needle's base and of the paddle went, since it is in:
-/// work + paddle + base = stored + friction + cutting.
+/// work + paddle + base = stored + friction + cutting. Of a needle that is moved across its line the work is counted, and the
+/// balance does not close: a seventh of that work is missing in a body that it has just been pushed into.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct EnergyAccount {
     /// Work at the base.

@@ -11,8 +11,13 @@ use crate::model::{Pose, TissueModel};
 use crate::needle::{Course, NeedleError};
 use crate::parallel;
 use crate::random::SplitMix64;
+use crate::scene::Motion;
 use nalgebra::{Matrix2, Vector2};
 use std::sync::Arc;
+
+/// Steps of an insertion, if nothing asks for more, and as many as are tried.
+const LEAST_STEPS: usize = 110;
+const MOST_STEPS: f64 = 5000.0;
 
 /// How an insertion is learnt.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,7 +37,19 @@ pub struct PathOptions {
 impl PathOptions {
     /// For an insertion of so many seconds.
     pub fn new(duration: f64) -> Self {
-        Self { duration, steps: 110, steered: true, trials: 6, threads: 1 }
+        Self { duration, steps: LEAST_STEPS, steered: true, trials: 6, threads: 1 }
+    }
+
+    /// The same with steps that follow what moves the patient.
+    ///
+    /// # Errors
+    /// [`TrainingError::TooFast`] where that takes more steps than are tried.
+    pub fn following(self, motion: &Motion) -> Result<Self, TrainingError> {
+        let needed = motion.longest_step().map_or(0.0, |step| (self.duration / step).ceil());
+        if needed > MOST_STEPS {
+            return Err(TrainingError::TooFast { steps: needed, most: MOST_STEPS });
+        }
+        Ok(Self { steps: self.steps.max(needed as usize), ..self })
     }
 }
 
@@ -68,9 +85,11 @@ pub struct AlongPath {
     interval: f64,
     knots: Vec<Knot>,
     growth: ErrorGrowth,
-    /// Largest distance from the path that errors were learnt at, length.
-    reach: f64,
 }
+
+/// Shortest distance from the path, over the depth, that errors are learnt at: where nothing moves the target there is no
+/// other.
+const LEAST_DISTANCE: f64 = 0.02;
 
 /// The worst of a few trials is not the worst there is.
 const UNSEEN: f64 = 3.0;
@@ -114,11 +133,13 @@ impl AlongPath {
                 let error = |knot: &Knot| normal.dot(&knot.target);
                 let answer = normal.dot(&(last.jacobian * direction));
                 let next = 2.0 * now - then - (2.0 * error(last) - error(before)) / answer;
-                (then, now) = (now, if next.is_finite() { next } else { now });
+                // No farther than its actuator goes.
+                let farthest = model.scene().actuator.max_displacement;
+                (then, now) = (now, if next.is_finite() { next.clamp(-farthest, farthest) } else { now });
             }
             direction * now
         })?;
-        let mut path = Self { interval: walk.interval, knots, growth: ErrorGrowth::default(), reach: 0.0 };
+        let mut path = Self { interval: walk.interval, knots, growth: ErrorGrowth::default() };
         path.growth.still = path.between_knots();
         if steered && options.trials > 0 {
             path.learn_errors(&walk, options)?;
@@ -140,7 +161,7 @@ impl AlongPath {
     fn learn_errors(&mut self, walk: &Walk<'_>, options: &PathOptions) -> Result<(), TrainingError> {
         let travel = self.knots.iter().map(|knot| knot.paddle.norm()).fold(0.0, f64::max);
         let moved = self.knots.iter().map(|knot| knot.target.norm()).fold(0.0, f64::max);
-        let far = 0.5 * travel.max(moved);
+        let far = (0.5 * travel.max(moved)).max(LEAST_DISTANCE * walk.model.scene().needle.depth);
         let path = &*self;
         let trials = parallel::map(options.trials, options.threads, |trial| {
             // Alternately near and far, so that what grows with the distance is told from what grows with its square.
@@ -160,7 +181,6 @@ impl AlongPath {
             .map(|(distance, error)| beyond(*error, still + linear * distance) / distance.powi(2))
             .fold(0.0, f64::max);
         self.growth = ErrorGrowth { still, linear: UNSEEN * linear, square: UNSEEN * square };
-        self.reach = far;
         Ok(())
     }
 
@@ -261,14 +281,10 @@ impl PathBody {
         self.path.cubic(&between, |knot| knot.target) + jacobian * self.off
     }
 
-    /// Error of the target displacement that it is estimated to have, length; infinite far beyond what it was learnt for.
+    /// Error of the target displacement that it is estimated to have, length: it grows with the square of the largest
+    /// distance from the path so far. Between knots of the path nothing is known but how the knots bend.
     pub fn error_estimate(&self) -> f64 {
         self.path.growth.at(self.farthest)
-    }
-
-    /// Largest distance from the path so far over that which errors were learnt at.
-    pub fn beyond_reach(&self) -> f64 {
-        if self.farthest > 0.0 { self.farthest / self.path.reach } else { 0.0 }
     }
 
     /// Coefficients of the path's nearest knot: what a picture shows.

@@ -18,6 +18,16 @@ pub enum TrainingError {
         /// Why.
         source: Box<NeedleError>,
     },
+    /// The patient moves too fast for the steps that are tried.
+    #[error(
+        "the patient moves so fast that the insertion takes {steps} steps, at most {most} are tried: insert faster, or use --plant full"
+    )]
+    TooFast {
+        /// Steps it would take.
+        steps: f64,
+        /// As many as are tried.
+        most: f64,
+    },
     /// The full model loses stability before any depth worth training.
     #[error(
         "the full model reaches depth {reached:.4} of {asked:.4} only: nothing to train on; ask for less depth, or give the law a barrier"

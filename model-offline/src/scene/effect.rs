@@ -1,6 +1,6 @@
 //! What a world may do that the simplest model of it does not.
 
-use super::{Breathing, Motion, Resistance, Scene, Shaft};
+use super::{Breathing, Resistance, Scene, Shaft};
 use crate::choice::choice;
 use crate::material::{Law, Material, Relaxation};
 
@@ -42,22 +42,23 @@ impl Scene {
         let mut scene = self.clone();
         match effect {
             Effect::Shaft if self.needle.shaft.is_none() => scene.needle.shaft = Some(self.typical_shaft()),
-            Effect::Creep if !self.relaxes() => {
+            Effect::Creep => {
                 // The numbers are good: they are constants, and a unit test makes them.
                 if let Ok(relaxation) = Relaxation::new(SHARES) {
-                    scene.material = self.material.clone().relaxing(relaxation.clone());
-                    for law in scene.inclusions.iter_mut().filter_map(|inclusion| inclusion.material.as_mut()) {
-                        *law = law.clone().relaxing(relaxation.clone());
+                    let own = scene.inclusions.iter_mut().filter_map(|inclusion| inclusion.material.as_mut());
+                    for law in std::iter::once(&mut scene.material).chain(own) {
+                        if law.relaxation().is_none() {
+                            *law = law.clone().relaxing(relaxation.clone());
+                        }
                     }
                 }
             }
-            Effect::Breathing if self.motion.is_none() => {
+            Effect::Breathing if self.motion.breathing.is_none() => {
                 let amplitude = AMPLITUDE * self.needle.depth;
                 let direction = self.needle.orthogonal();
-                scene.motion =
-                    Motion { breathing: Some(Breathing { period: PERIOD, amplitude, direction }), ..Motion::default() };
+                scene.motion.breathing = Some(Breathing { period: PERIOD, amplitude, direction });
             }
-            Effect::Shaft | Effect::Creep | Effect::Breathing => {}
+            Effect::Shaft | Effect::Breathing => {}
         }
         scene
     }
@@ -67,7 +68,8 @@ impl Scene {
     pub fn with_only(&self, effects: &[Effect]) -> Self {
         let mut scene = self.without_a_past();
         for effect in effects {
-            let with = self.with_effect(*effect);
+            let is_own = *effect == Effect::Creep && self.relaxes();
+            let with = if is_own { self.clone() } else { self.with_effect(*effect) };
             match effect {
                 Effect::Shaft => {
                     (scene.needle.shaft, scene.needle.deflection) = (with.needle.shaft, with.needle.deflection);

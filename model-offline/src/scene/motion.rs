@@ -57,6 +57,14 @@ impl Motion {
         *self == Self::default()
     }
 
+    /// The longest step of time that follows everything that moves, s; none where nothing does.
+    pub fn longest_step(&self) -> Option<f64> {
+        let breathing = self.breathing.map(|breathing| breathing.period / 40.0);
+        let surge = self.surge.map(|surge| surge.last / 20.0);
+        let rows = self.recorded.windows(2).map(|pair| 0.25 * (pair[1].0 - pair[0].0));
+        breathing.into_iter().chain(surge).chain(rows).min_by(f64::total_cmp)
+    }
+
     /// Displacement of the immobile part so many seconds after the start of the needle; none before.
     pub fn displacement(&self, since_start: f64) -> Point2 {
         if since_start <= 0.0 {

@@ -4,11 +4,14 @@ use super::{TableBuildError, check};
 use crate::model::{ModelError, Pose, TissueModel};
 use crate::needle::Course;
 use crate::placement::controllability::best_direction;
+use crate::solver::equilibrium::{Failure, FailureReason};
 use firmware::contract::{Knot, MAX_KNOTS};
 use nalgebra::Vector2;
 
 /// Orthogonal error over the depth that the paddle path leaves at a knot.
 const ENOUGH: f64 = 1e-7;
+/// The same that is refused, over what is enough: where the skin gives way with one paddle and not with the next, there may be no better one.
+const MOST: f64 = 1e5;
 /// Positions of the paddle that are tried at a knot.
 const ROUNDS: usize = 12;
 /// Steps of the insertion between two knots: what is elastic, cut and relaxed needs small ones, the table does not.
@@ -32,8 +35,8 @@ pub(super) fn knots(
     let mut still = Course::at_rest(model, Some(position))?;
     let mut steered = still.clone();
     let mut knots: heapless::Vec<Knot<f64, 2>, MAX_KNOTS> = heapless::Vec::new();
-    // Paddle travel per step, as the last ones needed it.
-    let mut ahead = Vector2::zeros();
+    // Paddle travel per step, as the last one needed it, in the direction that holds the target.
+    let mut ahead = 0.0;
     for k in 0..count {
         let outcome = (|| {
             for step in 1..=if k > 0 { STEPS } else { 0 } {
@@ -80,10 +83,11 @@ struct Steering {
 
 impl Steering {
     /// One step with the paddle where the target is on the needle's line after it; the paddle's travel.
-    fn step(&self, course: &mut Course<'_>, depth: f64, ahead: Vector2<f64>) -> Result<Vector2<f64>, TableBuildError> {
+    fn step(&self, course: &mut Course<'_>, depth: f64, ahead: f64) -> Result<f64, TableBuildError> {
+        let direction = self.direction(course)?.normalize();
         let before = course.clone();
         let from = before.pose().paddle;
-        let mut paddle = from + ahead;
+        let mut paddle = from + direction * ahead;
         let mut best = f64::INFINITY;
         for _ in 0..ROUNDS {
             let mut tried = before.clone();
@@ -97,12 +101,24 @@ impl Steering {
             if done {
                 break;
             }
-            let jacobian = course.actuation_jacobian()?;
-            let direction = best_direction(&jacobian, self.normal)
-                .map_err(|singular| ModelError::Uncontrollable { paddle: self.index, condition: singular.condition })?;
-            paddle -= direction * error;
+            paddle -= self.direction(course)? * error;
         }
-        Ok(course.pose().paddle - from)
+        if best > MOST * self.enough {
+            return Err(ModelError::Solve(Failure {
+                reason: FailureReason::NotConverged,
+                reached: 0.0,
+                detail: format!("the paddle path at depth {depth:.4} leaves {best:.1e} of orthogonal error"),
+            })
+            .into());
+        }
+        Ok((course.pose().paddle - from).dot(&direction))
+    }
+
+    /// J⁻¹n with the needle as it is.
+    fn direction(&self, course: &mut Course<'_>) -> Result<Vector2<f64>, TableBuildError> {
+        let found = best_direction(&course.actuation_jacobian()?, self.normal);
+        Ok(found
+            .map_err(|singular| ModelError::Uncontrollable { paddle: self.index, condition: singular.condition })?)
     }
 }
 
