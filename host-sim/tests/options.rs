@@ -36,7 +36,7 @@ const AT_WORK: Duration = Duration::from_secs(2);
 const HANGS: Duration = Duration::from_secs(20);
 
 /// What every command is called with to do something short; options that name outputs name them in `OUT`.
-const HOST_SIM: [(&str, &str); 16] = [
+const HOST_SIM: [(&str, &str); 17] = [
     ("run", "--tissue homogeneous --mode lockstep --insertion-time 0.05 --quiet --out OUT/report"),
     ("controller", "--table IN/paper.table --link LINK --patience 0.05 --record OUT/a.rec --json OUT/a.json"),
     ("plant", "--link LINK --paddle 3 --patience 0.05 --insertion-time 0.05 --json OUT/a.json"),
@@ -45,6 +45,7 @@ const HOST_SIM: [(&str, &str); 16] = [
     ("faults", "--only 7 --seeds 1 --out OUT/faults"),
     ("stability", "--quick --out OUT/stability"),
     ("tables", "--out OUT/tables"),
+    ("worlds", "--scene paper --seeds 1 --json OUT/a.json"),
     ("rearm", "1"),
     ("replay", "IN/paper.rec"),
     ("board", "IN/paper.rec"),
@@ -54,7 +55,7 @@ const HOST_SIM: [(&str, &str); 16] = [
     ("man", "OUT/man"),
     ("report", "IN/report"),
 ];
-const MODEL_OFFLINE: [(&str, &str); 12] = [
+const MODEL_OFFLINE: [(&str, &str); 13] = [
     ("place", "paper --quiet --json OUT/a.json"),
     ("solve", "paper --paddle 3 --depth 0.01 --json OUT/a.json"),
     ("table", "paper --paddle 3 -o OUT/a.table"),
@@ -63,6 +64,7 @@ const MODEL_OFFLINE: [(&str, &str); 12] = [
     ("pareto", "paper --quick --out OUT/pareto"),
     ("sweep", "paper --out OUT/sweep"),
     ("fit", "paper --tolerance 0.1 -o OUT/a.toml"),
+    ("compare", "paper --json OUT/a.json --csv OUT/a.csv --svg OUT/a.svg"),
     ("new", "-o OUT/a.toml"),
     ("completions", "bash"),
     ("man", "OUT/man"),
