@@ -7,7 +7,7 @@
 
 use crate::model::{ModelError, TissueModel};
 use crate::needle::{Course, NeedleError};
-use crate::output::chart::{Axis, Bars, Colour, Figure, Panel, Place, ReferenceLine};
+use crate::output::chart::{Axis, Bars, Colour, Dash, Figure, Panel, Place, ReferenceLine};
 use crate::output::csv;
 use crate::parallel;
 use crate::placement::controllability::best_direction;
@@ -309,26 +309,21 @@ impl Effects {
 
     /// A bar per effect, in per cent: target across and along the needle, base force, Jacobian.
     pub fn svg(&self) -> String {
-        let percent = |of: &dyn Fn(&Added) -> f64| -> Vec<(f64, f64)> {
-            let bar = |(k, tried): (usize, &Tried)| Some((k as f64 + 1.0, 100.0 * of(tried.added.as_ref()?).abs()));
-            self.effects.iter().enumerate().filter_map(bar).collect()
-        };
         let scale = self.target_displacement;
+        let names = || self.effects.iter().map(|tried| tried.variation.name().to_owned()).collect();
+        let limit = 100.0 * self.tolerance;
         let panel = |title: &str, of: &dyn Fn(&Added) -> f64| {
-            let mut panel = Panel::new(title, Axis::linear("effect", ""), Axis::linear("change", "%"));
-            for (place, height) in percent(of) {
-                let k = place as usize - 1;
-                panel.bars.push(Bars {
-                    label: format!("{} {}", k + 1, self.effects[k].variation.name()),
-                    colour: Colour::CYCLE[k % Colour::CYCLE.len()],
-                    bars: vec![[place - 0.35, place + 0.35, height]],
-                });
-            }
-            panel.lines.push(ReferenceLine::new(
-                "tolerance",
-                Place::Y(100.0 * self.tolerance),
-                crate::output::chart::Dash::Dashed,
-            ));
+            let bar = |(k, tried): (usize, &Tried)| Some((k, 100.0 * of(tried.added.as_ref()?).abs()));
+            let bars: Vec<(usize, f64)> = self.effects.iter().enumerate().filter_map(bar).collect();
+            let heights = bars.iter().map(|(_, height)| *height).chain([0.0, limit]);
+            let change = Axis::linear("change", "%").enclosing(heights);
+            let mut panel = Panel::new(title, Axis::categories("", names()), change);
+            panel.bars.extend(bars.iter().map(|&(k, height)| Bars {
+                label: String::new(),
+                colour: Colour::CYCLE[k % Colour::CYCLE.len()],
+                bars: vec![[k as f64 - 0.35, k as f64 + 0.35, height]],
+            }));
+            panel.lines.push(ReferenceLine::new("tolerance", Place::Y(limit), Dash::Dashed));
             panel
         };
         let needed: Vec<&str> =
