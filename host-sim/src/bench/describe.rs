@@ -21,13 +21,15 @@ fn path(points: &[Point2]) -> Vec<[f64; 2]> {
 }
 
 /// Settings of the simulation.
-pub fn settings(scene: &Scene, simulation: &Simulation) -> SimulationSettings {
+pub fn settings(scene: &Scene, simulation: &Simulation, table_knows_the_world: bool) -> SimulationSettings {
     let Simulation { loop_settings, actuator, .. } = simulation;
     SimulationSettings {
         rate_hz: loop_settings.rate,
         insertion_s: simulation.insertion_s,
         duration_s: simulation.duration_s,
         depth: simulation.depth,
+        world: scene.effects().into_iter().map(str::to_owned).collect(),
+        table_knows_the_world,
         sensor: simulation.sensor.title(),
         feedback: loop_settings.feedback.name().to_owned(),
         target_rate_hz: loop_settings.target_rate,

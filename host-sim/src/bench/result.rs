@@ -79,6 +79,12 @@ pub struct SimulationSettings {
     pub duration_s: f64,
     /// Depth of the insertion, length.
     pub depth: f64,
+    /// What the simulated world has besides a contact that moves with the needle in elastic tissue at rest; empty: nothing.
+    #[serde(default)]
+    pub world: Vec<String>,
+    /// Whether tables that were computed for the run know a needle that slips and stress that relaxes, where there are.
+    #[serde(default)]
+    pub table_knows_the_world: bool,
     /// What sees the target: a preset, or one that was changed.
     #[serde(default = "unnamed")]
     pub sensor: String,
@@ -101,6 +107,18 @@ pub struct SimulationSettings {
     pub paddle_max_rate: f64,
     /// Largest displacement of the paddle, length.
     pub paddle_max_displacement: f64,
+}
+
+impl SimulationSettings {
+    /// What the world has, and whether tables know it.
+    pub fn world_in_words(&self) -> String {
+        if self.world.is_empty() {
+            return "nothing".to_owned();
+        }
+        let knows =
+            if self.table_knows_the_world { "tables know of it what a table can" } else { "tables do not know it" };
+        format!("{}; {knows}", self.world.join(", "))
+    }
 }
 
 /// The undeformed scene.

@@ -282,6 +282,22 @@ impl Scene {
         [&self.material].into_iter().chain(of_inclusions).any(|law| law.relaxation().is_some())
     }
 
+    /// What it has besides a contact that moves with the needle in elastic tissue at rest, in words.
+    pub fn effects(&self) -> Vec<&'static str> {
+        let Motion { breathing, surge, recorded } = &self.motion;
+        [
+            (self.needle.shaft.is_some(), "a needle that slips"),
+            (self.needle.deflection != 0.0, "a needle that bends"),
+            (self.relaxes(), "tissue that creeps"),
+            (breathing.is_some(), "a patient that breathes"),
+            (surge.is_some(), "a cough"),
+            (!recorded.is_empty(), "a recorded motion"),
+        ]
+        .into_iter()
+        .filter_map(|(is_there, name)| is_there.then_some(name))
+        .collect()
+    }
+
     /// Whether its state in a simulation depends on what was before, or on the time, and not on needle and paddle alone.
     pub fn has_a_past(&self) -> bool {
         self.needle.shaft.is_some() || self.relaxes() || !self.motion.is_none() || self.needle.deflection != 0.0

@@ -438,7 +438,7 @@ impl<'p> Comparison<'p> {
             units: [self.scene.length_unit.clone(), self.scene.stress_unit.clone()],
             mode: self.options.mode.unwrap_or(RunMode::Lockstep),
             seed: self.simulation.seed,
-            settings: describe::settings(&self.scene, &self.simulation),
+            settings: describe::settings(&self.scene, &self.simulation, self.options.table_knows_the_world),
             geometry: describe::geometry(&self.scene, &self.studied[0].study.model),
             placements: self.placements(),
             cases,

@@ -32,6 +32,7 @@ fn rows(run: &RunResult) -> Vec<(&'static str, String, String)> {
         row("depth of the insertion", settings.depth, length),
         row("duration of the insertion", settings.insertion_s, "s"),
         row("time simulated", settings.duration_s, "s"),
+        ("the world, besides the simplest model", settings.world_in_words(), String::new()),
         ("what sees the target", settings.sensor.clone(), String::new()),
         ("feedback", settings.feedback.clone(), String::new()),
         row("rate of the target sensor", settings.target_rate_hz, "Hz"),

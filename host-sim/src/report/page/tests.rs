@@ -144,6 +144,8 @@ fn run(scene: &str) -> RunResult {
             insertion_s: 5.0,
             duration_s: 5.5,
             depth: 0.1,
+            world: Vec::new(),
+            table_knows_the_world: true,
             sensor: "ideal".to_owned(),
             feedback: "observer".to_owned(),
             target_rate_hz: 50.0,

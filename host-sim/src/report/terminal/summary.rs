@@ -52,6 +52,9 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
         noise(settings.noise, &run.units[0]),
         settings.feedback,
     )?;
+    if !settings.world.is_empty() {
+        writeln!(text, "in a world with {}", settings.world_in_words())?;
+    }
     writeln!(text, "  {:<13} {:<13} {:>12} {:>16} {:>16}", "tissue", "table", "none", "static", "dynamic")?;
     let results = run.cases.iter().flat_map(|case| case.strategies.iter());
     let digits = decimals(smallest_told(results.map(|(_, result)| result.max_orthogonal_error)), 6);
