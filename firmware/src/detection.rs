@@ -134,6 +134,30 @@ pub const SURPRISE_GROWTH: f64 = 3.0;
 /// times as steep as was thought.
 pub const STEEPEST_SURPRISE: f64 = 64.0;
 
+/// A breath takes at least and at most this long, s: a child's, and five a minute by a ventilator.
+pub const SHORTEST_BREATH: f64 = 1.5;
+/// See [`SHORTEST_BREATH`].
+pub const LONGEST_BREATH: f64 = 12.0;
+
+/// The target is smoothed over this time, s, before breaths are looked for: a sixth of the shortest one.
+pub const BREATH_SMOOTHING: f64 = 0.25;
+
+/// Smallest breath, standard deviations of the smoothed noise: twenty hours of noise alone have no two such swings in a row
+/// (there is a test).
+pub const BREATH_SIGMAS: f64 = 7.0;
+
+/// How much a breath differs from the one before, standard deviation over its size.
+pub const BREATH_WANDER: f64 = 0.3;
+
+/// Change of the period, part of it, from which on a breath is another one and learnt anew.
+pub const BREATH_CHANGE: f64 = 0.25;
+
+/// How much a new period counts against those before: its own scatter, seen by ultrasound, is a tenth.
+pub const BREATH_LEARNS: f64 = 0.3;
+
+/// Breaths that may be missed before none is predicted any more.
+pub const BREATHS_MISSED: f64 = 1.5;
+
 /// Ticks with skipped periods before them that are a fault, if in a row; otherwise n of m, see [`BUCKET_EVENT`]. A loop
 /// that skips every second period no longer runs at the rate that its gain was chosen for.
 pub const MAX_SUCCESSIVE_OVERRUNS: u32 = 10;

@@ -20,6 +20,8 @@ pub enum Feedback {
     /// [`crate::observer`].
     #[default]
     Observer,
+    /// The observer, which predicts a patient's breaths as well, once it has seen one.
+    Harmonic,
 }
 
 /// Paddle direction per unit of orthogonal target displacement.

@@ -32,7 +32,8 @@
 //! command         u ← towards f + w                  |u| ≤ u_max, |Δu| ≤ Δ_max on every tick
 //! ```
 //!
-//! [`observer`] tells how sensor and table are weighed. [`Feedback::Integral`] is the plain law, w ← w − g·d·e with
+//! [`observer`] tells how sensor and table are weighed, and how [`Feedback::Harmonic`] adds a patient's breath to what is
+//! removed: `n·J·w = −(l + s·Δz + c(t))`. [`Feedback::Integral`] is the plain law, w ← w − g·d·e with
 //! the error e = n·y: no estimate, fewer instructions.
 //!
 //! The gain g, of an observer the largest, follows from the delay of the loop, see [`loop_stability`]; the limits and their anti-windup are in

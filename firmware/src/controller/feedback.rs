@@ -86,7 +86,10 @@ impl<T: Scalar> Controller<'_, T> {
                 (placed, self.first_estimate(level, location.depth, *time_ns))
             }
         };
-        let now = before + estimate.drift * (location.depth - estimate.depth);
+        let mut now = before + estimate.drift * (location.depth - estimate.depth);
+        if estimate.observer.predicts_breaths() {
+            now += estimate.breath * T::of(seconds(time_ns.saturating_sub(estimate.since_ns)));
+        }
         let then = sample.and_then(|sample| state.history.at(sample.time_ns));
         let measured = then.and_then(|then| Some((then, self.table.locate(then.depth)?)));
         let (Some(sample), Some((then, measured))) = (sample, measured) else {
@@ -101,11 +104,14 @@ impl<T: Scalar> Controller<'_, T> {
         // Changed along d alone: where the paddle was placed across it, it stays.
         let jacobian = location.jacobian();
         let direction = self.runtime.direction.solve(&jacobian, n);
-        let change = -(estimate.observer.at(location.depth) + n.dot(&(jacobian * now)));
+        let acts_ns = time_ns.saturating_add(self.runtime.actuator_delay_ns);
+        let (breath, rate) = estimate.observer.ahead(T::of(seconds(acts_ns.saturating_sub(sample.time_ns))));
+        let change = -(estimate.observer.at(location.depth) + breath + n.dot(&(jacobian * now)));
         let corrected = now + direction * change;
         estimate.time_ns = sample.time_ns;
         estimate.depth = location.depth;
         estimate.drift = -direction * estimate.observer.slope();
+        (estimate.since_ns, estimate.breath) = (*time_ns, -direction * rate);
         // A correction that saturation swallows proves nothing about the sign of the plant.
         let setpoint = feed_forward + corrected;
         let acted = limits.clamp_position(&setpoint) == setpoint;
@@ -117,6 +123,7 @@ impl<T: Scalar> Controller<'_, T> {
     fn first_estimate(&self, level: T, depth: T, time_ns: u64) -> Estimate<T> {
         let surface = T::of(self.runtime.table_depth.0);
         let observer = Observer::starting(&self.runtime.belief, level, depth, surface);
-        Estimate { observer, time_ns, depth, drift: SVector::zeros() }
+        let drift = SVector::zeros();
+        Estimate { observer, time_ns, depth, drift, since_ns: time_ns, breath: drift }
     }
 }

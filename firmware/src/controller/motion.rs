@@ -52,7 +52,7 @@ impl<T: Scalar> Controller<'_, T> {
         let setting = Setting { time_ns: tick.time_ns, location, feed_forward, previous, limits };
         let feedback = match runtime.feedback {
             Feedback::Integral => self.integrate(state, tick.fresh_target, &setting),
-            Feedback::Observer => self.observe(state, tick.fresh_target, &setting),
+            Feedback::Observer | Feedback::Harmonic => self.observe(state, tick.fresh_target, &setting),
         };
         if let Some(correction) = feedback.correction {
             let diverges = state.divergence.update(runtime, correction.error, correction.size, needle.values[1]);
@@ -79,7 +79,7 @@ impl<T: Scalar> Controller<'_, T> {
 
     /// Remembers where needle and paddle are once the command of this tick has acted.
     pub(super) fn remember(&self, state: &mut State<T>, time_ns: u64, depth: T) {
-        if let (Feedback::Observer, Some(paddle)) = (self.runtime.feedback, state.displacement) {
+        if let (Feedback::Observer | Feedback::Harmonic, Some(paddle)) = (self.runtime.feedback, state.displacement) {
             let time_ns = time_ns.saturating_add(self.runtime.actuator_delay_ns);
             state.history.record(self.runtime.history_ns / INTERVALS, Moment { time_ns, depth, paddle });
         }

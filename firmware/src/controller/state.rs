@@ -116,6 +116,10 @@ pub(super) struct Estimate<T: Scalar> {
     pub(super) depth: T,
     /// d(what the feedback adds)/d(depth).
     pub(super) drift: SVector<T, D>,
+    /// When the integral was computed, ns.
+    pub(super) since_ns: u64,
+    /// d(what the feedback adds)/dt, 1/s: a breath's.
+    pub(super) breath: SVector<T, D>,
 }
 
 /// A motion at full rate: longer than the delay that the gain was chosen for knows of.

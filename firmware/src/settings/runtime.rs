@@ -102,6 +102,11 @@ impl<T: Scalar> Runtime<T> {
         let margin = DEPTH_MARGIN * (end - start);
         let bounds = TableBounds::of(table);
         let target_range = TARGET_MARGIN * bounds.target_displacement + bounds.jacobian_norm * max_displacement;
+        let belief = Belief::new(noise, bounds.target_slope, end - start, target_range, gain.min(1.0));
+        let belief = match settings.feedback {
+            Feedback::Harmonic => belief.with_breathing(seconds(settings.target_period_ns)),
+            Feedback::Integral | Feedback::Observer => belief,
+        };
         Ok(Self {
             limits: Limits {
                 shape: settings.position_limit,
@@ -110,7 +115,7 @@ impl<T: Scalar> Runtime<T> {
             },
             gain: T::of(gain),
             feedback: settings.feedback,
-            belief: Belief::new(noise, bounds.target_slope, end - start, target_range, gain.min(1.0)),
+            belief,
             history_ns: settings.target_latency_ns
                 + TARGET_SAMPLES_TO_HOLD * settings.target_period_ns
                 + settings.actuator_delay_ns,

@@ -67,7 +67,7 @@ impl Source<'_> {
 pub(crate) fn step(bytes: &[u8]) {
     const MS: u64 = 1_000_000;
     let table = table();
-    let feedback = if bytes.len().is_multiple_of(2) { Feedback::Observer } else { Feedback::Integral };
+    let feedback = [Feedback::Observer, Feedback::Integral, Feedback::Harmonic][bytes.len() % 3];
     let settings = Settings { feedback, ..Settings::new(MS, 20 * MS, 20 * MS) };
     let controller = Controller::new(&table, &settings).unwrap();
     let mut state = State::<f64>::new();

@@ -25,7 +25,7 @@ pub fn settings(scene: &Scene, simulation: &Simulation, table_knows_the_world: b
     let Simulation { loop_settings, actuator, .. } = simulation;
     SimulationSettings {
         rate_hz: loop_settings.rate,
-        insertion_s: simulation.insertion_s,
+        insertion_s: simulation.needle.insertion_s(),
         duration_s: simulation.duration_s,
         depth: simulation.depth,
         world: scene.effects().into_iter().map(str::to_owned).collect(),

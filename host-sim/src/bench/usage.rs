@@ -2,6 +2,10 @@
 
 use std::path::PathBuf;
 
+use model_offline::output::csv::CsvError;
+
+use crate::world::needle::RecordedNeedleError;
+
 /// Options that cannot be obeyed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -49,6 +53,37 @@ pub enum UsageError {
         /// Their product.
         ticks: f64,
         /// How many are kept.
+        most: f64,
+    },
+    /// A recorded needle that is no table.
+    #[error("--needle-motion {}: {source}; it takes two columns under a line of names: time_s,depth", file.display())]
+    NeedleFile {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        source: CsvError,
+    },
+    /// A recorded needle that cannot be followed.
+    #[error("--needle-motion {}: {source}", file.display())]
+    NeedleMotion {
+        /// The file.
+        file: PathBuf,
+        /// What is wrong with it.
+        source: RecordedNeedleError,
+    },
+    /// A recorded needle that leaves the table.
+    #[error(
+        "--needle-motion {}: row {row}: depth {depth} is beyond the scene's, {most}; raise [needle] depth, or check the unit",
+        file.display()
+    )]
+    NeedleTooDeep {
+        /// The file.
+        file: PathBuf,
+        /// From 1.
+        row: usize,
+        /// Its depth.
+        depth: f64,
+        /// The scene's.
         most: f64,
     },
     /// This machine has no such processor.

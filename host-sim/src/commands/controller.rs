@@ -19,7 +19,7 @@ use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::loop_settings::{LoopArgs, LoopSettings};
 use model_offline::output::table_text::hex;
-use model_offline::scene::SensorPreset;
+use model_offline::scene::{Motion, SensorPreset};
 
 use super::world_args::PATIENCE;
 use model_offline::output::check_outputs;
@@ -103,7 +103,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
 fn loop_settings(args: &LoopArgs, table: &AnyTable) -> Result<LoopSettings, SimError> {
     let ([unit, _], depth) = (table.units(), table.depth_end());
     let own = SensorPreset::of_unit(&unit).sensor(depth, &unit)?;
-    Ok(args.settings(&args.sensor(&own, depth, &unit)?)?)
+    Ok(args.settings(&args.sensor(&own, depth, &unit)?, &Motion::default())?)
 }
 
 /// Writes the accounts where they are wanted.

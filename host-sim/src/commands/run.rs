@@ -131,7 +131,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     let bar = super::progress_bar(args.quiet);
     let options = args.options()?;
     let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &bar))?;
-    let view = args.view.then(|| live_view(args, &simulation.loop_settings)).transpose()?;
+    let view = args.view.then(|| live_view(args, &comparison.simulation().loop_settings)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
     bar.finish_and_clear();
     write_run(&args.out, &compared.result, compared.artifacts)?;
@@ -164,7 +164,7 @@ fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(),
         table_tissue,
         table,
         table_bytes: bytes,
-        simulation: *comparison.simulation(),
+        simulation: comparison.simulation().clone(),
         mode: args.mode.unwrap_or(RunMode::Lockstep),
         hardware: args.hardware,
     };

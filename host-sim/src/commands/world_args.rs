@@ -7,13 +7,19 @@ use host_sim::SimError;
 use host_sim::bench::usage::UsageError;
 use host_sim::world::error::OptionRange;
 use host_sim::world::loop_settings::LoopArgs;
+use host_sim::world::needle::NeedleTrajectory;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::tissue::WantedPlant;
+use model_offline::output::csv;
 use model_offline::scene::{Effect, Scene};
 
 /// How long a silent peer is waited for.
 pub(super) const PATIENCE: OptionRange = OptionRange::new("--patience", 1e-3, 86_400.0, " s");
 const INSERTION_TIME: OptionRange = OptionRange::new("--insertion-time", 1e-3, 86_400.0, " s");
+const WAIT: OptionRange = OptionRange::new("--wait", 0.0, 3600.0, " s");
+const STEPS: OptionRange = OptionRange::new("--steps", 1.0, 1000.0, "");
+const PAUSE: OptionRange = OptionRange::new("--pause", 0.0, 3600.0, " s");
+const DWELL: OptionRange = OptionRange::new("--dwell", 0.0, 3600.0, " s");
 const DURATION: OptionRange = OptionRange::new("--duration", 1e-3, 86_400.0, " s");
 const PADDLE_LAG: OptionRange = OptionRange::new("--paddle-lag", 0.0, 6e4, " ms");
 const PADDLE_DELAY: OptionRange = OptionRange::new("--paddle-delay", 0.0, 1e5, " ticks");
@@ -38,7 +44,25 @@ pub(crate) struct WorldArgs {
     /// Duration of the insertion, s [default: at the speed of the scene's needle, 5 where it names none]
     #[arg(long, value_name = "S")]
     pub(crate) insertion_time: Option<f64>,
-    /// Time simulated from the start of the needle, s [default: the insertion and half a second]
+    /// Time that the needle waits at the skin, s: the patient breathes already, the controller sees it
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub(crate) wait: f64,
+    /// Steps that the needle goes in, with a pause after each
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    pub(crate) steps: u32,
+    /// Pause between two steps, s
+    #[arg(long, default_value_t = 0.5, value_name = "S")]
+    pub(crate) pause: f64,
+    /// Time that the needle rests at its depth, s
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub(crate) dwell: f64,
+    /// Draw the needle back in the end, as fast as it came
+    #[arg(long)]
+    pub(crate) withdraw: bool,
+    /// How the needle goes, as recorded: a CSV file of time in s and depth, with a line of names
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["insertion_time", "steps", "pause", "wait"])]
+    pub(crate) needle_motion: Option<PathBuf>,
+    /// Time simulated from the start of the needle, s [default: all that the needle does, and half a second]
     #[arg(long, value_name = "S")]
     pub(crate) duration: Option<f64>,
     /// Seed of the sensors' noise
@@ -76,12 +100,37 @@ impl WorldArgs {
         let path = self.scene.as_deref().unwrap_or(Path::new("paper"));
         let mut scene = Scene::read(path)?;
         scene = self.world.iter().fold(scene, |scene, effect| scene.with_effect(*effect));
+        // Friction and relaxation are those of the insertion that is asked for, in the table too.
         if let Some(insertion_s) = self.insertion_time {
             INSERTION_TIME.check(insertion_s)?;
-            // Friction and relaxation are those of the insertion that is asked for, in the table too.
             scene.set_speed(scene.needle.depth / insertion_s);
+        } else if self.needle_motion.is_some() {
+            let needle = self.needle(&scene)?;
+            scene.set_speed(needle.depth() / needle.insertion_s());
         }
         Ok(scene)
+    }
+
+    /// How the needle goes.
+    ///
+    /// # Errors
+    /// [`SimError::Usage`] names the option.
+    fn needle(&self, scene: &Scene) -> Result<NeedleTrajectory, SimError> {
+        let depth = scene.needle.depth;
+        DWELL.check(self.dwell)?;
+        let inserted = match &self.needle_motion {
+            Some(path) => recorded_needle(path, depth)?,
+            None => {
+                let insertion_s = self.insertion_time.unwrap_or_else(|| own_insertion_time(scene));
+                INSERTION_TIME.check(insertion_s)?;
+                WAIT.check(self.wait)?;
+                STEPS.check(f64::from(self.steps))?;
+                PAUSE.check(self.pause)?;
+                NeedleTrajectory::in_steps(depth, insertion_s, self.steps, self.pause).after(self.wait)
+            }
+        };
+        let rested = inserted.dwelling(self.dwell);
+        Ok(if self.withdraw { rested.withdrawn() } else { rested })
     }
 
     /// Checks the numbers and combines them with the scene's.
@@ -90,13 +139,11 @@ impl WorldArgs {
     /// [`SimError::Usage`] names the option.
     pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
         let sensor = self.loop_args.sensor(&scene.sensor, scene.needle.depth, &scene.length_unit)?;
-        let loop_settings = self.loop_args.settings(&sensor)?;
-        let insertion_s = self.insertion_time.unwrap_or_else(|| own_insertion_time(scene));
-        INSERTION_TIME.check(insertion_s)?;
+        let loop_settings = self.loop_args.settings(&sensor, &scene.motion)?;
         PADDLE_LAG.check(self.paddle_lag)?;
         PADDLE_DELAY.check(f64::from(self.paddle_delay))?;
         PADDLE_GAIN.check(self.paddle_gain)?;
-        let mut simulation = Simulation::new(scene).with_insertion(insertion_s);
+        let mut simulation = Simulation::new(scene).with_needle(self.needle(scene)?);
         simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
         DURATION.check(simulation.duration_s)?;
         let ticks = simulation.duration_s * loop_settings.rate;
@@ -113,4 +160,14 @@ impl WorldArgs {
         simulation.plant = self.plant;
         Ok(simulation)
     }
+}
+
+/// Reads a recorded needle that goes no deeper than the scene's.
+fn recorded_needle(path: &Path, depth: f64) -> Result<NeedleTrajectory, UsageError> {
+    let file = path.to_path_buf();
+    let rows = csv::rows::<(f64, f64)>(path).map_err(|source| UsageError::NeedleFile { file: file.clone(), source })?;
+    if let Some((k, row)) = rows.iter().enumerate().find(|(_, row)| row.1 > depth * (1.0 + 1e-9)) {
+        return Err(UsageError::NeedleTooDeep { file, row: k + 1, depth: row.1, most: depth });
+    }
+    NeedleTrajectory::recorded(&rows).map_err(|source| UsageError::NeedleMotion { file, source })
 }

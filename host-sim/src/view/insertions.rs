@@ -20,7 +20,7 @@ use crate::world::error::WorldError;
 use crate::world::simulation::Simulation;
 
 /// What the page's insertions start from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct InsertionBasis<'a> {
     /// This program, which is also the controller.
     pub program: &'a Path,
@@ -85,10 +85,10 @@ fn under(knobs: &Knobs, basis: &InsertionBasis<'_>) -> (Scene, Simulation) {
     for inclusion in &mut scene.inclusions {
         inclusion.stiffness *= knobs.stiffness;
     }
-    let mut simulation = basis.simulation;
-    let settle_s = simulation.duration_s - simulation.insertion_s;
-    simulation.insertion_s /= knobs.needle_speed;
-    simulation.duration_s = simulation.insertion_s + settle_s;
+    let mut simulation = basis.simulation.clone();
+    let settle_s = simulation.duration_s - simulation.needle.end_s();
+    simulation.needle = simulation.needle.faster(knobs.needle_speed);
+    simulation.duration_s = simulation.needle.end_s() + settle_s;
     let loop_settings = &mut simulation.loop_settings;
     loop_settings.noise = Some(loop_settings.noise_for(simulation.depth) * knobs.noise);
     // The target sensor is never faster than the loop.

@@ -2,7 +2,7 @@
 
 use clap::{Args, ValueEnum};
 use firmware::{Feedback, Settings};
-use model_offline::scene::{IDEAL_NOISE_PER_DEPTH, Sensor, SensorPreset, UnknownLength};
+use model_offline::scene::{IDEAL_NOISE_PER_DEPTH, Motion, Sensor, SensorPreset, UnknownLength};
 
 use super::error::{OptionRange, OutOfRange};
 
@@ -20,6 +20,8 @@ pub enum FeedbackLaw {
     /// What the table leaves is estimated from sensor and table, as good as each is
     #[default]
     Observer,
+    /// The same, and a patient's breaths are predicted once one has been seen
+    Harmonic,
 }
 
 impl FeedbackLaw {
@@ -28,6 +30,7 @@ impl FeedbackLaw {
         match self {
             Self::Integral => Feedback::Integral,
             Self::Observer => Feedback::Observer,
+            Self::Harmonic => Feedback::Harmonic,
         }
     }
 
@@ -36,7 +39,13 @@ impl FeedbackLaw {
         match self {
             Self::Integral => "integral",
             Self::Observer => "observer",
+            Self::Harmonic => "harmonic",
         }
+    }
+
+    /// What a patient asks for: the harmonic predictor where one breathes.
+    pub fn for_patient(motion: &Motion) -> Self {
+        if motion.breathing.is_some() { Self::Harmonic } else { Self::default() }
     }
 }
 
@@ -58,9 +67,9 @@ pub struct LoopArgs {
     /// Standard deviation of the target sensor per component, length [default: the sensor's]
     #[arg(long, value_name = "LENGTH")]
     pub noise: Option<f64>,
-    /// How measurements of the target become corrections
-    #[arg(long, value_enum, default_value_t, value_name = "LAW")]
-    pub feedback: FeedbackLaw,
+    /// How measurements of the target become corrections [default: observer; harmonic where the scene's patient breathes]
+    #[arg(long, value_enum, value_name = "LAW")]
+    pub feedback: Option<FeedbackLaw>,
 }
 
 impl LoopArgs {
@@ -78,12 +87,13 @@ impl LoopArgs {
         Ok(sensor)
     }
 
-    /// The settings of a loop with this sensor.
+    /// The settings of a loop with this sensor and a patient who moves like this.
     ///
     /// # Errors
     /// [`OutOfRange`] names the option.
-    pub fn settings(&self, sensor: &Sensor) -> Result<LoopSettings, OutOfRange> {
-        let settings = LoopSettings { rate: self.rate, feedback: self.feedback, ..LoopSettings::of(sensor) };
+    pub fn settings(&self, sensor: &Sensor, motion: &Motion) -> Result<LoopSettings, OutOfRange> {
+        let feedback = self.feedback.unwrap_or_else(|| FeedbackLaw::for_patient(motion));
+        let settings = LoopSettings { rate: self.rate, feedback, ..LoopSettings::of(sensor) };
         settings.check()?;
         Ok(settings)
     }

@@ -79,7 +79,7 @@ impl<'m> World<TissuePlant<'m>> {
         let tissue = match model.scene().has_a_past() {
             true => {
                 let insertion = Insertion {
-                    trajectory: NeedleTrajectory::new(simulation.depth, simulation.insertion_s),
+                    trajectory: simulation.needle.clone(),
                     duration_s: simulation.duration_s,
                     plan: paddle.plan(),
                 };
@@ -103,7 +103,7 @@ impl<T: TissueResponse> World<T> {
     /// A tissue with the needle drive, the actuator and the sensors of a simulation; the paddle's encoder has this index.
     pub fn simulated(tissue: T, paddle_index: u32, simulation: &Simulation) -> Self {
         let settings = simulation.loop_settings.settings(simulation.depth);
-        let drive = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
+        let drive = simulation.needle.clone();
         let sensors = Sensors {
             target: TargetSensor::new(
                 settings.target_period_ns,

@@ -3,7 +3,7 @@
 use model_offline::scene::{Scene, Sensor};
 
 use super::actuator::ActuatorModel;
-use super::loop_settings::LoopSettings;
+use super::loop_settings::{FeedbackLaw, LoopSettings};
 use super::needle::NeedleTrajectory;
 use super::tissue::WantedPlant;
 
@@ -21,16 +21,16 @@ const SETTLE_S: f64 = 0.5;
 ///
 /// let scene = Scene::bundled("paper").expect("it comes with the program");
 /// let slow = Simulation::new(&scene).with_insertion(10.0);
-/// assert_eq!((slow.insertion_s, slow.duration_s), (10.0, 10.5));
+/// assert_eq!((slow.needle.insertion_s(), slow.duration_s), (10.0, 10.5));
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
     /// Rates, latency, noise.
     pub loop_settings: LoopSettings,
     /// What sees the target; its rate, latency, and noise are those of the loop's settings.
     pub sensor: Sensor,
-    /// Duration of the insertion, s.
-    pub insertion_s: f64,
+    /// How the needle goes.
+    pub needle: NeedleTrajectory,
     /// Time simulated after the start of the needle, s.
     pub duration_s: f64,
     /// Depth of the insertion, length.
@@ -48,22 +48,31 @@ impl Simulation {
     /// An insertion to the scene's depth in 5 s, seen by the scene's sensor, with a servo that follows at the scene's largest rate.
     pub fn new(scene: &Scene) -> Self {
         let actuator = ActuatorModel { max_rate: scene.actuator.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
-        let loop_settings = LoopSettings::of(&scene.sensor);
+        let feedback = FeedbackLaw::for_patient(&scene.motion);
+        let loop_settings = LoopSettings { feedback, ..LoopSettings::of(&scene.sensor) };
         let sensor = scene.sensor;
         let depth = scene.needle.depth;
-        Self { loop_settings, sensor, insertion_s: 0.0, duration_s: 0.0, depth, actuator, seed: 1, plant: None }
-            .with_insertion(5.0)
+        let needle = NeedleTrajectory::new(depth, 5.0);
+        let duration_s = needle.end_s() + SETTLE_S;
+        Self { loop_settings, sensor, needle, duration_s, depth, actuator, seed: 1, plant: None }
     }
 
     /// The same in so many seconds, with half a second for what is left then.
     #[must_use]
     pub fn with_insertion(self, insertion_s: f64) -> Self {
-        Self { insertion_s, duration_s: insertion_s + SETTLE_S, ..self }
+        let needle = NeedleTrajectory::new(self.depth, insertion_s);
+        self.with_needle(needle)
+    }
+
+    /// The same with a needle that goes another way, with half a second for what is left then.
+    #[must_use]
+    pub fn with_needle(self, needle: NeedleTrajectory) -> Self {
+        Self { duration_s: needle.end_s() + SETTLE_S, needle, ..self }
     }
 
     /// Largest speed of the needle, length/s.
     pub fn needle_speed(&self) -> f64 {
-        NeedleTrajectory::new(self.depth, self.insertion_s).speed()
+        self.needle.speed()
     }
 
     /// Ticks of a run, with the wait for RUN.

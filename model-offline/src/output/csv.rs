@@ -1,4 +1,8 @@
-//! Tables as CSV (RFC 4180), for all that writes one.
+//! Tables as CSV (RFC 4180), for all that writes or reads one.
+
+pub use csv::Error as CsvError;
+use serde::de::DeserializeOwned;
+use std::path::Path;
 
 /// A header and one line per item; fields that need quotes get them.
 ///
@@ -21,4 +25,13 @@ pub fn table<T, H: AsRef<[u8]>, const N: usize>(
         let _ = writer.write_record(line(item));
     }
     writer.into_inner().unwrap_or_default()
+}
+
+/// The rows of a file that begins with a line of names; lines that begin with `#` are left out.
+///
+/// # Errors
+/// [`CsvError`] says in which line what cannot be read.
+pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, CsvError> {
+    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_path(path)?;
+    reader.deserialize().collect()
 }

@@ -45,7 +45,15 @@ impl PathOptions {
     /// # Errors
     /// [`TrainingError::TooFast`] where that takes more steps than are tried.
     pub fn following(self, motion: &Motion) -> Result<Self, TrainingError> {
-        let needed = motion.longest_step().map_or(0.0, |step| (self.duration / step).ceil());
+        motion.longest_step().map_or(Ok(self), |step| self.in_steps_of(step))
+    }
+
+    /// The same with steps that take at most so many seconds.
+    ///
+    /// # Errors
+    /// [`TrainingError::TooFast`] where that takes more steps than are tried.
+    pub fn in_steps_of(self, longest: f64) -> Result<Self, TrainingError> {
+        let needed = (self.duration / longest * (1.0 - 1e-9)).ceil();
         if needed > MOST_STEPS {
             return Err(TrainingError::TooFast { steps: needed, most: MOST_STEPS });
         }

@@ -30,12 +30,16 @@ pub(super) fn measure(
     let plant_account = plant.world().plant_account();
     let deformed_nodes = plant.world().tissue.deformed_nodes();
     let started_ns = plant.world().needle_started_ns().unwrap_or(0);
+    let waited_s = plant.world().drive.wait_s();
     let needle = &model.scene().needle;
     let (normal, axis) = (needle.orthogonal(), needle.axis);
     let truths = plant.truths();
     let error = |truth: &Truth| Vector2::from(truth.target).dot(&normal);
-    let worst = truths.iter().max_by(|a, b| error(a).abs().total_cmp(&error(b).abs()));
-    let squares: f64 = truths.iter().map(|truth| error(truth).powi(2)).sum();
+    // Before the needle moves nothing is to be held.
+    let waits = |truth: &Truth| export::csv::seconds_since(truth.time_ns, started_ns) < waited_s;
+    let counted = if waited_s > 0.0 { &truths[truths.partition_point(waits)..] } else { truths };
+    let worst = counted.iter().max_by(|a, b| error(a).abs().total_cmp(&error(b).abs()));
+    let squares: f64 = counted.iter().map(|truth| error(truth).powi(2)).sum();
     let travel =
         truths.windows(2).map(|pair| (Vector2::from(pair[1].paddle) - Vector2::from(pair[0].paddle)).norm()).sum();
     let stride = truths.len().div_ceil(SERIES_POINTS - 1).max(1);
@@ -57,7 +61,7 @@ pub(super) fn measure(
         paddle,
         max_orthogonal_error: worst.map_or(0.0, |truth| error(truth).abs()),
         max_error_depth: worst.map_or(0.0, |truth| truth.depth),
-        rms_orthogonal_error: (squares / truths.len().max(1) as f64).sqrt(),
+        rms_orthogonal_error: (squares / counted.len().max(1) as f64).sqrt(),
         paddle_travel: travel,
         final_state: None,
         run_share: None,
@@ -91,13 +95,24 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Bod
     let started_ns = truths.get(started).map_or(0, |truth| truth.time_ns);
     let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
     // A millionth of the depth is beyond any drawing.
-    let places = 10f64.powi(6 - last.depth.abs().max(1e-9).log10().floor() as i32);
+    let places = 10f64.powi(6 - model.scene().needle.depth.log10().floor() as i32);
     let rounded = |coordinate: f64| (coordinate * places).round() / places;
     let mut frames = Vec::new();
+    // The needle's way so far, in and out: of one that only goes in its depth.
+    let gone: Vec<f64> = truths
+        .iter()
+        .scan((0.0, 0.0), |(before, gone), truth| {
+            *gone += (truth.depth - *before).abs();
+            *before = truth.depth;
+            Some(*gone)
+        })
+        .collect();
+    let whole = gone.last().copied().unwrap_or(0.0);
     for i in 0..=count {
-        let depth = last.depth * i as f64 / count as f64;
+        let part = whole * i as f64 / count as f64;
         // The last one is the end, with what the controller removed after the needle had arrived.
-        let truth = if i == count { last } else { &truths[truths.partition_point(|truth| truth.depth < depth)] };
+        let truth =
+            if i == count { last } else { &truths[gone.partition_point(|gone| *gone < part).min(truths.len() - 1)] };
         let since_start_s = truth.time_ns.saturating_sub(started_ns) as f64 * 1e-9;
         if tissue.step_at(since_start_s, truth.depth, Vector2::from(truth.paddle)).is_err() {
             break;

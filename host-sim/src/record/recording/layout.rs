@@ -42,6 +42,7 @@ pub(super) fn encode_header(header: &RecordingHeader, writer: &mut ByteWriter) {
     writer.u32(match settings.feedback {
         Feedback::Integral => 1,
         Feedback::Observer => 2,
+        Feedback::Harmonic => 3,
     });
     writer.u32(header.table.len() as u32);
     writer.bytes(&header.table);
@@ -91,6 +92,7 @@ fn decode_header_fields(reader: &mut ByteReader<'_>, version: u32) -> Option<Rec
     settings.feedback = match if version == FIRST_VERSION { 1 } else { reader.u32()? } {
         1 => Feedback::Integral,
         2 => Feedback::Observer,
+        3 => Feedback::Harmonic,
         _ => return None,
     };
     let length = reader.u32()? as usize;

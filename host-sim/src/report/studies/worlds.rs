@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use model_offline::number::length;
 
-use crate::bench::worlds::{Controlled, Errors, Spread, WorldRow, Worlds};
+use crate::bench::worlds::{Controlled, Errors, Spread, Worlds};
+use model_offline::scene::Effect;
 
 /// The table, in Markdown: readable in a terminal too.
 pub fn summary(worlds: &Worlds) -> String {
@@ -15,7 +16,7 @@ pub fn summary(worlds: &Worlds) -> String {
 }
 
 fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
-    let Worlds { scene, length_unit, seeds, paddles: [fixture, dynamic], rows } = worlds;
+    let Worlds { scene, length_unit, seeds, paddles: [fixture, dynamic], rows, waiting } = worlds;
     writeln!(
         text,
         "Scene {scene}: target displacement orthogonal to the needle, peak / RMS in {length_unit}; fixture: paddle {fixture}, \
@@ -28,21 +29,43 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
     writeln!(text, "|---|---|---|---|---|---|---|---|")?;
     for row in rows {
         for sensor in &row.sensors {
-            let known = sensor.known.as_ref().map_or_else(|| "no table".to_owned(), |known| controlled(known, row));
+            let known = sensor.known.as_ref();
+            let known = known.map_or_else(|| "no table".to_owned(), |known| controlled(known, &row.none));
+            let [needle, tissue, patient] = in_words(&row.effects);
             writeln!(
                 text,
-                "| {} | {} | {} | {} | {} | {} | {known} | {} |",
-                if has(row, "shaft") { "shaft" } else { "patch" },
-                if has(row, "creep") { "creeping" } else { "elastic" },
-                if has(row, "breathing") { "breathing" } else { "still" },
+                "| {needle} | {tissue} | {patient} | {} | {} | {} | {known} | {} |",
                 sensor.sensor,
                 errors(&row.none),
                 errors(&row.fixture),
-                controlled(&sensor.simple, row),
+                controlled(&sensor.simple, &row.none),
+            )?;
+        }
+    }
+    writeln!(
+        text,
+        "\nThe same where the needle waits for some breaths at the skin, the table knowing all but the breath: followed by the \
+         observer, foretold by the harmonic predictor. From the needle's first motion on.\n"
+    )?;
+    writeln!(text, "| needle | tissue | waits | sensor | no paddle | fixture | followed | foretold |")?;
+    writeln!(text, "|---|---|---|---|---|---|---|---|")?;
+    for row in waiting {
+        for sensor in &row.sensors {
+            let [needle, tissue, _] = in_words(&row.effects);
+            writeln!(
+                text,
+                "| {needle} | {tissue} | {} s | {} | {} | {} | {} | {} |",
+                row.wait_s,
+                sensor.sensor,
+                errors(&row.none),
+                errors(&row.fixture),
+                controlled(&sensor.followed, &row.none),
+                controlled(&sensor.predicted, &row.none),
             )?;
         }
     }
     let all = rows.iter().flat_map(|row| &row.sensors).flat_map(|row| row.known.iter().chain([&row.simple]));
+    let all = all.chain(waiting.iter().flat_map(|row| &row.sensors).flat_map(|row| [&row.followed, &row.predicted]));
     let found = all.filter_map(|run| run.tissue_error).fold(0.0, f64::max);
     writeln!(
         text,
@@ -58,17 +81,23 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
     Ok(())
 }
 
-fn has(row: &WorldRow, effect: &str) -> bool {
-    row.effects.iter().any(|found| found.name() == effect)
+/// Needle, tissue and patient.
+fn in_words(effects: &[Effect]) -> [&'static str; 3] {
+    let has = |effect: Effect| effects.contains(&effect);
+    [
+        if has(Effect::Shaft) { "shaft" } else { "patch" },
+        if has(Effect::Creep) { "creeping" } else { "elastic" },
+        if has(Effect::Breathing) { "breathing" } else { "still" },
+    ]
 }
 
 fn errors(Errors { peak, rms }: &Errors) -> String {
     format!("{peak:.3} / {rms:.3}")
 }
 
-fn controlled(run: &Controlled, row: &WorldRow) -> String {
+fn controlled(run: &Controlled, none: &Errors) -> String {
     let Spread { low, median, high } = run.peak;
-    let hurts = if median > row.none.peak { " (−)" } else { "" };
+    let hurts = if median > none.peak { " (−)" } else { "" };
     let share = if run.run_share < 1.0 { format!("; {:.0} % in RUN", 100.0 * run.run_share) } else { String::new() };
     // What the simulated tissue itself is off by, where that counts.
     let off = match run.tissue_error {

@@ -7,7 +7,6 @@ use nalgebra::Vector2;
 
 use crate::world::World;
 use crate::world::error::WorldError;
-use crate::world::needle::NeedleTrajectory;
 use crate::world::simulation::Simulation;
 use crate::world::tissue::{AttachedPaddle, Reductions, TissuePlant, TissueResponse as _, WantedPlant};
 
@@ -62,7 +61,7 @@ pub fn world_in_time<'m>(
     if simulation.plant.is_some() {
         return Err(full.too_slow());
     }
-    let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..*simulation };
+    let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..simulation.clone() };
     let Ok(mut world) = at_rest(&reduced) else { return Err(full.too_slow()) };
     let rehearsed = rehearse(&mut world.tissue, simulation)?;
     if !rehearsed.keeps_the_period() {
@@ -77,9 +76,9 @@ pub fn world_in_time<'m>(
 /// # Errors
 /// [`WorldError::Tissue`].
 pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result<Rehearsal, WorldError> {
-    let trajectory = NeedleTrajectory::new(simulation.depth, simulation.insertion_s);
+    let trajectory = &simulation.needle;
     let period_us = simulation.loop_settings.period_ns() as f64 * 1e-3;
-    let middle_s = 0.5 * simulation.insertion_s;
+    let middle_s = trajectory.midway_s();
     let (mut total_us, mut timed) = (0.0, 0_u32);
     tissue.aside(|tissue| {
         let middle = trajectory.at(middle_s).depth;

@@ -5,24 +5,28 @@
 //! between; a loop that the machine's clock drives solves at every tick, because it has no time for one tick's solve
 //! after many without.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use clap::ValueEnum;
-use firmware::contract::Table;
 use model_offline::model::{Body, Pose, TissueModel};
 use model_offline::needle::Course;
-use model_offline::parallel;
-use model_offline::reduction::along_path::{AlongPath, PathBody, PathOptions, along};
+use model_offline::reduction::along_path::{PathBody, along};
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
-use model_offline::reduction::{Condensed, Extrapolated, TrainingError, TrainingOptions, TrainingReport, train};
+use model_offline::reduction::{Condensed, Extrapolated};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 use super::error::WorldError;
 use super::needle::NeedleTrajectory;
+
+mod account;
+mod attachment;
+mod reductions;
+
+pub use account::PlantAccount;
+pub use attachment::{AttachedPaddle, Attachment, Insertion, PaddlePlan};
+pub use reductions::Reductions;
 
 /// Error of an extrapolated target displacement that is aimed at, over the depth that the scene inserts to: a thousandth of
 /// the noise that the target is seen with.
@@ -41,219 +45,6 @@ pub enum WantedPlant {
     Condensed,
     /// What `model-offline fit` wrote into the scene, else the reduced model if it can be trained
     Auto,
-}
-
-/// Which model answered, how often it could not, and how far off it was in the end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PlantAccount {
-    /// The model.
-    pub model: PlantModel,
-    /// Modes of the reduced model.
-    #[serde(default)]
-    pub modes: Option<usize>,
-    /// Integration points left of the full model's.
-    #[serde(default)]
-    pub points: Option<[usize; 2]>,
-    /// Steps that the full model answered because the reduced one could not.
-    #[serde(default)]
-    pub fallbacks: u64,
-    /// Why, the first time; or why there is no reduced model.
-    #[serde(default)]
-    pub first_fallback: Option<String>,
-    /// What a step of the full model takes, µs, where the reduced one stands in because that is too long.
-    #[serde(default)]
-    pub full_step_us: Option<f64>,
-    /// Largest error of the target displacement that the reduced model estimated of itself, length.
-    #[serde(default)]
-    pub largest_estimate: Option<f64>,
-    /// States on the path that stands in for tissue that has a past.
-    #[serde(default)]
-    pub path_knots: Option<usize>,
-    /// States that the full model was solved for, where it was extrapolated between.
-    #[serde(default)]
-    pub solves: Option<u64>,
-    /// Largest error of an extrapolated target displacement that solving found, the end of the run included, length.
-    #[serde(default)]
-    pub extrapolation_error: Option<f64>,
-    /// Distance from the full model's target displacement at the end of the run, length; computed after it.
-    #[serde(default)]
-    pub error_at_end: Option<f64>,
-}
-
-impl Default for PlantAccount {
-    /// The full model, which has nothing to account for.
-    fn default() -> Self {
-        Self {
-            model: PlantModel::Full,
-            modes: None,
-            points: None,
-            fallbacks: 0,
-            first_fallback: None,
-            full_step_us: None,
-            largest_estimate: None,
-            path_knots: None,
-            solves: None,
-            extrapolation_error: None,
-            error_at_end: None,
-        }
-    }
-}
-
-/// What is attached to a body, and what becomes of it: all that a reduced model of the body depends on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Attachment {
-    /// Place of the paddle in the scene's list; none without one.
-    pub paddle: Option<usize>,
-    /// Whether it stays where it rests. A reduced model needs to know nothing else then.
-    pub held: bool,
-}
-
-impl Attachment {
-    /// A paddle that moves.
-    pub const fn moved(paddle: Option<usize>) -> Self {
-        Self { paddle, held: false }
-    }
-
-    /// A paddle that does not.
-    pub const fn held(paddle: Option<usize>) -> Self {
-        Self { paddle, held: true }
-    }
-
-    /// To the scene's own accuracy, on all threads: the result does not depend on how many there are.
-    fn training(self, model: &TissueModel) -> TrainingOptions {
-        let options = TrainingOptions { threads: parallel::available(), ..TrainingOptions::of(model.scene()) };
-        if self.held { TrainingOptions { paddle: Some(0.0), ..options } } else { options }
-    }
-}
-
-/// What training found.
-type Trained = Result<(Arc<ReducedModel>, TrainingReport), TrainingError>;
-
-/// Reduced models of one tissue, each trained when it is first asked for: insertions that differ in table, mode or loop
-/// alone share theirs. Refusals are remembered too.
-#[derive(Debug, Default)]
-pub struct Reductions {
-    states: Mutex<Vec<(Attachment, Trained)>>,
-    paths: Mutex<Vec<(PathKey, Learnt)>>,
-}
-
-/// What a path depends on besides the tissue.
-type PathKey = (Attachment, Insertion);
-
-/// One insertion.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Insertion {
-    /// How the needle goes.
-    pub trajectory: NeedleTrajectory,
-    /// Seconds from its start to the end.
-    pub duration_s: f64,
-    /// Where the paddle is planned to be.
-    pub plan: PaddlePlan,
-}
-
-/// What is attached to the tissue of a world, and what becomes of it.
-#[derive(Clone, Copy, Debug)]
-pub enum AttachedPaddle<'t> {
-    /// Nothing.
-    None,
-    /// The paddle of this index, which stays where it rests.
-    Held(u32),
-    /// The paddle of this index, which moves nobody knows where to.
-    Moved(u32),
-    /// A table's paddle, which moves as it plans, and as a controller corrects it.
-    Steered(&'t Table<f64, 2>),
-}
-
-impl AttachedPaddle<'_> {
-    /// Its index.
-    pub fn index(&self) -> Option<u32> {
-        match self {
-            Self::None => None,
-            Self::Held(index) | Self::Moved(index) => Some(*index),
-            Self::Steered(table) => Some(table.paddle.index),
-        }
-    }
-
-    pub(super) fn attachment(&self, position: Option<usize>) -> Attachment {
-        match self {
-            Self::None | Self::Held(_) => Attachment::held(position),
-            Self::Moved(_) | Self::Steered(_) => Attachment::moved(position),
-        }
-    }
-
-    pub(super) fn plan(&self) -> PaddlePlan {
-        match self {
-            Self::Steered(table) => PaddlePlan::of(table),
-            _ => PaddlePlan::default(),
-        }
-    }
-}
-
-/// Where a paddle is planned to be along the depth; nowhere else than at rest by default.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct PaddlePlan(Vec<(f64, Vector2<f64>)>);
-
-impl PaddlePlan {
-    /// A table's feed-forward path.
-    pub fn of(table: &Table<f64, 2>) -> Self {
-        Self(table.knots.iter().map(|knot| (knot.depth, knot.paddle_path)).collect())
-    }
-
-    /// At a depth, length; its ends are held.
-    fn at(&self, depth: f64) -> Vector2<f64> {
-        let after = self.0.partition_point(|(knot, _)| *knot <= depth);
-        match (after.checked_sub(1).map(|before| self.0[before]), self.0.get(after)) {
-            (None, None) => Vector2::zeros(),
-            (None, Some((_, only))) => *only,
-            (Some((_, only)), None) => only,
-            (Some((from, a)), Some((to, b))) => a + (b - a) * ((depth - from) / (to - from)),
-        }
-    }
-}
-
-/// What learning a path found.
-type Learnt = Result<Arc<AlongPath>, TrainingError>;
-
-impl Reductions {
-    /// The one for this attachment; `model` is the same at every call.
-    fn of(&self, model: &TissueModel, attachment: Attachment) -> Trained {
-        let known = || self.states.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = known().iter().find(|(of, _)| *of == attachment).map(|(_, trained)| trained.clone());
-        found.unwrap_or_else(|| {
-            // Without the lock: a thread that waits for others to train may be given another insertion meanwhile, which
-            // asks here as well.
-            let trained = train(model, attachment.paddle, &attachment.training(model));
-            known().push((attachment, trained.clone()));
-            trained
-        })
-    }
-}
-
-impl Reductions {
-    /// The path of an insertion; `model` is the same at every call.
-    fn path(&self, model: &TissueModel, attachment: Attachment, insertion: &Insertion) -> Learnt {
-        let Insertion { trajectory, duration_s, plan } = insertion;
-        let key = (attachment, insertion.clone());
-        let known = || self.paths.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = known().iter().find(|(of, _)| *of == key).map(|(_, learnt)| learnt.clone());
-        found.unwrap_or_else(|| {
-            let way = |time: f64| {
-                let depth = trajectory.at(time).depth;
-                let paddle = if attachment.held { Vector2::zeros() } else { plan.at(depth) };
-                Pose { paddle, ..model.pose_at(time, depth) }
-            };
-            let options = PathOptions {
-                steered: !attachment.held,
-                threads: parallel::available(),
-                ..PathOptions::new(*duration_s)
-            };
-            let options = options.following(&model.scene().motion);
-            let learnt = options.and_then(|options| AlongPath::learn(model, attachment.paddle, &way, &options));
-            let learnt = learnt.map(Arc::new);
-            known().push((key, learnt.clone()));
-            learnt
-        })
-    }
 }
 
 /// What answers for the tissue.
@@ -317,7 +108,8 @@ struct AlongInsertion {
 impl AlongInsertion {
     /// The same insertion, from its start.
     fn afresh(&self) -> Self {
-        Self { body: self.body.afresh(), paddle: Vec::new(), ..*self }
+        let Self { body, trajectory, interval_s, .. } = self;
+        Self { body: body.afresh(), trajectory: trajectory.clone(), interval_s: *interval_s, paddle: Vec::new() }
     }
 }
 
@@ -325,7 +117,7 @@ impl<'m> TissuePlant<'m> {
     /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
     ///
     /// # Errors
-    /// [`WorldError::Scene`] where the needle slips; [`WorldError::Tissue`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
+    /// [`WorldError::Tissue`] or, of tissue that has a past, [`WorldError::Needle`] when the body is not held; [`WorldError::Training`] or [`WorldError::Condensation`] when
     /// the reduced model that was asked for cannot be made (with [`WantedPlant::Auto`] the full one answers, and the account says why).
     pub fn new(model: &'m TissueModel, paddle: Option<usize>, choice: WantedPlant) -> Result<Self, WorldError> {
         Self::sharing(model, Attachment::moved(paddle), choice, &Reductions::default())
@@ -521,7 +313,7 @@ impl<'m> TissuePlant<'m> {
             account.solves = Some(body.account().solves);
             account.extrapolation_error = Some(body.account().largest_error);
         } else if let Kind::Path(taken) = &self.kind {
-            let (trajectory, model) = (taken.trajectory, self.model);
+            let (trajectory, model) = (&taken.trajectory, self.model);
             let way = |time: f64| model.pose_at(time, trajectory.at(time).depth);
             // Where the full model cannot go the same way nothing is known.
             if let Ok(full) = along(model, self.paddle, &way, taken.interval_s, &taken.paddle) {

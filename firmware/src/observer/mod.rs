@@ -16,6 +16,10 @@
 //! an exact sensor the estimate follows every sample, with a poor one it trusts the table until the samples together
 //! say otherwise.
 //!
+//! Of a patient who breathes, the same sensor sees a displacement that comes again with every breath. With
+//! [`Feedback::Harmonic`](crate::Feedback::Harmonic) it is a part of the state as soon as a whole breath has been seen, and is
+//! predicted over the delay of the loop; see [`BreathBelief`].
+//!
 //! Two safeguards, because the model of the error is a model too: the gain never exceeds the one that the delayed loop
 //! bears ([`crate::loop_stability`]), and innovations that keep their sign for longer than noise would widen the
 //! covariance until the estimate follows (a patient who moves, tissue that is further off than was allowed for).
@@ -24,6 +28,12 @@ use crate::detection::{
     LEVEL_TIME, STEEPEST_SURPRISE, SURPRISE_GROWTH, SURPRISE_MEMORY, SURPRISE_SIGMAS, TISSUE_SPREAD,
 };
 use crate::scalar::{Scalar, bounded};
+use nalgebra::Matrix2;
+
+mod breathing;
+
+pub use breathing::BreathBelief;
+use breathing::{Breathing, News};
 
 /// What is believed before the first sample, as variances; built once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +50,8 @@ pub struct Belief<T: Scalar> {
     pub widest: T,
     /// Largest gain on the level.
     pub max_gain: T,
+    /// What breaths are looked for with, if they are.
+    pub breathing: Option<BreathBelief<T>>,
 }
 
 impl<T: Scalar> Belief<T> {
@@ -58,6 +70,7 @@ impl<T: Scalar> Belief<T> {
             level_walk: T::of(at_the_end * at_the_end / LEVEL_TIME),
             widest: T::of(target_range * target_range),
             max_gain: T::of(max_gain),
+            breathing: None,
         }
     }
 }
@@ -77,6 +90,8 @@ impl<T: Scalar> Belief<T> {
 ///     observer.update(&belief, 1.0, 0.1, 0.03);
 /// }
 /// assert!((observer.at(0.1) - 1.0).abs() < 0.2);
+/// // At rest nothing changes with time.
+/// assert_eq!(observer.ahead(0.1), (0.0, 0.0));
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Observer<T: Scalar> {
@@ -90,6 +105,7 @@ pub struct Observer<T: Scalar> {
     /// Normalised innovations, summed with forgetting, and the variance of that sum.
     surprise: T,
     surprise_variance: T,
+    breathing: Breathing<T>,
 }
 
 impl<T: Scalar> Observer<T> {
@@ -111,14 +127,36 @@ impl<T: Scalar> Observer<T> {
     pub fn update(&mut self, belief: &Belief<T>, measured: T, depth: T, elapsed: T) {
         let way = depth - self.depth;
         self.advance(belief, way, elapsed);
+        self.breathing.advance(way, elapsed);
         self.depth = depth;
-        let innovation = measured - self.level;
-        self.widen_if_surprised(belief, innovation);
-        let gains = self.gains(belief, way);
-        self.correct(belief, innovation, gains);
+        let (breath, uncertain) = self.breathing.now();
+        let innovation = measured - self.level - breath;
+        self.widen_if_surprised(belief, innovation, belief.noise + uncertain);
+        if self.breathing.is_predicted() {
+            self.correct_all(belief, innovation, way);
+        } else {
+            let gains = self.gains(belief, way);
+            self.correct(belief, innovation, gains);
+        }
+        if let Some(breaths) = &belief.breathing {
+            match self.breathing.watch(breaths, measured, elapsed) {
+                News::Nothing => {}
+                News::Begins { middle, swing } => self.begin_to_predict(belief, middle, swing),
+                News::Ends { left } => {
+                    self.level += left;
+                    self.level_variance += left * left;
+                }
+            }
+        }
     }
 
-    /// The estimate at a depth, length.
+    /// What level and slope have learnt of a patient who breathed was a breath.
+    fn begin_to_predict(&mut self, belief: &Belief<T>, middle: T, swing: T) {
+        (self.level, self.level_variance) = (middle, T::of(0.25 * 0.25) * swing * swing);
+        (self.slope, self.slope_variance, self.covariance) = (T::zero(), belief.slope, T::zero());
+    }
+
+    /// The estimate at a depth, length, but for what a breath adds.
     pub fn at(&self, depth: T) -> T {
         self.level + self.slope * (depth - self.depth)
     }
@@ -126,6 +164,16 @@ impl<T: Scalar> Observer<T> {
     /// d(estimate)/d(depth).
     pub fn slope(&self) -> T {
         self.slope
+    }
+
+    /// What a breath adds to the estimate in so many seconds, and its rate, length and length/s.
+    pub fn ahead(&self, seconds: T) -> (T, T) {
+        self.breathing.ahead(seconds)
+    }
+
+    /// Whether a breath has been seen, and the next ones are predicted.
+    pub fn predicts_breaths(&self) -> bool {
+        self.breathing.is_predicted()
     }
 
     fn advance(&mut self, belief: &Belief<T>, way: T, elapsed: T) {
@@ -138,14 +186,17 @@ impl<T: Scalar> Observer<T> {
 
     /// Innovations of a filter whose model holds are white: their sum with forgetting stays within a few of its own
     /// standard deviations.
-    fn widen_if_surprised(&mut self, belief: &Belief<T>, innovation: T) {
+    fn widen_if_surprised(&mut self, belief: &Belief<T>, innovation: T, noise: T) {
         let memory = T::of(SURPRISE_MEMORY);
-        self.surprise = self.surprise * memory + innovation / (self.level_variance + belief.noise).sqrt();
+        self.surprise = self.surprise * memory + innovation / (self.level_variance + noise).sqrt();
         self.surprise_variance = self.surprise_variance * memory * memory + T::one();
         let expected = T::of(SURPRISE_SIGMAS * SURPRISE_SIGMAS) * self.surprise_variance;
         if self.surprise * self.surprise > expected && self.level_variance < belief.widest {
             let growth = T::of(SURPRISE_GROWTH);
             self.level_variance *= growth;
+            if let Some(waves) = self.breathing.waves() {
+                waves.widen(growth);
+            }
             // At rest nothing would ever bring the slope's variance down again: what surprises then is no slope.
             if self.slope_variance < T::of(STEEPEST_SURPRISE) * belief.slope {
                 self.covariance *= growth;
@@ -162,11 +213,25 @@ impl<T: Scalar> Observer<T> {
         if level <= most {
             return (level, slope);
         }
-        let slope = slope * (most / level);
-        // The slope of an α-β filter that keeps its bandwidth: β = α²/(2 − α) per step.
-        let steepest = most * most / (T::of(2.0) - most);
-        let per_step = bounded(slope * way, -steepest, steepest);
-        (most, if way == T::zero() { slope } else { per_step / way })
+        (most, bounded_slope(slope * (most / level), way, most))
+    }
+
+    /// The same with a breath's waves, which take their part of the gain that the loop bears.
+    fn correct_all(&mut self, belief: &Belief<T>, innovation: T, way: T) {
+        let Some(waves) = self.breathing.waves() else { return };
+        let line = Matrix2::new(self.level_variance, self.covariance, self.covariance, self.slope_variance);
+        let shares = waves.shares(line.column(0).into());
+        let variance = shares.in_all() + belief.noise;
+        let mut gains = shares.times(T::one() / variance);
+        let (all, most) = (gains.in_all(), belief.max_gain);
+        if all > most {
+            gains = gains.times(most / all);
+            gains.beside.y = bounded_slope(gains.beside.y, way, most);
+        }
+        let line = waves.correct(innovation, (&shares, &gains), variance, &line);
+        (self.level_variance, self.covariance, self.slope_variance) = (line.m11, line.m12, line.m22);
+        self.level += gains.beside.x * innovation;
+        self.slope += gains.beside.y * innovation;
     }
 
     /// In Joseph's form, which stays positive for any gains.
@@ -182,6 +247,14 @@ impl<T: Scalar> Observer<T> {
     }
 }
 
+/// Gain on the slope beside `most` on the level, over a `way`: that of an α-β filter which keeps its bandwidth, β = α²/(2 − α)
+/// per step, at most.
+fn bounded_slope<T: Scalar>(slope: T, way: T, most: T) -> T {
+    let steepest = most * most / (T::of(2.0) - most);
+    let per_step = bounded(slope * way, -steepest, steepest);
+    if way == T::zero() { slope } else { per_step / way }
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::{Matrix2, RowVector2, Vector2};
@@ -189,8 +262,15 @@ mod tests {
 
     use super::*;
 
-    const BELIEF: Belief<f64> =
-        Belief { noise: 0.16, slope: 3e-5, slope_walk: 2.5e-6, level_walk: 1e-4, widest: 100.0, max_gain: 1.0 };
+    const BELIEF: Belief<f64> = Belief {
+        noise: 0.16,
+        slope: 3e-5,
+        slope_walk: 2.5e-6,
+        level_walk: 1e-4,
+        widest: 100.0,
+        max_gain: 1.0,
+        breathing: None,
+    };
 
     /// The textbook's filter in matrices, without safeguards.
     struct Textbook {
@@ -281,7 +361,7 @@ mod tests {
                 covariance: 1e-3,
                 ..Observer::default()
             };
-            observer.widen_if_surprised(&BELIEF, 0.0);
+            observer.widen_if_surprised(&BELIEF, 0.0, BELIEF.noise);
             let growth = if grows { SURPRISE_GROWTH } else { 1.0 };
             assert_eq!(observer.level_variance, 2.0 * SURPRISE_GROWTH);
             assert_eq!(

@@ -1,0 +1,645 @@
+//! A displacement that comes again with every breath: two waves that turn with time, and what finds their period.
+//!
+//! ```text
+//! d(t) = c₁ + c₂,   cₖ' = k·ω·sₖ,   sₖ' = −k·ω·cₖ        k = 1, 2
+//! ```
+//!
+//! cos⁴, the usual model of breathing, has these two waves and no other (Lujan et al., Medical Physics 26, 1999). They are
+//! four more states of the observer's Kalman filter, which turn with time and walk by a part of a breath's size from one to the
+//! next; their covariances with each other and with level and slope are kept in blocks of two by two.
+//!
+//! Nothing is predicted before a whole breath has been seen: two rises through the middle between the last top and the last
+//! bottom of the smoothed signal. Noise does not make a top, because the signal must fall by several of its standard
+//! deviations from it. Every later breath corrects the period, and a breath that does not come ends the prediction.
+
+use nalgebra::{Matrix2, RowVector2, Vector2};
+
+use super::Belief;
+use crate::detection::{
+    BREATH_CHANGE, BREATH_LEARNS, BREATH_SIGMAS, BREATH_SMOOTHING, BREATH_WANDER, BREATHS_MISSED, LONGEST_BREATH,
+    SHORTEST_BREATH,
+};
+use crate::scalar::Scalar;
+
+/// A swing counts from this many steps on.
+const STEPS_PER_SWING: f64 = 2.5;
+/// Size of the second wave over the first (cos⁴), as far as it is known before.
+const SECOND_WAVE: f64 = 0.5;
+
+/// What breaths are looked for with; built once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BreathBelief<T: Scalar> {
+    /// Part of a sample that the smoothed signal takes.
+    share: T,
+    /// A top is one once the smoothed signal has fallen this far from it, length.
+    step: T,
+}
+
+impl<T: Scalar> BreathBelief<T> {
+    /// Of a sensor with this period, s, and noise, length, whose target moves by at most `target_range`, length.
+    pub(super) fn new(target_period: f64, noise: f64, target_range: f64) -> Self {
+        let share = (target_period / BREATH_SMOOTHING).min(1.0);
+        let smoothed = noise * libm::sqrt(share / (2.0 - share));
+        Self { share: T::of(share), step: T::of((BREATH_SIGMAS / STEPS_PER_SWING * smoothed).max(1e-3 * target_range)) }
+    }
+}
+
+/// Displacement of a wave now and a quarter of a turn later, and the turn by an angle.
+fn turn<T: Scalar>(angle: T) -> Matrix2<T> {
+    // To the angle's third power over twelve: a rotation for any angle, without a sine.
+    let half = T::of(0.5) * angle;
+    let squared = half * half;
+    let scale = T::one() / (T::one() + squared);
+    let (cos, sin) = ((T::one() - squared) * scale, (half + half) * scale);
+    Matrix2::new(cos, sin, -sin, cos)
+}
+
+/// Where the smoothed signal is on its way up and down.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Swing<T: Scalar> {
+    /// The smoothed signal, from the first sample on.
+    smooth: Option<T>,
+    /// The farthest that it has been since it turned, length.
+    extreme: T,
+    /// Whether it rises; unknown until it has gone by a step.
+    rises: Option<bool>,
+    top: Option<T>,
+    bottom: Option<T>,
+    /// Since it last rose through the middle, s.
+    since_rise: Option<T>,
+}
+
+/// A rise through the middle.
+struct Rise<T> {
+    /// Since the one before, s.
+    period: Option<T>,
+    /// Between bottom and top, length.
+    middle: T,
+    /// From bottom to top, length.
+    swing: T,
+}
+
+impl<T: Scalar> Swing<T> {
+    fn watch(&mut self, belief: &BreathBelief<T>, measured: T, elapsed: T) -> Option<Rise<T>> {
+        let before = self.smooth.unwrap_or(measured);
+        let now = before + belief.share * (measured - before);
+        if self.smooth.is_none() {
+            self.extreme = now;
+        }
+        self.smooth = Some(now);
+        self.since_rise = self.since_rise.map(|since| since + elapsed);
+        match self.rises {
+            Some(true) if now > self.extreme => self.extreme = now,
+            Some(false) if now < self.extreme => self.extreme = now,
+            Some(true) if now < self.extreme - belief.step => {
+                (self.top, self.rises, self.extreme) = (Some(self.extreme), Some(false), now);
+            }
+            Some(false) if now > self.extreme + belief.step => {
+                (self.bottom, self.rises, self.extreme) = (Some(self.extreme), Some(true), now);
+            }
+            None if (now - self.extreme).abs() > belief.step => {
+                (self.rises, self.extreme) = (Some(now > self.extreme), now);
+            }
+            _ => {}
+        }
+        let swing = self.top? - self.bottom?;
+        let middle = self.bottom? + T::of(0.5) * swing;
+        if self.rises == Some(true) && before < middle && middle <= now && swing > T::of(STEPS_PER_SWING) * belief.step
+        {
+            return Some(Rise { period: self.since_rise.replace(T::zero()), middle, swing });
+        }
+        None
+    }
+}
+
+/// What a breath does to the target, and when the next one comes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Breathing<T: Scalar> {
+    swing: Swing<T>,
+    /// 2π over the period, rad/s, and the waves; none until a breath has been seen.
+    waves: Option<Waves<T>>,
+}
+
+/// Both waves, and what is known of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Waves<T: Scalar> {
+    rate: T,
+    first: Vector2<T>,
+    second: Vector2<T>,
+    /// Covariances: of each wave, of the first (rows) with the second, of each (rows) with level and slope.
+    of_first: Matrix2<T>,
+    of_second: Matrix2<T>,
+    between: Matrix2<T>,
+    first_beside: Matrix2<T>,
+    second_beside: Matrix2<T>,
+}
+
+/// What an innovation has in common with the states: its covariance with each, or the gains on each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shares<T: Scalar> {
+    /// Of level and slope.
+    pub(super) beside: Vector2<T>,
+    first: Vector2<T>,
+    second: Vector2<T>,
+}
+
+impl<T: Scalar> Shares<T> {
+    /// Of what is measured.
+    pub(super) fn in_all(&self) -> T {
+        self.beside.x + self.first.x + self.second.x
+    }
+
+    pub(super) fn times(&self, factor: T) -> Self {
+        Self { beside: self.beside * factor, first: self.first * factor, second: self.second * factor }
+    }
+
+    fn minus(&self, other: &Self) -> Self {
+        Self { beside: self.beside - other.beside, first: self.first - other.first, second: self.second - other.second }
+    }
+}
+
+/// `covariance` after a correction with `gain` on rows and columns (Joseph's form, for any gain): the halves hold what an
+/// innovation has in common with them, less half of what the correction takes.
+fn corrected<T: Scalar>(
+    covariance: &Matrix2<T>,
+    (row_gain, row_half): (&Vector2<T>, &Vector2<T>),
+    (column_gain, column_half): (&Vector2<T>, &Vector2<T>),
+) -> Matrix2<T> {
+    covariance - row_gain * column_half.transpose() - row_half * column_gain.transpose()
+}
+
+fn symmetric<T: Scalar>(matrix: Matrix2<T>) -> Matrix2<T> {
+    Matrix2::new(matrix.m11, matrix.m12, matrix.m12, matrix.m22)
+}
+
+impl<T: Scalar> Waves<T> {
+    fn beginning(period: T, swing: T) -> Self {
+        let (half, rate) = (T::of(0.5) * swing, T::two_pi() / period);
+        let deviation = T::of(0.25) * swing;
+        let variance = Matrix2::identity() * (deviation * deviation);
+        // The smoothed signal rises through its middle now; the signal did so before.
+        let first = turn(rate * T::of(BREATH_SMOOTHING)) * Vector2::new(T::zero(), half);
+        Self {
+            rate,
+            first,
+            second: Vector2::zeros(),
+            of_first: variance,
+            of_second: variance * T::of(SECOND_WAVE * SECOND_WAVE),
+            between: Matrix2::zeros(),
+            first_beside: Matrix2::zeros(),
+            second_beside: Matrix2::zeros(),
+        }
+    }
+
+    /// The waves turn, and are less certain; the level goes along its slope by `way`.
+    fn advance(&mut self, way: T, elapsed: T) {
+        let angle = self.rate * elapsed;
+        let first = turn(angle);
+        let second = first * first;
+        let along = Matrix2::new(T::one(), T::zero(), way, T::one());
+        // Over a period 2π/ω, the part of a breath that the next one may differ by.
+        let walk = T::of(BREATH_WANDER * BREATH_WANDER / core::f64::consts::TAU) * self.first.norm_squared() * angle;
+        self.first = first * self.first;
+        self.second = second * self.second;
+        self.of_first = symmetric(first * self.of_first * first.transpose()) + Matrix2::identity() * walk;
+        let walk = T::of(SECOND_WAVE * SECOND_WAVE) * walk;
+        self.of_second = symmetric(second * self.of_second * second.transpose()) + Matrix2::identity() * walk;
+        self.between = first * self.between * second.transpose();
+        self.first_beside = first * self.first_beside * along;
+        self.second_beside = second * self.second_beside * along;
+    }
+
+    /// What surprises is another breath as likely as anything else: the waves are less certain by this factor, as long as
+    /// they are known better than by half of their size.
+    pub(super) fn widen(&mut self, growth: T) {
+        if self.of_first.m11 < T::of(0.25) * self.first.norm_squared() {
+            self.of_first *= growth;
+            self.of_second *= growth;
+            self.between *= growth;
+        }
+    }
+
+    fn now(&self) -> T {
+        self.first.x + self.second.x
+    }
+
+    /// What they add to the variance of what is measured.
+    fn variance(&self) -> T {
+        let twice = self.between.m11 + self.first_beside.m11 + self.second_beside.m11;
+        self.of_first.m11 + self.of_second.m11 + twice + twice
+    }
+
+    /// Covariances of what is measured with the states; `beside` is that of level and slope alone.
+    pub(super) fn shares(&self, beside: Vector2<T>) -> Shares<T> {
+        let row = |row: RowVector2<T>| row.transpose();
+        Shares {
+            beside: beside + row(self.first_beside.row(0).into()) + row(self.second_beside.row(0).into()),
+            first: self.of_first.column(0) + self.between.column(0) + self.first_beside.column(0),
+            second: self.of_second.column(0) + row(self.between.row(0).into()) + self.second_beside.column(0),
+        }
+    }
+
+    /// Enters an innovation of this variance with these gains; returns the covariance of level and slope after it.
+    pub(super) fn correct(
+        &mut self,
+        innovation: T,
+        (shares, gains): (&Shares<T>, &Shares<T>),
+        variance: T,
+        beside: &Matrix2<T>,
+    ) -> Matrix2<T> {
+        let half = shares.minus(&gains.times(T::of(0.5) * variance));
+        let (first, second) = ((&gains.first, &half.first), (&gains.second, &half.second));
+        let line = (&gains.beside, &half.beside);
+        self.first += gains.first * innovation;
+        self.second += gains.second * innovation;
+        self.of_first = symmetric(corrected(&self.of_first, first, first));
+        self.of_second = symmetric(corrected(&self.of_second, second, second));
+        self.between = corrected(&self.between, first, second);
+        self.first_beside = corrected(&self.first_beside, first, line);
+        self.second_beside = corrected(&self.second_beside, second, line);
+        symmetric(corrected(beside, line, line))
+    }
+
+    fn ahead(&self, seconds: T) -> (T, T) {
+        let first = turn(self.rate * seconds);
+        let (first, second) = (first * self.first, first * (first * self.second));
+        (first.x + second.x, self.rate * (first.y + second.y + second.y))
+    }
+}
+
+/// What a sample taught about breathing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum News<T> {
+    Nothing,
+    /// From now on it is predicted; breaths have this middle and this size, length.
+    Begins {
+        middle: T,
+        swing: T,
+    },
+    /// No longer; the waves came to this, length.
+    Ends {
+        left: T,
+    },
+}
+
+impl<T: Scalar> Breathing<T> {
+    /// The waves, where breaths are predicted.
+    pub(super) fn waves(&mut self) -> Option<&mut Waves<T>> {
+        self.waves.as_mut()
+    }
+
+    /// Whether breaths are predicted.
+    pub(super) fn is_predicted(&self) -> bool {
+        self.waves.is_some()
+    }
+
+    /// Time goes on, and the level along its slope by `way`.
+    pub(super) fn advance(&mut self, way: T, elapsed: T) {
+        if let Some(waves) = &mut self.waves {
+            waves.advance(way, elapsed);
+        }
+    }
+
+    /// Displacement now, length, and what it adds to the variance of what is measured, length².
+    pub(super) fn now(&self) -> (T, T) {
+        self.waves.as_ref().map_or((T::zero(), T::zero()), |waves| (waves.now(), waves.variance()))
+    }
+
+    /// Displacement and its rate in so many seconds, length and length/s.
+    pub(super) fn ahead(&self, seconds: T) -> (T, T) {
+        self.waves.as_ref().map_or((T::zero(), T::zero()), |waves| waves.ahead(seconds))
+    }
+
+    /// Looks for breaths.
+    pub(super) fn watch(&mut self, belief: &BreathBelief<T>, measured: T, elapsed: T) -> News<T> {
+        let rise = self.swing.watch(belief, measured, elapsed);
+        let seen = rise.and_then(|rise| Some((rise.period?, rise.middle, rise.swing)));
+        let breath = T::of(SHORTEST_BREATH)..=T::of(LONGEST_BREATH);
+        match (&mut self.waves, seen.filter(|(period, ..)| breath.contains(period))) {
+            (None, Some((period, middle, swing))) => {
+                self.waves = Some(Waves::beginning(period, swing));
+                News::Begins { middle, swing }
+            }
+            (Some(waves), Some((period, middle, swing))) => {
+                let rate = T::two_pi() / period;
+                if (rate - waves.rate).abs() > T::of(BREATH_CHANGE) * waves.rate {
+                    *waves = Waves::beginning(period, swing);
+                    return News::Begins { middle, swing };
+                }
+                waves.rate += T::of(BREATH_LEARNS) * (rate - waves.rate);
+                News::Nothing
+            }
+            (Some(waves), None) => {
+                let longest = T::of(BREATHS_MISSED) * T::two_pi();
+                if self.swing.since_rise.is_some_and(|since| since * waves.rate <= longest) {
+                    return News::Nothing;
+                }
+                let left = waves.now();
+                self.waves = None;
+                News::Ends { left }
+            }
+            (None, None) => News::Nothing,
+        }
+    }
+}
+
+impl<T: Scalar> Belief<T> {
+    /// The same of a patient who may breathe, seen every `target_period` seconds.
+    #[must_use]
+    pub fn with_breathing(self, target_period: f64) -> Self {
+        let (noise, range) = (libm::sqrt(self.noise.to_f64()), libm::sqrt(self.widest.to_f64()));
+        Self { breathing: Some(BreathBelief::new(target_period, noise, range)), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::{PI, TAU};
+
+    use nalgebra::{SMatrix, SVector};
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::observer::Observer;
+
+    const ULTRASOUND_S: f64 = 1.0 / 30.0;
+
+    /// A sensor's noise: sums of twelve uniform numbers, standard deviation 1.
+    struct Noise(u64);
+
+    impl Noise {
+        fn next(&mut self) -> f64 {
+            let mut uniform = || {
+                self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+                (self.0 >> 11) as f64 / (1u64 << 53) as f64
+            };
+            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+        }
+    }
+
+    fn belief(noise: f64) -> Belief<f64> {
+        Belief::new(noise, 0.2, 12.0, 10.0, 0.1).with_breathing(ULTRASOUND_S)
+    }
+
+    /// As Lujan et al. have it.
+    fn lujan(amplitude: f64, period_s: f64, time_s: f64) -> f64 {
+        amplitude * (1.0 - (PI * time_s / period_s).cos().powi(4))
+    }
+
+    /// An observer that has seen this for so long at depth 0.
+    fn having_seen(belief: &Belief<f64>, seconds: f64, target: impl Fn(f64) -> f64, seed: u64) -> Observer<f64> {
+        let mut noise = Noise(seed);
+        let mut observer = Observer::starting(belief, 0.0, 0.0, 0.0);
+        for k in 0..(seconds / ULTRASOUND_S) as u32 {
+            let time_s = f64::from(k) * ULTRASOUND_S;
+            let measured = target(time_s) + belief.noise.sqrt() * noise.next();
+            observer.update(belief, measured, 0.0, ULTRASOUND_S);
+        }
+        observer
+    }
+
+    /// Root mean square of what is wrong with the displacement that is foretold for `ahead_s` later, over the last `counted`
+    /// seconds.
+    fn foretold(belief: &Belief<f64>, seconds: f64, ahead_s: f64, target: &dyn Fn(f64) -> f64) -> f64 {
+        let mut noise = Noise(7);
+        let mut observer = Observer::starting(belief, 0.0, 0.0, 0.0);
+        let samples = (seconds / ULTRASOUND_S) as u32;
+        let (mut squares, mut counted) = (0.0, 0.0);
+        for k in 0..samples {
+            let time_s = f64::from(k) * ULTRASOUND_S;
+            observer.update(belief, target(time_s) + belief.noise.sqrt() * noise.next(), 0.0, ULTRASOUND_S);
+            if time_s > 0.5 * seconds {
+                let off = observer.at(0.0) + observer.ahead(ahead_s).0 - target(time_s + ahead_s);
+                (squares, counted) = (squares + off * off, counted + 1.0);
+            }
+        }
+        f64::sqrt(squares / counted)
+    }
+
+    #[test]
+    fn a_turn_is_a_rotation_by_its_angle() {
+        for angle in [1e-3_f64, 0.05, 0.1, 0.3, 1.0, 7.0] {
+            let turned = turn(angle) * Vector2::new(0.6, 0.8);
+            assert!((turned.norm() - 1.0).abs() < 1e-14, "{angle}");
+            if angle < 0.5 {
+                let exact = 0.6 * angle.cos() + 0.8 * angle.sin();
+                assert!((turned.x - exact).abs() < angle.powi(3) / 12.0, "{angle}: {} {exact}", turned.x);
+            }
+        }
+    }
+
+    /// The textbook's filter in matrices of six by six, without safeguards.
+    #[test]
+    fn it_is_the_kalman_filter_of_six_states() {
+        let belief = Belief { max_gain: 10.0, ..belief(0.4) };
+        let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+        let breath = |time_s: f64| lujan(3.0, 4.0, time_s);
+        let mut k = 0;
+        while !observer.predicts_breaths() {
+            observer.update(&belief, breath(f64::from(k) * ULTRASOUND_S), 0.0, ULTRASOUND_S);
+            k += 1;
+        }
+        // What level and slope were widened by is no part of this.
+        (observer.surprise, observer.surprise_variance) = (0.0, 0.0);
+        let of = |observer: &Observer<f64>| {
+            let waves = observer.breathing.waves.unwrap();
+            let mut state = SVector::<f64, 6>::zeros();
+            let mut covariance = SMatrix::<f64, 6, 6>::zeros();
+            state.copy_from_slice(&[
+                observer.level,
+                observer.slope,
+                waves.first.x,
+                waves.first.y,
+                waves.second.x,
+                waves.second.y,
+            ]);
+            let line = Matrix2::new(
+                observer.level_variance,
+                observer.covariance,
+                observer.covariance,
+                observer.slope_variance,
+            );
+            let mut put = |row: usize, column: usize, block: &Matrix2<f64>| {
+                covariance.fixed_view_mut::<2, 2>(row, column).copy_from(block);
+                covariance.fixed_view_mut::<2, 2>(column, row).copy_from(&block.transpose());
+            };
+            put(0, 0, &line);
+            put(2, 2, &waves.of_first);
+            put(4, 4, &waves.of_second);
+            put(2, 4, &waves.between);
+            put(2, 0, &waves.first_beside);
+            put(4, 0, &waves.second_beside);
+            (state, covariance, waves.rate)
+        };
+        let mut depth = 0.0;
+        for step in 0..100 {
+            let (state, covariance, rate) = of(&observer);
+            let mut transition = SMatrix::<f64, 6, 6>::identity();
+            let way = 0.08;
+            transition[(0, 1)] = way;
+            let first = turn(rate * ULTRASOUND_S);
+            transition.fixed_view_mut::<2, 2>(2, 2).copy_from(&first);
+            transition.fixed_view_mut::<2, 2>(4, 4).copy_from(&(first * first));
+            let size = state.fixed_rows::<2>(2).norm_squared();
+            let walk = BREATH_WANDER.powi(2) / TAU * size * rate * ULTRASOUND_S;
+            let walks = [belief.level_walk * ULTRASOUND_S, belief.slope_walk * way, walk, walk, walk / 4.0, walk / 4.0];
+            let before = transition * covariance * transition.transpose() + SMatrix::from_diagonal(&walks.into());
+            let row = SMatrix::<f64, 1, 6>::from([1.0, 0.0, 1.0, 0.0, 1.0, 0.0].map(|x| [x]));
+            let gain = before * row.transpose() / ((row * before * row.transpose()).x + belief.noise);
+            let measured = breath(f64::from(k + step) * ULTRASOUND_S) + 0.02 * depth;
+            let expected = transition * state;
+            let expected = expected + gain * (measured - (row * expected).x);
+            let after = (SMatrix::<f64, 6, 6>::identity() - gain * row) * before;
+            depth += way;
+            (observer.surprise, observer.surprise_variance) = (0.0, 0.0);
+            observer.update(&belief, measured, depth, ULTRASOUND_S);
+            let (state, covariance, rate_now) = of(&observer);
+            assert!((state - expected).amax() < 1e-12, "{step}: {state} {expected}");
+            assert!((covariance - after).amax() < 1e-12 * after.amax().max(1.0), "{step}: {covariance} {after}");
+            if rate_now != rate {
+                break;
+            }
+        }
+        assert!(depth > 2.0, "{depth}");
+    }
+
+    /// cos⁴ is a level and two waves: what is left without noise is what the period is off by, and nothing once that is
+    /// right.
+    #[test]
+    fn a_breath_that_repeats_itself_is_foretold() {
+        for (period_s, amplitude) in [(2.0, 1.0), (4.0, 3.0), (5.5, 8.0), (10.0, 2.0)] {
+            let left = foretold(&belief(0.0), 60.0, 0.1, &|time_s| lujan(amplitude, period_s, time_s));
+            assert!(left < 0.01 * amplitude, "{period_s} s: {left} of {amplitude}");
+        }
+    }
+
+    /// With an ultrasound's noise, over its delay: better than the observer that follows behind, several times.
+    #[test]
+    fn with_noise_it_beats_following() {
+        for period_s in [3.0, 4.0, 5.0] {
+            let breath = |time_s: f64| lujan(3.0, period_s, time_s);
+            let predicted = foretold(&belief(0.4), 60.0, 0.1, &breath);
+            let followed = foretold(&Belief { breathing: None, ..belief(0.4) }, 60.0, 0.1, &breath);
+            assert!(predicted < 0.25 && followed > 3.0 * predicted, "{period_s} s: {predicted} {followed}");
+        }
+    }
+
+    /// Two rises through the middle take more than one breath and less than two and a half.
+    #[test]
+    fn nothing_is_foretold_before_a_breath_has_been_seen() {
+        let breath = |time_s: f64| lujan(3.0, 4.0, time_s);
+        for (seconds, foretells) in [(4.0, false), (10.0, true)] {
+            let observer = having_seen(&belief(0.4), seconds, breath, 3);
+            assert_eq!(observer.predicts_breaths(), foretells, "{seconds} s");
+        }
+        let observer = having_seen(&belief(0.4), 40.0, breath, 3);
+        let period_s = TAU / observer.breathing.waves.unwrap().rate;
+        assert!((period_s - 4.0).abs() < 0.2, "{period_s}");
+    }
+
+    #[test]
+    fn what_is_no_breath_is_not_foretold() {
+        for seed in 0..40 {
+            let seen = |target: &dyn Fn(f64) -> f64| having_seen(&belief(0.4), 60.0, target, seed).predicts_breaths();
+            assert!(!seen(&|_| 0.0), "noise, {seed}");
+            assert!(
+                !having_seen(&belief(0.4), 1800.0, |_| 0.0, seed).predicts_breaths(),
+                "half an hour of noise, {seed}"
+            );
+            assert!(!seen(&|time_s| 0.1 * time_s), "a needle that goes in, {seed}");
+            assert!(!seen(&|time_s| if time_s < 20.0 { 0.0 } else { 3.0 }), "a jerk, {seed}");
+            assert!(!seen(&|time_s| 5.0 * (-(time_s - 20.0).powi(2)).exp()), "a cough, {seed}");
+            assert!(!seen(&|time_s| 3.0 * f64::sin(TAU * time_s)), "a tremor, {seed}");
+        }
+    }
+
+    /// A breath that is held ends the prediction; what is left is followed.
+    #[test]
+    fn a_held_breath_ends_it() {
+        let held = |time_s: f64| lujan(3.0, 4.0, f64::min(time_s, 22.0));
+        let observer = having_seen(&belief(0.1), 22.0, held, 5);
+        assert!(observer.predicts_breaths());
+        let observer = having_seen(&belief(0.1), 40.0, held, 5);
+        assert!(!observer.predicts_breaths());
+        assert!((observer.at(0.0) - 3.0).abs() < 0.1, "{}", observer.at(0.0));
+    }
+
+    /// Deeper and quicker breaths are taken up.
+    #[test]
+    fn a_breath_that_changes_is_followed() {
+        let changes = |time_s: f64| if time_s < 20.0 { lujan(2.0, 5.0, time_s) } else { lujan(4.0, 4.0, time_s) };
+        let left = foretold(&belief(0.1), 80.0, 0.1, &changes);
+        assert!(left < 0.25, "{left}");
+    }
+
+    /// The loop of estimate and paddle whose true effect is λ times the assumed one. Root mean square of the last breaths.
+    fn held(lambda: f64, delay: usize, noise: f64) -> f64 {
+        let gain = crate::loop_stability::default_gain(delay as u32, 1.3);
+        let belief = Belief::<f64>::new(noise, 0.2, 12.0, 10.0, gain).with_breathing(ULTRASOUND_S);
+        let mut random = Noise(11);
+        let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+        let mut shown = std::collections::VecDeque::from(std::vec![0.0; delay + 1]);
+        let (mut squares, mut counted) = (0.0, 0.0);
+        for k in 0..6000 {
+            let time_s = f64::from(k) * ULTRASOUND_S;
+            let applied = shown.pop_front().unwrap();
+            let error = lujan(3.0, 4.0, time_s) - lambda * applied;
+            observer.update(&belief, error + applied + noise * random.next(), 0.0, ULTRASOUND_S);
+            let ahead_s = (delay + 1) as f64 * ULTRASOUND_S;
+            shown.push_back(observer.at(0.0) + observer.ahead(ahead_s).0);
+            if k > 3000 {
+                (squares, counted) = (squares + error * error, counted + 1.0);
+            }
+        }
+        f64::sqrt(squares / counted)
+    }
+
+    /// Tissue that the table is wrong about does not make the prediction swing.
+    #[test]
+    fn the_loop_stays_stable_with_other_tissue() {
+        for delay in [1, 3, 5] {
+            for lambda in [0.5, 0.8, 1.0, 1.3, 1.6] {
+                let left = held(lambda, delay, 0.1);
+                assert!(left < 0.35, "delay {delay}, λ {lambda}: {left}");
+            }
+        }
+    }
+
+    proptest! {
+        /// Whatever is measured, whenever: finite numbers, and variances of something.
+        #[test]
+        fn variances_stay_some(
+            noise in 0.0..1.0f64,
+            samples in proptest::collection::vec((-20.0..20.0f64, 0.0..3.0f64), 1..400),
+            period_s in 1.5..12.0f64,
+        ) {
+            let belief = belief(noise);
+            let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+            for k in 0..600 {
+                observer.update(&belief, lujan(5.0, period_s, f64::from(k) * ULTRASOUND_S), 0.0, ULTRASOUND_S);
+            }
+            for (measured, elapsed) in samples {
+                observer.update(&belief, measured, 0.0, elapsed);
+                let variances = observer.breathing.waves.map(|waves| [waves.of_first.diagonal(), waves.of_second.diagonal()]);
+                prop_assert!(variances.iter().flatten().all(|both| both.min() >= 0.0), "{observer:?}");
+                let (displacement, rate) = observer.ahead(0.1);
+                prop_assert!(displacement.is_finite() && rate.is_finite() && observer.at(0.0).is_finite());
+            }
+        }
+
+        /// Lengths in any unit.
+        #[test]
+        fn units_do_not_matter(exponent in -6..6i32) {
+            let unit = 10f64.powi(exponent);
+            let seen = |unit: f64| {
+                let belief = Belief::<f64>::new(0.1 * unit, 0.2, 12.0 * unit, 10.0 * unit, 0.1).with_breathing(ULTRASOUND_S);
+                let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+                for k in 0..600 {
+                    observer.update(&belief, unit * lujan(3.0, 4.0, f64::from(k) * ULTRASOUND_S), 0.0, ULTRASOUND_S);
+                }
+                observer.ahead(0.1).0 / unit
+            };
+            prop_assert!((seen(unit) - seen(1.0)).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Which model answered for the tissue, and how well.
+
+use model_offline::scene::PlantModel;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Which model answered, how often it could not, and how far off it was in the end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlantAccount {
+    /// The model.
+    pub model: PlantModel,
+    /// Modes of the reduced model.
+    #[serde(default)]
+    pub modes: Option<usize>,
+    /// Integration points left of the full model's.
+    #[serde(default)]
+    pub points: Option<[usize; 2]>,
+    /// Steps that the full model answered because the reduced one could not.
+    #[serde(default)]
+    pub fallbacks: u64,
+    /// Why, the first time; or why there is no reduced model.
+    #[serde(default)]
+    pub first_fallback: Option<String>,
+    /// What a step of the full model takes, µs, where the reduced one stands in because that is too long.
+    #[serde(default)]
+    pub full_step_us: Option<f64>,
+    /// Largest error of the target displacement that the reduced model estimated of itself, length.
+    #[serde(default)]
+    pub largest_estimate: Option<f64>,
+    /// States on the path that stands in for tissue that has a past.
+    #[serde(default)]
+    pub path_knots: Option<usize>,
+    /// States that the full model was solved for, where it was extrapolated between.
+    #[serde(default)]
+    pub solves: Option<u64>,
+    /// Largest error of an extrapolated target displacement that solving found, the end of the run included, length.
+    #[serde(default)]
+    pub extrapolation_error: Option<f64>,
+    /// Distance from the full model's target displacement at the end of the run, length; computed after it.
+    #[serde(default)]
+    pub error_at_end: Option<f64>,
+}
+
+impl Default for PlantAccount {
+    /// The full model, which has nothing to account for.
+    fn default() -> Self {
+        Self {
+            model: PlantModel::Full,
+            modes: None,
+            points: None,
+            fallbacks: 0,
+            first_fallback: None,
+            full_step_us: None,
+            largest_estimate: None,
+            path_knots: None,
+            solves: None,
+            extrapolation_error: None,
+            error_at_end: None,
+        }
+    }
+}
