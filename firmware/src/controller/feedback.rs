@@ -33,8 +33,6 @@ pub(super) struct Fed<T: Scalar> {
     pub(super) now: SVector<T, D>,
     /// The same at the last sample that it used, length.
     pub(super) at_sample: SVector<T, D>,
-    /// What the observer knows.
-    pub(super) estimate: Option<Estimate<T>>,
     /// A correction that acts, for the monitors.
     pub(super) correction: Option<Correction>,
 }
@@ -55,7 +53,7 @@ impl<T: Scalar> Controller<'_, T> {
         let Setting { location, feed_forward, previous, limits, .. } = setting;
         let integral = state.integral.unwrap_or(previous - feed_forward);
         let Some(sample) = sample else {
-            return Fed { now: integral, at_sample: integral, estimate: None, correction: None };
+            return Fed { now: integral, at_sample: integral, correction: None };
         };
         let n = &self.table.orthogonal;
         let error = n.dot(&from_frame(&sample.values));
@@ -70,22 +68,25 @@ impl<T: Scalar> Controller<'_, T> {
         let taken = (corrected - integral).dot(&correction);
         let acted = taken > correction.norm_squared() * T::of(0.5);
         let correction = Correction { error: error.to_f64(), size: change.abs().to_f64() };
-        Fed { now: corrected, at_sample: corrected, estimate: None, correction: acted.then_some(correction) }
+        Fed { now: corrected, at_sample: corrected, correction: acted.then_some(correction) }
     }
 
-    /// As much as the observer believes that the table leaves.
-    pub(super) fn observe(&self, state: &State<T>, sample: Option<Measurement>, setting: &Setting<'_, T>) -> Fed<T> {
+    /// As much as the observer believes that the table leaves. What it knows is changed where it is: a copy would be a
+    /// tenth of a microcontroller's stack.
+    pub(super) fn observe(
+        &self,
+        state: &mut State<T>,
+        sample: Option<Measurement>,
+        setting: &Setting<'_, T>,
+    ) -> Fed<T> {
         let Setting { time_ns, location, feed_forward, previous, limits } = setting;
         let n = &self.table.orthogonal;
-        let (before, mut estimate) = match (state.integral, state.estimate) {
-            (Some(integral), Some(estimate)) => (integral, estimate),
-            // Whoever placed the paddle beside its path had a reason: so much is left there.
-            _ => {
-                let placed = previous - feed_forward;
-                let level = -n.dot(&(location.jacobian() * placed));
-                (placed, self.first_estimate(level, location.depth, *time_ns))
-            }
-        };
+        // Whoever placed the paddle beside its path had a reason: so much is left there.
+        let before = state.integral.unwrap_or(previous - feed_forward);
+        let estimate = state.estimate.get_or_insert_with(|| {
+            let level = -n.dot(&(location.jacobian() * before));
+            self.first_estimate(level, location.depth, *time_ns)
+        });
         let mut now = before + estimate.drift * (location.depth - estimate.depth);
         if estimate.observer.predicts_breaths() {
             now += estimate.breath * T::of(seconds(time_ns.saturating_sub(estimate.since_ns)));
@@ -93,7 +94,7 @@ impl<T: Scalar> Controller<'_, T> {
         let then = sample.and_then(|sample| state.history.at(sample.time_ns));
         let measured = then.and_then(|then| Some((then, self.table.locate(then.depth)?)));
         let (Some(sample), Some((then, measured))) = (sample, measured) else {
-            return Fed { now, at_sample: before, estimate: Some(estimate), correction: None };
+            return Fed { now, at_sample: before, correction: None };
         };
 
         let error = n.dot(&from_frame(&sample.values));
@@ -117,7 +118,7 @@ impl<T: Scalar> Controller<'_, T> {
         let acted = limits.clamp_position(&setpoint) == setpoint;
         let correction = Correction { error: error.to_f64(), size: change.abs().to_f64() };
         let correction = acted.then_some(correction);
-        Fed { now: corrected, at_sample: corrected, estimate: Some(estimate), correction }
+        Fed { now: corrected, at_sample: corrected, correction }
     }
 
     fn first_estimate(&self, level: T, depth: T, time_ns: u64) -> Estimate<T> {

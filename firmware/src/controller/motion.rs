@@ -72,7 +72,7 @@ impl<T: Scalar> Controller<'_, T> {
         }
         let [x, y] = &mut state.gate.travel.paddle;
         (*x, *y) = (*x + step.x.abs().to_f64(), *y + step.y.abs().to_f64());
-        (state.integral, state.estimate) = (Some(feedback.at_sample), feedback.estimate);
+        state.integral = Some(feedback.at_sample);
         state.added = Some(feedback.now);
         state.displacement = Some(limited.displacement);
     }

@@ -28,12 +28,11 @@ use crate::detection::{
     LEVEL_TIME, STEEPEST_SURPRISE, SURPRISE_GROWTH, SURPRISE_MEMORY, SURPRISE_SIGMAS, TISSUE_SPREAD,
 };
 use crate::scalar::{Scalar, bounded};
-use nalgebra::Matrix2;
 
 mod breathing;
 
 pub use breathing::BreathBelief;
-use breathing::{Breathing, News};
+use breathing::{Breathing, Correction, News};
 
 /// What is believed before the first sample, as variances; built once.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -216,24 +215,6 @@ impl<T: Scalar> Observer<T> {
         (most, bounded_slope(slope * (most / level), way, most))
     }
 
-    /// The same with a breath's waves, which take their part of the gain that the loop bears.
-    fn correct_all(&mut self, belief: &Belief<T>, innovation: T, way: T) {
-        let Some(waves) = self.breathing.waves() else { return };
-        let line = Matrix2::new(self.level_variance, self.covariance, self.covariance, self.slope_variance);
-        let shares = waves.shares(line.column(0).into());
-        let variance = shares.in_all() + belief.noise;
-        let mut gains = shares.times(T::one() / variance);
-        let (all, most) = (gains.in_all(), belief.max_gain);
-        if all > most {
-            gains = gains.times(most / all);
-            gains.beside.y = bounded_slope(gains.beside.y, way, most);
-        }
-        let line = waves.correct(innovation, (&shares, &gains), variance, &line);
-        (self.level_variance, self.covariance, self.slope_variance) = (line.m11, line.m12, line.m22);
-        self.level += gains.beside.x * innovation;
-        self.slope += gains.beside.y * innovation;
-    }
-
     /// In Joseph's form, which stays positive for any gains.
     fn correct(&mut self, belief: &Belief<T>, innovation: T, (level, slope): (T, T)) {
         self.level += level * innovation;
@@ -245,6 +226,37 @@ impl<T: Scalar> Observer<T> {
         self.covariance = kept * covariance + level * slope * belief.noise;
         self.level_variance = kept * kept * self.level_variance + level * level * belief.noise;
     }
+
+    /// The same with a breath's waves, which take their part of the gain that the loop bears.
+    #[inline(never)] // Its temporaries are not on the stack of a loop without breaths.
+    fn correct_all(&mut self, belief: &Belief<T>, innovation: T, way: T) {
+        let Some(waves) = self.breathing.waves() else { return };
+        let shares = waves.shares([self.level_variance, self.covariance]);
+        let [level, slope] = shares.beside;
+        let all = shares.in_all();
+        let variance = all + belief.noise;
+        let most = belief.max_gain * variance;
+        let (mut part, mut part_of_slope) = (T::one(), T::one());
+        if all > most {
+            part = most / all;
+            let gain = slope * part / variance;
+            part_of_slope =
+                if gain == T::zero() { part } else { bounded_slope(gain, way, belief.max_gain) / gain * part };
+        }
+        let correction = Correction { innovation: innovation / variance, variance, part, part_of_slope };
+        waves.correct(&shares, &correction);
+        self.level += level * part * correction.innovation;
+        self.slope += slope * part_of_slope * correction.innovation;
+        self.level_variance = left_of(self.level_variance, level * level * correction.lost(part, part));
+        self.covariance -= level * slope * correction.lost(part, part_of_slope);
+        let lost = slope * slope * correction.lost(part_of_slope, part_of_slope);
+        self.slope_variance = left_of(self.slope_variance, lost);
+    }
+}
+
+/// What is left of a variance; rounding leaves nothing less than none.
+fn left_of<T: Scalar>(variance: T, lost: T) -> T {
+    if variance > lost { variance - lost } else { T::zero() }
 }
 
 /// Gain on the slope beside `most` on the level, over a `way`: that of an α-β filter which keeps its bandwidth, β = α²/(2 − α)

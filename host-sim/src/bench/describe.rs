@@ -26,6 +26,8 @@ pub fn settings(scene: &Scene, simulation: &Simulation, table_knows_the_world: b
     SimulationSettings {
         rate_hz: loop_settings.rate,
         insertion_s: simulation.needle.insertion_s(),
+        wait_s: simulation.needle.wait_s(),
+        pauses_s: simulation.needle.pauses_s(),
         duration_s: simulation.duration_s,
         depth: simulation.depth,
         world: scene.effects().into_iter().map(str::to_owned).collect(),

@@ -75,6 +75,12 @@ pub struct SimulationSettings {
     pub rate_hz: f64,
     /// Duration of the insertion, s.
     pub insertion_s: f64,
+    /// Time that the needle waits at the skin before, s.
+    #[serde(default)]
+    pub wait_s: f64,
+    /// Pauses of the insertion, rest and way back after it, s.
+    #[serde(default)]
+    pub pauses_s: f64,
     /// Time simulated after the start of the needle, s.
     pub duration_s: f64,
     /// Depth of the insertion, length.

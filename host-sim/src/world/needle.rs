@@ -198,6 +198,11 @@ impl NeedleTrajectory {
         self.moves.iter().take(until + 1).filter(|each| each.way() != 0.0).map(|each| each.duration_s).sum()
     }
 
+    /// Seconds of everything but waiting and the insertion: pauses, rests, and ways back.
+    pub fn pauses_s(&self) -> f64 {
+        self.end_s - self.wait_s() - self.insertion_s()
+    }
+
     /// When everything is done, s.
     pub fn end_s(&self) -> f64 {
         self.end_s
@@ -330,6 +335,7 @@ mod tests {
             assert!((way.at(time_s).depth - depth).abs() < 1e-12, "{time_s}: {:?}", way.at(time_s));
         }
         assert_eq!((way.wait_s(), way.insertion_s(), way.end_s(), way.depth()), (2.0, 3.0, 10.5, 12.0));
+        assert_eq!(way.pauses_s(), 1.0 + 1.5 + 3.0);
         assert!((way.at(way.midway_s()).depth - 6.0).abs() < 0.3 && way.at(way.midway_s()).velocity > 0.0);
         is_smooth(&way, 0.06);
         let hurried = way.faster(2.0);

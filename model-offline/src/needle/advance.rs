@@ -128,6 +128,11 @@ impl SlippingNeedle<'_> {
     /// The three things that a tip does: it holds, it cuts, or it is withdrawn.
     fn tip_finds_its_place(&mut self, depth: f64, ahead: Point2) -> Result<(f64, Trial), NeedleError> {
         let cut = self.path.length();
+        if depth <= 0.0 && cut <= 0.0 {
+            // It has not set out: it leads the point of the skin that it touches, and cuts nothing that comes to meet it.
+            self.tip_holds = false;
+            return Ok((0.0, self.trial(depth, ahead, Tip { engaged: 0.0, bounds: Bounds::exactly(0.0) })?));
+        }
         if self.engaged < cut {
             let (engaged, trial) = self.tip_at(depth, ahead, 0.0)?;
             if engaged < cut {

@@ -30,7 +30,9 @@ impl SlippingNeedle<'_> {
         // What is held: points on the line, points that stick, and a tip that holds, as its force is spread.
         let mut rows: Vec<Held<'_>> = Vec::new();
         for contact in &contacts {
-            rows.push(Held { along: normal, response: 0, points: vec![(contact, 1.0)] });
+            if !self.is_beside_the_skin(contact) {
+                rows.push(Held { along: normal, response: 0, points: vec![(contact, 1.0)] });
+            }
             if contact.slide == Slide::Sticks {
                 rows.push(Held { along: axis, response: 1, points: vec![(contact, 1.0)] });
             }

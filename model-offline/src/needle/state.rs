@@ -72,6 +72,8 @@ pub struct SlippingNeedle<'m> {
     /// Forces of the paddle and of the base on the tissue at the end of the last increment.
     pub(super) last_forces: [Vector2<f64>; 2],
     pub(super) energy: EnergyAccount,
+    /// Of all that have been found.
+    pub(super) largest_force: f64,
     /// Coefficients at the end of the last increment.
     pub(super) last: Vec<f64>,
 }
@@ -108,6 +110,7 @@ impl<'m> SlippingNeedle<'m> {
             tip_holds: false,
             last_forces: [Vector2::zeros(); 2],
             energy: EnergyAccount::default(),
+            largest_force: 0.0,
             last: vec![0.0; model.dofs()],
         };
         let places = needle.places();

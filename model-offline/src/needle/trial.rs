@@ -15,13 +15,15 @@ use std::sync::Arc;
 const AGREED: f64 = 1e-7;
 /// Change of the forces, over the largest, at which they do: in units of displacement small forces would never be asked.
 const SETTLED: f64 = 1e-5;
+/// Part of the largest force so far below which forces are none: of a body that has come back to rest all are rounding.
+const NEGLIGIBLE: f64 = 1e-3;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
 /// A compliance that leaves more than this part of the error is computed anew.
 const STALE: f64 = 0.2;
 /// Stations nearer to the tip than this part of their distance from each other give way to it.
 const CLEARANCE: f64 = 0.3;
-/// The same of the station at the skin.
+/// A tip that is in by less than this part of it is held across the needle by the skin alone.
 const AT_THE_SKIN: f64 = 0.02;
 
 /// The tip of one trial.
@@ -50,9 +52,9 @@ impl SlippingNeedle<'_> {
                 Some(before) => station.arc_length - self.stations[before].arc_length,
                 None => self.stations.get(1).map_or(0.0, |next| next.arc_length - station.arc_length),
             };
-            // The skin is held from the first touch on.
-            let clearance = if station.arc_length > 0.0 { CLEARANCE } else { AT_THE_SKIN };
-            if station.arc_length > engaged - clearance * gap {
+            // The skin is held from the first touch on: at depth 0 by the tip itself.
+            let clearance = if station.arc_length > 0.0 { CLEARANCE } else { 0.0 };
+            if station.arc_length >= engaged - clearance * gap {
                 break;
             }
             contacts.push(if station.known { station.clone() } else { self.joined(station, depth, ahead)? });
@@ -126,7 +128,8 @@ impl SlippingNeedle<'_> {
             let held = |k: &usize| !self.lies_where_it_is(&contacts[*k]);
             let off = (0..m).filter(held).map(|k| felt[k].abs()).fold(0.0, f64::max);
             let change = (&known * (&found - &forces)).amax().max(off).max(astray);
-            let settled = (&found - &forces).amax() <= SETTLED * found.amax();
+            let scale = found.amax().max(NEGLIGIBLE * self.largest_force);
+            let settled = (&found - &forces).amax() <= SETTLED * scale;
             if change <= enough && settled {
                 for (k, contact) in contacts.iter_mut().enumerate() {
                     (contact.across, contact.along) = (forces[k], forces[m + k]);
@@ -134,6 +137,7 @@ impl SlippingNeedle<'_> {
                     contact.slip += self.slipped(contact, depth, tip.engaged);
                 }
                 let tip_displacement = self.tip_displacement(&contacts, &spread);
+                self.largest_force = self.largest_force.max(forces.amax());
                 return Ok(Trial { contacts, tip_force: forces[2 * m], tip_displacement });
             }
             fresh = change > STALE * last && !fresh;
@@ -160,7 +164,14 @@ impl SlippingNeedle<'_> {
     /// that it meets and pushes none aside, so that the station is the material point that lies on the needle's line,
     /// under no force across it. In an old cut there is nothing to choose.
     pub(super) fn lies_where_it_is(&self, station: &Station) -> bool {
-        !station.known && !self.is_small_strain() && station.arc_length > self.path.length()
+        let is_new = !station.known && station.arc_length > self.path.length();
+        !self.is_small_strain() && (is_new || self.is_beside_the_skin(station))
+    }
+
+    /// Whether a tip has only just come in: the skin, which it took with it, is held instead.
+    pub(super) fn is_beside_the_skin(&self, station: &Station) -> bool {
+        let gap = self.stations.get(1).map_or(0.0, |next| next.arc_length);
+        0.0 < station.arc_length && station.arc_length < AT_THE_SKIN * gap
     }
 
     /// Makes stations that have just been cut the points that lie on the needle's line; how far they were off it.

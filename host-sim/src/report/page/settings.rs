@@ -31,6 +31,8 @@ fn rows(run: &RunResult) -> Vec<(&'static str, String, String)> {
         row("rate of the loop", settings.rate_hz, "Hz"),
         row("depth of the insertion", settings.depth, length),
         row("duration of the insertion", settings.insertion_s, "s"),
+        row("wait of the needle before it", settings.wait_s, "s"),
+        row("pauses, rest and way back of the needle", settings.pauses_s, "s"),
         row("time simulated", settings.duration_s, "s"),
         ("the world, besides the simplest model", settings.world_in_words(), String::new()),
         ("what sees the target", settings.sensor.clone(), String::new()),

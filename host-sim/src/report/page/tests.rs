@@ -142,6 +142,8 @@ fn run(scene: &str) -> RunResult {
         settings: SimulationSettings {
             rate_hz: 1000.0,
             insertion_s: 5.0,
+            wait_s: 0.0,
+            pauses_s: 0.0,
             duration_s: 5.5,
             depth: 0.1,
             world: Vec::new(),

@@ -6,7 +6,7 @@ use std::path::Path;
 use model_offline::number::{decimals, smallest_told};
 use model_offline::scene::PlantModel;
 
-use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::bench::result::{CaseResult, RunResult, SimulationSettings, StrategyResult};
 use crate::report::paper::paper_optima;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
@@ -42,10 +42,11 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     }
     writeln!(
         text,
-        "\nLargest target displacement orthogonal to the needle, depth {} in {} s,\n\
+        "\nLargest target displacement orthogonal to the needle, depth {} in {} s{},\n\
          target seen by {}: {} Hz, {} ms late, noise {}; feedback: {}; paddle in brackets",
         settings.depth,
         settings.insertion_s,
+        programme(settings),
         settings.sensor,
         settings.target_rate_hz,
         settings.target_latency_ms,
@@ -64,6 +65,19 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     write_plant(text, run)?;
     write_loop(text, run)?;
     writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
+}
+
+/// What the needle does besides going in.
+fn programme(settings: &SimulationSettings) -> String {
+    let seconds = |seconds: f64| (seconds * 1e3).round() * 1e-3;
+    let waits = match settings.wait_s {
+        wait_s if wait_s > 0.0 => format!(" after waiting for {} s", seconds(wait_s)),
+        _ => String::new(),
+    };
+    match settings.pauses_s {
+        pauses_s if pauses_s > 1e-9 => format!("{waits}, {} s of pauses, rest and way back", seconds(pauses_s)),
+        _ => waits,
+    }
 }
 
 /// The sensor's noise with its unit, where it has one.

@@ -442,6 +442,7 @@ fn drive(body: &mut Body<'_>, depth: f64, paddle: Vector2<f64>) -> Result<Vector
 #[cfg(test)]
 mod tests {
     use super::*;
+    use model_offline::parallel;
     use model_offline::scene::Scene;
 
     #[test]
