@@ -56,7 +56,7 @@ pub enum UsageError {
         most: f64,
     },
     /// A recorded needle that is no table.
-    #[error("--needle-motion {}: {source}; it takes two columns under a line of names: time_s,depth", file.display())]
+    #[error("--needle-motion {}: {source}; it takes two columns: time in s, depth", file.display())]
     NeedleFile {
         /// The file.
         file: PathBuf,
@@ -85,6 +85,16 @@ pub enum UsageError {
         depth: f64,
         /// The scene's.
         most: f64,
+    },
+    /// Nothing is simulated but a needle that waits.
+    #[error(
+        "--duration {duration_s} s: the needle has not moved by then, it waits for {wait_s} s; simulate a longer time"
+    )]
+    OnlyWaits {
+        /// Duration, s.
+        duration_s: f64,
+        /// Time that the needle waits, s.
+        wait_s: f64,
     },
     /// This machine has no such processor.
     #[error("--cpu {cpu}: this machine has processors 0 to {last}")]

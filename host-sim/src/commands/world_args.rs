@@ -59,7 +59,7 @@ pub(crate) struct WorldArgs {
     /// Draw the needle back in the end, as fast as it came
     #[arg(long)]
     pub(crate) withdraw: bool,
-    /// How the needle goes, as recorded: a CSV file of time in s and depth, with a line of names
+    /// How the needle goes, as recorded: a CSV file of two columns, time in s and depth
     #[arg(long, value_name = "FILE", conflicts_with_all = ["insertion_time", "steps", "pause", "wait"])]
     pub(crate) needle_motion: Option<PathBuf>,
     /// Time simulated from the start of the needle, s [default: all that the needle does, and half a second]
@@ -146,6 +146,10 @@ impl WorldArgs {
         let mut simulation = Simulation::new(scene).with_needle(self.needle(scene)?);
         simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
         DURATION.check(simulation.duration_s)?;
+        let (duration_s, wait_s) = (simulation.duration_s, simulation.needle.wait_s());
+        if duration_s <= wait_s {
+            return Err(UsageError::OnlyWaits { duration_s, wait_s }.into());
+        }
         let ticks = simulation.duration_s * loop_settings.rate;
         if ticks > MOST_TICKS {
             let (duration_s, rate_hz) = (simulation.duration_s, loop_settings.rate);

@@ -254,6 +254,9 @@ fn check_rows(rows: &[(f64, f64)]) -> Result<(), RecordedNeedleError> {
     if let Some(k) = (1..rows.len()).find(|&k| rows[k].0 <= rows[k - 1].0) {
         return Err(RecordedNeedleError::NotLater { row: k + 1, time_s: rows[k].0 });
     }
+    if rows.iter().all(|row| row.1 == 0.0) {
+        return Err(RecordedNeedleError::StaysOut);
+    }
     if rows[0].1 != 0.0 {
         return Err(RecordedNeedleError::NotAtRest { depth: rows[0].1 });
     }
@@ -287,6 +290,9 @@ pub enum RecordedNeedleError {
         /// Its time.
         time_s: f64,
     },
+    /// It never goes in.
+    #[error("every depth is 0: the needle never goes in")]
+    StaysOut,
     /// It begins within the tissue.
     #[error("row 1: depth {depth}: the needle begins at the skin, at depth 0")]
     NotAtRest {
@@ -368,6 +374,7 @@ mod tests {
         assert!(matches!(refuse(&[(0.0, 0.0), (1.0, -1.0)]), RecordedNeedleError::Number { row: 2, .. }));
         let back = [(0.0, 0.0), (1.0, 1.0), (1.0, 2.0)];
         assert_eq!(refuse(&back), RecordedNeedleError::NotLater { row: 3, time_s: 1.0 });
+        assert_eq!(refuse(&[(0.0, 0.0), (1.0, 0.0)]), RecordedNeedleError::StaysOut);
         assert_eq!(refuse(&[(0.0, 1.0), (1.0, 2.0)]), RecordedNeedleError::NotAtRest { depth: 1.0 });
     }
 }

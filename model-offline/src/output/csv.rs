@@ -27,11 +27,15 @@ pub fn table<T, H: AsRef<[u8]>, const N: usize>(
     writer.into_inner().unwrap_or_default()
 }
 
-/// The rows of a file that begins with a line of names; lines that begin with `#` are left out.
+/// The rows of a file, with or without a line of names before them; lines that begin with `#` are left out.
 ///
 /// # Errors
 /// [`CsvError`] says in which line what cannot be read.
 pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, CsvError> {
-    let mut reader = csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_path(path)?;
-    reader.deserialize().collect()
+    let mut builder = csv::ReaderBuilder::new();
+    let mut reader = builder.has_headers(false).comment(Some(b'#')).trim(csv::Trim::All).from_path(path)?;
+    let rows: Vec<Result<T, CsvError>> = reader.deserialize().collect();
+    // Names are no row.
+    let named = matches!(rows.first(), Some(Err(error)) if matches!(error.kind(), csv::ErrorKind::Deserialize { .. }));
+    rows.into_iter().skip(usize::from(named)).collect()
 }
