@@ -45,9 +45,9 @@ fn beside_the_path_the_estimate_is_at_least_the_error() {
             let truth = along(&model, Some(paddle), &way(&model), path.interval(), &ways).unwrap();
             for ((time, paddle), truth) in times.iter().zip(&ways).zip(&truth) {
                 body.go_to(*time, *paddle);
-                let error = (body.target_displacement() - truth).norm();
+                let error = (body.target_displacement() - truth.target).norm();
                 worst = worst.max(error / depth);
-                largest = largest.max(truth.norm() / depth);
+                largest = largest.max(truth.target.norm() / depth);
                 trials += 1;
                 covered += i32::from(error <= body.error_estimate());
                 tightest = tightest.min(body.error_estimate() / error.max(1e-12));

@@ -15,6 +15,8 @@ use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::PlantAccount;
+use crate::world::truth::NeedleMoment;
+use model_offline::needle::StationState;
 use model_offline::scene::TissueVariant;
 
 /// Version of this format.
@@ -353,6 +355,9 @@ pub struct StrategyResult {
     pub recording: Option<RecordingResult>,
     /// The time series beside the result.
     pub csv: Option<String>,
+    /// Forces on the needle, and its shaft, as tables beside the result.
+    #[serde(default)]
+    pub needle_csv: Vec<String>,
     /// The insertion in at most 500 points.
     pub series: Vec<SeriesPoint>,
     /// Nodes at the end.
@@ -360,6 +365,9 @@ pub struct StrategyResult {
     /// The body along the way, for drawings; results of older versions have none.
     #[serde(default)]
     pub frames: Vec<BodyFrame>,
+    /// What the needle met, where the world has one that slips; results of older versions do not say.
+    #[serde(default)]
+    pub needle: Option<NeedleResult>,
     /// Mean duration of a plant step, µs; not part of what is reproducible.
     pub plant_step_us: f64,
     /// Which model answered for the tissue, and how well; results of older versions do not say.
@@ -374,6 +382,50 @@ pub struct BodyFrame {
     pub depth: f64,
     /// Nodes there.
     pub nodes: Vec<[f64; 2]>,
+}
+
+/// What a needle that slips met on its way, by the full model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NeedleResult {
+    /// At most 500 moments.
+    pub points: Vec<NeedlePoint>,
+    /// Depth of the needle where it was deepest, length.
+    pub shaft_depth: f64,
+    /// The shaft there, from the entry to the tip; empty where the skin held.
+    pub shaft: Vec<StationState>,
+}
+
+/// Forces on a needle at one moment, force per unit thickness: positive where they push it in.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct NeedlePoint {
+    /// Time since the start of the needle, s.
+    pub time_s: f64,
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Force at the base: that of the tip and of the shaft.
+    pub base_force: f64,
+    /// Force of the tip.
+    pub tip_force: f64,
+    /// Friction all along the shaft.
+    pub friction: f64,
+    /// Length of tissue that the tip has passed; none while the skin holds.
+    pub cut_length: Option<f64>,
+    /// Farthest that the needle has slid past tissue anywhere, length; negative where it slid out.
+    pub largest_slip: f64,
+}
+
+impl From<&NeedleMoment> for NeedlePoint {
+    fn from(NeedleMoment { since_start_s, reading }: &NeedleMoment) -> Self {
+        Self {
+            time_s: *since_start_s,
+            depth: reading.depth,
+            base_force: reading.base_force,
+            tip_force: reading.tip_force,
+            friction: reading.friction(),
+            cut_length: reading.cut_length,
+            largest_slip: reading.largest_slip(),
+        }
+    }
 }
 
 /// A recording file.

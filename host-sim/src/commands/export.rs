@@ -34,7 +34,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
         .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
     let mut said = Vec::new();
     if let Some(path) = &args.mcap {
-        let bytes = mcap::encode(&recording, table.orthogonal.into())?;
+        let bytes = mcap::encode(&recording, table.orthogonal.into(), mcap::NeedleForces::default())?;
         said.push(written(path, &bytes)?);
     }
     if let Some(path) = &args.csv {

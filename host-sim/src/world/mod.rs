@@ -10,6 +10,7 @@ pub mod actuator;
 pub mod error;
 pub mod loop_settings;
 pub mod needle;
+pub mod retrace;
 pub mod sensors;
 pub mod simulation;
 pub mod tissue;

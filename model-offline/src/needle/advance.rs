@@ -131,7 +131,7 @@ impl SlippingNeedle<'_> {
         if depth <= 0.0 && cut <= 0.0 {
             // It has not set out: it leads the point of the skin that it touches, and cuts nothing that comes to meet it.
             self.tip_holds = false;
-            return Ok((0.0, self.trial(depth, ahead, Tip { engaged: 0.0, bounds: Bounds::exactly(0.0) })?));
+            return Ok((0.0, self.trial(depth, ahead, Tip { engaged: 0.0, bounds: Bounds::exactly(0.0) }, None)?));
         }
         if self.engaged < cut {
             let (engaged, trial) = self.tip_at(depth, ahead, 0.0)?;
@@ -143,7 +143,18 @@ impl SlippingNeedle<'_> {
         let cutting_force =
             self.model.scene().resistance_at(self.path.at(cut + self.probe(), ahead), &self.shaft).cutting_force;
         let held = self.cutting_force(cutting_force, cut);
-        let trial = self.trial(depth, ahead, Tip { engaged: cut, bounds: Bounds { lower: 0.0, upper: held } })?;
+        // A tip that has cut and is pushed on goes on cutting, if that takes it on.
+        if self.has_cut
+            && !self.is_small_strain()
+            && depth > self.pose.depth
+            && cut >= self.shaft.tip_length
+            && let Ok((engaged, trial)) = self.tip_at(depth, ahead, cutting_force)
+            && engaged >= cut
+        {
+            self.tip_holds = false;
+            return Ok((engaged, trial));
+        }
+        let trial = self.trial(depth, ahead, Tip { engaged: cut, bounds: Bounds { lower: 0.0, upper: held } }, None)?;
         self.tip_holds = false;
         if trial.tip_force >= held {
             self.tip_at(depth, ahead, cutting_force)
@@ -167,18 +178,19 @@ impl SlippingNeedle<'_> {
             let engaged = depth.max(0.0);
             // On the undeformed body a blunt tip would have the tissue overtake it: then it holds.
             let bounds = Bounds { lower: 0.0, upper: self.cutting_force(force, engaged) };
-            let trial = self.trial(depth, ahead, Tip { engaged, bounds })?;
+            let trial = self.trial(depth, ahead, Tip { engaged, bounds }, None)?;
             self.tip_holds = 0.0 < trial.tip_force && trial.tip_force < bounds.upper;
             return Ok((engaged, trial));
         }
         let enough = 1e-6 * self.model.spacing();
         let mut engaged = (self.engaged + self.tip_rate * (depth - self.pose.depth)).max(0.0);
         let mut last: Option<(f64, f64)> = None;
+        let mut near = None;
         // Between these the root lies: the tissue jumps a little where a station is passed, maybe over it.
         let (mut behind, mut beyond) = ((0.0, None), (f64::INFINITY, None));
         for _ in 0..ROUNDS {
             let bounds = Bounds::exactly(self.cutting_force(force, engaged));
-            let trial = self.trial(depth, ahead, Tip { engaged, bounds })?;
+            let trial = self.trial(depth, ahead, Tip { engaged, bounds }, near.as_ref())?;
             let off = self.ahead_of_entry(engaged, ahead, &trial) + trial.tip_displacement - depth;
             let before = last.map(|(_, off)| off);
             // An end that stays counts half, so that the other one moves past the root (Illinois).
@@ -208,6 +220,7 @@ impl SlippingNeedle<'_> {
             last = Some((engaged, off));
             let inside = behind.0 < next && next < beyond.0;
             engaged = if inside { next } else { 0.5 * (behind.0 + beyond.0) };
+            near = Some(trial);
         }
         Err(NeedleError::NoForces { depth })
     }
@@ -241,6 +254,7 @@ impl SlippingNeedle<'_> {
         if depth != self.pose.depth {
             self.tip_rate = ((engaged - self.engaged) / (depth - self.pose.depth)).clamp(0.0, 2.0);
         }
+        self.has_cut = engaged > self.path.length();
         self.engaged = engaged;
         for contact in &contacts {
             self.path.cut_to(contact.arc_length, contact.at);
@@ -250,7 +264,7 @@ impl SlippingNeedle<'_> {
         let axis = self.axis();
         for contact in &mut contacts {
             contact.axial = axis.dot(&contact.stencil.interpolate(self.equilibrium.coefficients()));
-            contact.known = true;
+            (contact.known, contact.takes_over) = (true, false);
         }
         let tip = contacts.pop();
         for station in &mut self.stations {

@@ -1,6 +1,7 @@
 //! A body through everything that its scene says may happen to it, in time.
 
 use super::error::NeedleError;
+use super::reading::NeedleReading;
 use super::state::SlippingNeedle;
 use crate::model::{Body, Pose, TissueModel};
 use crate::solver::equilibrium::{Failure, NewtonSettings};
@@ -126,6 +127,14 @@ impl<'m> Course<'m> {
         match &self.state {
             State::Pushing { body, .. } => body.contact_force(),
             State::Within(needle) => needle.base_force(),
+        }
+    }
+
+    /// Forces on the needle, and what its shaft does.
+    pub fn reading(&self) -> NeedleReading {
+        match &self.state {
+            State::Pushing { body, .. } => NeedleReading::pushing(body.depth(), body.contact_force()),
+            State::Within(needle) => NeedleReading::within(needle),
         }
     }
 

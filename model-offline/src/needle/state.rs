@@ -69,6 +69,8 @@ pub struct SlippingNeedle<'m> {
     pub(super) tip_slope: f64,
     /// Whether the tip neither cuts nor is withdrawn: its force is what holds it where it is.
     pub(super) tip_holds: bool,
+    /// Whether it cut in the last increment.
+    pub(super) has_cut: bool,
     /// Forces of the paddle and of the base on the tissue at the end of the last increment.
     pub(super) last_forces: [Vector2<f64>; 2],
     pub(super) energy: EnergyAccount,
@@ -76,6 +78,14 @@ pub struct SlippingNeedle<'m> {
     pub(super) largest_force: f64,
     /// Coefficients at the end of the last increment.
     pub(super) last: Vec<f64>,
+}
+
+/// Largest step of Newton's method at an equilibrium that is kept, over the spacing.
+pub(super) const STEP_TOLERANCE: f64 = 1e-8;
+
+/// Equilibria follow each other closely: the last factor serves, and the body's stability is checked as it moves.
+pub(super) fn newton_settings(step_tolerance: f64) -> NewtonSettings {
+    NewtonSettings { residual_tolerance: 0.1 * step_tolerance, step_tolerance, ..NewtonSettings::SMALL_STEPS }
 }
 
 impl<'m> SlippingNeedle<'m> {
@@ -88,8 +98,7 @@ impl<'m> SlippingNeedle<'m> {
         let shaft = model.scene().needle.shaft.ok_or(NeedleError::NoShaft)?;
         let (rows, immobile) = model.rows_without_needle(paddle).ok_or(NeedleError::HeldWeakly)?;
         let counts = [immobile, rows.len() - immobile];
-        // Equilibria follow each other closely: the last factor serves, and the body's stability is checked as it moves.
-        let settings = NewtonSettings { residual_tolerance: 1e-9, step_tolerance: 1e-8, ..NewtonSettings::SMALL_STEPS };
+        let settings = newton_settings(STEP_TOLERANCE);
         let equilibrium =
             Equilibrium::analysed(model.discrete_body(), model.analysis(), Constraints::from(rows), settings)
                 .map_err(|source| NeedleError::Equilibrium { depth: 0.0, source })?;
@@ -108,6 +117,7 @@ impl<'m> SlippingNeedle<'m> {
             tip_rate: 1.0,
             tip_slope: 1.0,
             tip_holds: false,
+            has_cut: false,
             last_forces: [Vector2::zeros(); 2],
             energy: EnergyAccount::default(),
             largest_force: 0.0,
@@ -160,6 +170,7 @@ impl<'m> SlippingNeedle<'m> {
             resistance: self.model.scene().resistance_at(at, &self.shaft),
             slide: Slide::Forward,
             known: false,
+            takes_over: false,
             across: 0.0,
             along: 0.0,
             length: 0.0,

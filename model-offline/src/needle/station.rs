@@ -5,7 +5,8 @@ use crate::discretization::Stencil;
 use crate::geometry::Point2;
 use crate::scene::Resistance;
 use nalgebra::Vector2;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Whether tissue sticks to the shaft, or in which direction the needle slides past it.
@@ -26,6 +27,9 @@ pub(super) struct Station {
     pub(super) slide: Slide,
     /// Whether it has been held to the shaft before, so that sticking means something.
     pub(super) known: bool,
+    /// Whether it has taken over from the tip in this increment, and slides as that did: the forces along the shaft are
+    /// divided anew, which moves the tissue by more than the needle goes and says nothing about sticking.
+    pub(super) takes_over: bool,
     /// Forces across and along the needle on the tissue.
     pub(super) across: f64,
     pub(super) along: f64,
@@ -40,7 +44,7 @@ pub(super) struct Station {
 }
 
 /// What the shaft does at a station.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StationState {
     /// Length of cut behind it, from the entry.
     pub arc_length: f64,

@@ -3,7 +3,7 @@
 use super::complementarity::{Bounds, forces_between};
 use super::error::NeedleError;
 use super::path::hat_integrals;
-use super::state::SlippingNeedle;
+use super::state::{STEP_TOLERANCE, SlippingNeedle, newton_settings};
 use super::station::{Slide, Station, add_force, spread};
 use crate::geometry::Point2;
 use crate::model::Pose;
@@ -14,13 +14,16 @@ use std::sync::Arc;
 /// Change of the stations' displacements, over the spacing, at which forces and tissue agree.
 const AGREED: f64 = 1e-7;
 /// Change of the forces, over the largest, at which they do: in units of displacement small forces would never be asked.
-const SETTLED: f64 = 1e-5;
+const SETTLED: f64 = 1e-6;
 /// Part of the largest force so far below which forces are none: of a body that has come back to rest all are rounding.
 const NEGLIGIBLE: f64 = 1e-3;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
 /// A compliance that leaves more than this part of the error is computed anew.
-const STALE: f64 = 0.2;
+const STALE: f64 = 0.5;
+/// Error of the equilibria on the way, over what the forces changed last, and the largest.
+const FORCING: f64 = 1e-2;
+const LOOSEST: f64 = 1e-4;
 /// Stations nearer to the tip than this part of their distance from each other give way to it.
 const CLEARANCE: f64 = 0.3;
 /// A tip that is in by less than this part of it is held across the needle by the skin alone.
@@ -57,18 +60,23 @@ impl SlippingNeedle<'_> {
             if station.arc_length >= engaged - clearance * gap {
                 break;
             }
-            contacts.push(if station.known { station.clone() } else { self.joined(station, depth, ahead)? });
+            contacts.push(if station.known { station.clone() } else { self.joined(station, (depth, engaged), ahead)? });
         }
         let same = |tip: &&Station| (tip.arc_length - engaged).abs() <= 1e-12 * self.model.scene().needle.depth;
         contacts.push(match self.tip.as_ref().filter(same) {
             Some(tip) => tip.clone(),
-            None => self.joined(&self.station(engaged, self.path.at(engaged, ahead))?, depth, ahead)?,
+            None => self.joined(&self.station(engaged, self.path.at(engaged, ahead))?, (depth, engaged), ahead)?,
         });
         Ok(contacts)
     }
 
     /// A station that the shaft has held without its being asked, or that it has just come to.
-    pub(super) fn joined(&self, station: &Station, depth: f64, ahead: Point2) -> Result<Station, NeedleError> {
+    pub(super) fn joined(
+        &self,
+        station: &Station,
+        (depth, engaged): (f64, f64),
+        ahead: Point2,
+    ) -> Result<Station, NeedleError> {
         let at = self.path.at(station.arc_length, ahead);
         let moved = at != station.at;
         let mut joined = if moved {
@@ -81,17 +89,47 @@ impl SlippingNeedle<'_> {
         if let (Some(tip), true) = (&self.tip, station.arc_length <= self.engaged) {
             joined.known = true;
             joined.slide = tip.slide;
+            // On the way in: what the tip leaves behind on the way out was held before.
+            joined.takes_over = tip.slide == Slide::Forward && engaged > self.engaged && depth > self.pose.depth;
             joined.axial = self.axis().dot(&joined.stencil.interpolate(&self.last));
         }
         Ok(joined)
     }
 
-    /// Forces and tissue that agree with the tip there.
-    pub(super) fn trial(&mut self, depth: f64, ahead: Point2, tip: Tip) -> Result<Trial, NeedleError> {
+    /// Begins where another trial of the same increment ended: the tip lies beside where its way went straight as far as
+    /// that one's did, and forces are that one's.
+    fn begin_at(&self, contacts: &mut [Station], near: &Trial, ahead: Point2) -> Result<(), NeedleError> {
+        let ([stations @ .., tip], [others @ .., other]) = (contacts, &near.contacts[..]) else { return Ok(()) };
+        for station in stations {
+            if let Some(same) = others.iter().find(|other| other.arc_length == station.arc_length) {
+                (station.across, station.along) = (same.across, same.along);
+            }
+        }
+        (tip.across, tip.along) = (other.across, other.along);
+        if self.lies_where_it_is(tip) && self.lies_where_it_is(other) {
+            let beside = self.normal().dot(&(other.at - self.path.at(other.arc_length, ahead)));
+            tip.at = self.path.at(tip.arc_length, ahead) + self.normal() * beside;
+            tip.stencil = self.model.planar().value_stencil(&tip.at)?;
+        }
+        Ok(())
+    }
+
+    /// Forces and tissue that agree with the tip there; `near` is another trial of the same increment.
+    pub(super) fn trial(
+        &mut self,
+        depth: f64,
+        ahead: Point2,
+        tip: Tip,
+        near: Option<&Trial>,
+    ) -> Result<Trial, NeedleError> {
         let mut contacts = self.contacts(depth, ahead, tip.engaged)?;
+        if let Some(near) = near {
+            self.begin_at(&mut contacts, near, ahead)?;
+        }
         let places: Vec<f64> = contacts.iter().map(|contact| contact.arc_length).collect();
         let lengths = hat_integrals(&places, 0.0, tip.engaged);
         let spread = spread(&places, tip.engaged, self.shaft.tip_length);
+        let before: Vec<Slide> = contacts.iter().map(|contact| contact.slide).collect();
         let m = contacts.len();
         let mut forces = DVector::from_fn(2 * m + 1, |i, _| match i {
             i if i < m => contacts[i].across,
@@ -103,6 +141,10 @@ impl SlippingNeedle<'_> {
         let (mut last, mut fresh) = (f64::INFINITY, false);
         for _ in 0..ROUNDS {
             let external = self.external(&contacts, &forces, &spread);
+            // As good as the forces are that it is for; a linear tissue's is found in one step.
+            let loosest = if self.is_small_strain() { STEP_TOLERANCE } else { LOOSEST };
+            let loose = (FORCING * last / self.model.spacing()).clamp(STEP_TOLERANCE, loosest);
+            self.equilibrium.set_settings(newton_settings(loose));
             self.equilibrium
                 .drive_loaded(&self.prescribed(), &external)
                 .map_err(|source| NeedleError::Equilibrium { depth, source })?;
@@ -114,23 +156,24 @@ impl SlippingNeedle<'_> {
                     self.compliance(&contacts, &spread)
                 }
             };
-            let astray = self.follow_the_tissue(&mut contacts, &felt)?;
             let at_zero = &felt - &known * &forces;
-            let found = self.friction(&mut contacts, (&lengths, tip.bounds), (&known, &at_zero), &forces);
+            let found = self.friction(&mut contacts, (&lengths, &before, tip.bounds), (&known, &at_zero), &forces);
             let Some(found) = found else {
                 if std::mem::replace(&mut fresh, true) {
                     return Err(NeedleError::NoForces { depth });
                 }
+                self.follow_the_tissue(&mut contacts, &felt)?;
                 // A compliance of several states may be none.
                 continue;
             };
             // Responses of several states make a compliance that is not symmetric: what is felt across the needle decides too.
-            let held = |k: &usize| !self.lies_where_it_is(&contacts[*k]);
-            let off = (0..m).filter(held).map(|k| felt[k].abs()).fold(0.0, f64::max);
-            let change = (&known * (&found - &forces)).amax().max(off).max(astray);
+            // Points that are to lie on the line are as far off it as what is felt.
+            let off = felt.rows(0, m).amax();
+            let moved = &known * (&found - &forces);
+            let change = moved.amax().max(off);
             let scale = found.amax().max(NEGLIGIBLE * self.largest_force);
             let settled = (&found - &forces).amax() <= SETTLED * scale;
-            if change <= enough && settled {
+            if change <= enough && settled && loose <= STEP_TOLERANCE {
                 for (k, contact) in contacts.iter_mut().enumerate() {
                     (contact.across, contact.along) = (forces[k], forces[m + k]);
                     contact.length = lengths[k];
@@ -140,6 +183,8 @@ impl SlippingNeedle<'_> {
                 self.largest_force = self.largest_force.max(forces.amax());
                 return Ok(Trial { contacts, tip_force: forces[2 * m], tip_displacement });
             }
+            // Where the tissue will be under the new forces: behind them this would converge half as fast.
+            self.follow_the_tissue(&mut contacts, &(&felt + &moved))?;
             fresh = change > STALE * last && !fresh;
             if !fresh {
                 compliance = Some(known);
@@ -174,41 +219,43 @@ impl SlippingNeedle<'_> {
         0.0 < station.arc_length && station.arc_length < AT_THE_SKIN * gap
     }
 
-    /// Makes stations that have just been cut the points that lie on the needle's line; how far they were off it.
-    pub(super) fn follow_the_tissue(&self, contacts: &mut [Station], felt: &DVector<f64>) -> Result<f64, NeedleError> {
-        let (normal, mut astray) = (self.normal(), 0.0);
+    /// Makes stations that have just been cut the points that lie on the needle's line, off which the present ones are by
+    /// what is felt across it.
+    fn follow_the_tissue(&self, contacts: &mut [Station], felt: &DVector<f64>) -> Result<(), NeedleError> {
+        let normal = self.normal();
         for (k, contact) in contacts.iter_mut().enumerate() {
             if self.lies_where_it_is(contact) && felt[k] != 0.0 {
                 contact.at -= normal * felt[k];
                 contact.stencil = self.model.planar().value_stencil(&contact.at)?;
-                astray = f64::max(astray, felt[k].abs());
             }
         }
-        Ok(astray)
+        Ok(())
     }
 
     /// The forces that fit a compliance; what breaks loose slides with less.
-    pub(super) fn friction(
+    ///
+    /// Static friction holds what kinetic friction would not, so that there may be two answers. What slid before the
+    /// increment is asked to stick by kinetic friction alone, what stuck by static friction, in every round: no guess on the
+    /// way to the answer may decide which of the two it is.
+    fn friction(
         &self,
         contacts: &mut [Station],
-        (lengths, tip): (&[f64], Bounds),
+        (lengths, before, tip): (&[f64], &[Slide], Bounds),
         (compliance, at_zero): (&DMatrix<f64>, &DVector<f64>),
         start: &DVector<f64>,
     ) -> Option<DVector<f64>> {
         let m = contacts.len();
-        let mut start = start.clone();
-        // What has been let loose once in this search does not stick again in it.
-        let mut loose = vec![false; m];
+        let (mut start, mut regimes) = (start.clone(), before.to_vec());
         for _ in 0..ROUNDS {
             let across = |contact: &Station| match self.lies_where_it_is(contact) {
                 true => Bounds::exactly(0.0),
                 false => Bounds::HOLDS,
             };
             let mut bounds: Vec<Bounds> = contacts.iter().map(across).collect();
-            bounds.extend(contacts.iter().zip(lengths).map(|(contact, length)| {
+            bounds.extend(contacts.iter().zip(lengths).zip(&regimes).map(|((contact, length), regime)| {
                 let holding = contact.resistance.holding(self.shaft.speed) * length;
                 let sliding = contact.resistance.sliding(self.shaft.speed) * length;
-                match (contact.slide, contact.known) {
+                match (regime, contact.known && !contact.takes_over) {
                     (Slide::Forward, false) => Bounds::exactly(sliding),
                     (Slide::Backward, false) => Bounds::exactly(-sliding),
                     (Slide::Sticks, _) => Bounds { lower: -holding, upper: holding },
@@ -219,19 +266,19 @@ impl SlippingNeedle<'_> {
             bounds.push(tip);
             let forces = forces_between(&bounds, compliance, at_zero, &start)?;
             let mut broke = false;
-            for (k, contact) in contacts.iter_mut().enumerate().filter(|(_, contact)| contact.known) {
+            let decided = contacts.iter_mut().enumerate().filter(|(_, contact)| contact.known && !contact.takes_over);
+            for (k, contact) in decided {
                 let (force, Bounds { lower, upper }) = (forces[m + k], bounds[m + k]);
                 let slides = match force {
                     force if force >= upper => Slide::Forward,
                     force if force <= lower => Slide::Backward,
                     _ => Slide::Sticks,
                 };
-                if slides != contact.slide && slides != Slide::Sticks {
-                    (broke, loose[k]) = (true, true);
-                    contact.slide = slides;
-                } else if !loose[k] {
-                    contact.slide = slides;
+                if slides != Slide::Sticks && slides != regimes[k] {
+                    (broke, regimes[k]) = (true, slides);
                 }
+                // What has been let loose does not stick again in the same increment.
+                contact.slide = if regimes[k] == before[k] { slides } else { regimes[k] };
             }
             if !broke {
                 return Some(forces);

@@ -8,7 +8,7 @@
 
 use super::error::TrainingError;
 use crate::model::{Pose, TissueModel};
-use crate::needle::{Course, NeedleError};
+use crate::needle::{Course, NeedleError, NeedleReading};
 use crate::parallel;
 use crate::random::SplitMix64;
 use crate::scene::Motion;
@@ -67,7 +67,6 @@ struct Knot {
     paddle: Vector2<f64>,
     target: Vector2<f64>,
     jacobian: Matrix2<f64>,
-    base_force: f64,
     coefficients: Vec<f64>,
 }
 
@@ -196,7 +195,7 @@ impl AlongPath {
     fn errors_beside(&self, walk: &Walk<'_>, size: f64, seed: u64) -> Result<Vec<(f64, f64)>, TrainingError> {
         let beside = RandomWay::new(size, seed, walk.interval * walk.steps as f64);
         let at = |k: usize| self.knots[k].paddle + beside.at(walk.interval * k as f64);
-        let found = walk.targets(&at)?;
+        let found = walk.courses(&at, |course| course.target_displacement())?;
         let mut farthest = 0.0_f64;
         let errors = found.into_iter().enumerate().map(|(k, target)| {
             let off = at(k) - self.knots[k].paddle;
@@ -245,12 +244,6 @@ impl AlongPath {
     /// Where the paddle is on the path, at a time since its start.
     pub fn paddle(&self, since_start: f64) -> Vector2<f64> {
         self.cubic(&self.between(since_start), |knot| knot.paddle)
-    }
-
-    /// Force at the needle's base on the path, at a time since its start.
-    pub fn base_force(&self, since_start: f64) -> f64 {
-        let Between { knot, share } = self.between(since_start);
-        self.knots[knot].base_force * (1.0 - share) + self.knots[knot + 1].base_force * share
     }
 }
 
@@ -339,28 +332,40 @@ impl<'w> Walk<'w> {
                 paddle: course.pose().paddle,
                 target: course.target_displacement(),
                 jacobian,
-                base_force: course.base_force(),
                 coefficients: course.coefficients().to_vec(),
             });
         }
         Ok(knots)
     }
 
-    /// Target displacements of a way whose paddle is known.
-    fn targets(&self, paddle: &dyn Fn(usize) -> Vector2<f64>) -> Result<Vec<Vector2<f64>>, TrainingError> {
+    /// What is seen of the body step by step, on a way whose paddle is known.
+    fn courses<T>(
+        &self,
+        paddle: &dyn Fn(usize) -> Vector2<f64>,
+        mut see: impl FnMut(&Course<'_>) -> T,
+    ) -> Result<Vec<T>, TrainingError> {
         let mut course = self.course()?;
         (0..=self.steps)
             .map(|k| {
                 if k > 0 {
                     self.step(&mut course, k, paddle(k))?;
                 }
-                Ok(course.target_displacement())
+                Ok(see(&course))
             })
             .collect()
     }
 }
 
-/// Where the full model ends when the paddle goes its own way.
+/// A moment of the full model's way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AlongTheWay {
+    /// Target displacement, length.
+    pub target: Vector2<f64>,
+    /// What the needle meets.
+    pub needle: NeedleReading,
+}
+
+/// Where the full model goes, moment by moment, when the paddle goes its own way.
 ///
 /// # Errors
 /// [`TrainingError::Path`] where the tissue cannot be taken along it.
@@ -370,9 +375,10 @@ pub fn along(
     way: &(dyn Fn(f64) -> Pose + Sync),
     interval: f64,
     paddle: &[Vector2<f64>],
-) -> Result<Vec<Vector2<f64>>, TrainingError> {
+) -> Result<Vec<AlongTheWay>, TrainingError> {
     let walk = Walk { model, paddle: attached, way, interval, steps: paddle.len().saturating_sub(1) };
-    walk.targets(&|k| paddle[k])
+    let see = |course: &Course<'_>| AlongTheWay { target: course.target_displacement(), needle: course.reading() };
+    walk.courses(&|k| paddle[k], see)
 }
 
 fn failed(time: f64) -> impl FnOnce(NeedleError) -> TrainingError {

@@ -4,12 +4,12 @@ use firmware::Faults;
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 
-use crate::bench::result::{BodyFrame, SeriesPoint, StrategyResult};
+use crate::bench::result::{BodyFrame, NeedlePoint, NeedleResult, SeriesPoint, StrategyResult};
 use crate::record::export;
 use crate::runtime::plant::PlantLoop;
 use crate::runtime::time::mode::RunMode;
-use crate::world::tissue::{TissuePlant, TissueResponse as _, WantedPlant};
-use crate::world::truth::Truth;
+use crate::world::retrace::Retrace;
+use crate::world::truth::{NeedleMoment, Truth};
 use model_offline::output::table_text::hex;
 
 /// Points of a time series in the result.
@@ -29,10 +29,10 @@ pub(super) fn measure(
 ) -> StrategyResult {
     let plant_account = plant.world().plant_account();
     let deformed_nodes = plant.world().tissue.deformed_nodes();
+    let needle = needle(plant.world().tissue.needle());
     let started_ns = plant.world().needle_started_ns().unwrap_or(0);
     let waited_s = plant.world().drive.wait_s();
-    let needle = &model.scene().needle;
-    let (normal, axis) = (needle.orthogonal(), needle.axis);
+    let (normal, axis) = (model.scene().needle.orthogonal(), model.scene().needle.axis);
     let truths = plant.truths();
     let error = |truth: &Truth| Vector2::from(truth.target).dot(&normal);
     // Before the needle moves nothing is to be held.
@@ -75,9 +75,11 @@ pub(super) fn measure(
         scene_hash: hex(&model.scene().hash()),
         recording: None,
         csv: None,
+        needle_csv: Vec::new(),
         series,
         deformed_nodes,
-        frames: frames(model, paddle, truths),
+        frames: frames(model, paddle, truths, started_ns),
+        needle,
         plant_step_us: plant.mean_step_us(),
         plant: plant_account,
     }
@@ -85,14 +87,11 @@ pub(super) fn measure(
 
 /// The body along the insertion, solved once more after the run at some of its ticks: nothing is added to a loop on
 /// the machine's clock. Ends early where the tissue has no equilibrium with such large steps.
-fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<BodyFrame> {
-    let position = paddle.and_then(|index| model.paddle_position(index));
-    let (Ok(mut tissue), Some(last)) = (TissuePlant::new(model, position, WantedPlant::Full), truths.last()) else {
+fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth], started_ns: u64) -> Vec<BodyFrame> {
+    let (Ok(mut retrace), Some(last)) = (Retrace::new(model, paddle, truths, started_ns), truths.len().checked_sub(1))
+    else {
         return Vec::new();
     };
-    // The last tick at which the needle was at rest.
-    let started = truths.partition_point(|truth| truth.depth <= 0.0).saturating_sub(1);
-    let started_ns = truths.get(started).map_or(0, |truth| truth.time_ns);
     let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
     // A millionth of the depth is beyond any drawing.
     let places = 10f64.powi(6 - model.scene().needle.depth.log10().floor() as i32);
@@ -111,16 +110,25 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth]) -> Vec<Bod
     for i in 0..=count {
         let part = whole * i as f64 / count as f64;
         // The last one is the end, with what the controller removed after the needle had arrived.
-        let truth =
-            if i == count { last } else { &truths[gone.partition_point(|gone| *gone < part).min(truths.len() - 1)] };
-        let since_start_s = truth.time_ns.saturating_sub(started_ns) as f64 * 1e-9;
-        if tissue.step_at(since_start_s, truth.depth, Vector2::from(truth.paddle)).is_err() {
-            break;
-        }
+        let index = if i == count { last } else { gone.partition_point(|gone| *gone < part).min(last) };
+        let Ok(tissue) = retrace.go_on_to(index) else { break };
         frames.push(BodyFrame {
-            depth: truth.depth,
+            depth: truths[index].depth,
             nodes: tissue.deformed_nodes().into_iter().map(|node| node.map(rounded)).collect(),
         });
     }
     frames
+}
+
+/// Forces and slip in so many points at most, and the whole shaft where the needle is deepest.
+fn needle(moments: &[NeedleMoment]) -> Option<NeedleResult> {
+    let deepest = moments.iter().max_by(|a, b| a.reading.depth.total_cmp(&b.reading.depth))?;
+    let stride = moments.len().div_ceil(SERIES_POINTS - 1).max(1);
+    let last = moments.len() - 1;
+    let kept = moments.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
+    Some(NeedleResult {
+        points: kept.map(|(_, moment)| NeedlePoint::from(moment)).collect(),
+        shaft_depth: deepest.reading.depth,
+        shaft: deepest.reading.shaft.clone(),
+    })
 }

@@ -202,6 +202,9 @@ impl<'a> SimulatedInsertion<'a> {
         let series = csv::insertion(plant.truths(), &[], &normal, &model.scene().length_unit);
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         result.csv = Some(artifacts[0].name.clone());
+        let needle = self.needle_tables(&mut plant);
+        result.needle_csv = needle.iter().map(|table| table.name.clone()).collect();
+        artifacts.extend(needle);
         if extras.vtu {
             artifacts.extend(paraview::series(model, paddle, plant.truths(), 0, &label.stem()));
         }
@@ -255,9 +258,12 @@ impl<'a> SimulatedInsertion<'a> {
         });
         result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
         let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);
-        let mut artifacts = self.files(controller, &recording, run.plant.truths(), started_ns)?;
+        let mut artifacts = self.files(controller, &recording, &mut run.plant, started_ns)?;
         artifacts.insert(1, Artifact { name: label.file("rec"), bytes });
         result.csv = Some(artifacts[0].name.clone());
+        let needle = self.needle_tables(&mut run.plant);
+        result.needle_csv = needle.iter().map(|table| table.name.clone()).collect();
+        artifacts.extend(needle);
         result.final_state = run.accounts.final_state;
         result.faults = run.accounts.faults;
         let moving = || recording.records.iter().map(|record| &record.tick).filter(|t| t.inputs.time_ns >= started_ns);
@@ -290,23 +296,41 @@ impl<'a> SimulatedInsertion<'a> {
         &self,
         controller: &ControllerSetup<'_>,
         recording: &Recording,
-        truths: &[Truth],
+        plant: &mut PlantLoop<'_>,
         started_ns: u64,
     ) -> Result<Vec<Artifact>, SimError> {
         let Self { model, label, extras, .. } = *self;
         let normal = model.scene().needle.orthogonal();
-        let series = csv::insertion(truths, &recording.records, &normal, &model.scene().length_unit);
+        let series = csv::insertion(plant.truths(), &recording.records, &normal, &model.scene().length_unit);
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         if extras.mcap {
             let name = label.file("mcap");
-            let bytes = mcap::encode(recording, controller.table.orthogonal.into())?;
+            let needle = mcap::NeedleForces { started_ns, moments: plant.world().tissue.needle() };
+            let bytes = mcap::encode(recording, controller.table.orthogonal.into(), needle)?;
             artifacts.push(Artifact { name, bytes });
         }
         if extras.vtu {
             let paddle = controller.table.paddle.index;
-            artifacts.extend(paraview::series(model, Some(paddle), truths, started_ns, &label.stem()));
+            artifacts.extend(paraview::series(model, Some(paddle), plant.truths(), started_ns, &label.stem()));
         }
         Ok(artifacts)
+    }
+
+    /// What the needle met, where the world has one that slips.
+    fn needle_tables(&self, plant: &mut PlantLoop<'_>) -> Vec<Artifact> {
+        let scene = self.model.scene();
+        let units = csv::Units { length: &scene.length_unit, stress: &scene.stress_unit };
+        let first_ns = plant.truths().first().map_or(0, |truth| truth.time_ns);
+        let started_s = csv::seconds_since(plant.world().needle_started_ns().unwrap_or(0), first_ns);
+        let moments = plant.world().tissue.needle();
+        if moments.is_empty() {
+            return Vec::new();
+        }
+        let named = |what: &str, bytes| Artifact { name: format!("{}-{what}.csv", self.label.stem()), bytes };
+        vec![
+            named("needle", csv::needle(moments, started_s, units)),
+            named("shaft", csv::shaft(moments, started_s, units)),
+        ]
     }
 
     /// The simulated world before its first tick.

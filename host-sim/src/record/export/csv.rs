@@ -5,7 +5,7 @@ use model_offline::output::csv::table;
 use nalgebra::Vector2;
 
 use crate::record::recording::{Record, Recording};
-use crate::world::truth::Truth;
+use crate::world::truth::{NeedleMoment, Truth};
 
 /// What the plant saw of an insertion: one line per tick of the plant. `{}` is the unit of length.
 const INSERTION: [&str; 16] = [
@@ -48,6 +48,30 @@ const RECORDING: [&str; 18] = [
     "true_paddle_x [{}]",
     "true_paddle_y [{}]",
 ];
+
+/// What a needle that slips met: one line per moment. `{}` is the unit of length, `{f}` that of force per thickness.
+const NEEDLE: [&str; 7] = [
+    "time [s]",
+    "true_depth [{}]",
+    "base_force [{f}]",
+    "tip_force [{f}]",
+    "shaft_friction [{f}]",
+    "cut_length [{}]",
+    "largest_slip [{}]",
+];
+
+/// Its shaft: one line per moment and place. `{s}` is the unit of stress.
+const SHAFT: [&str; 6] = [
+    "time [s]",
+    "true_depth [{}]",
+    "arc_length [{}]",
+    "slip [{}]",
+    "friction_per_length [{s}]",
+    "normal_force_per_length [{s}]",
+];
+
+/// Moments of a shaft that are written: a profile every now and then.
+const SHAFT_MOMENTS: usize = 50;
 
 /// Time from `start_ns`, s; negative before.
 pub fn seconds_since(time_ns: u64, start_ns: u64) -> f64 {
@@ -123,6 +147,65 @@ pub fn recording(recording: &Recording, orthogonal: &Vector2<f64>, length: &str)
             error,
             true_px,
             true_py,
+        ]
+    })
+}
+
+/// Labels of the units of length and stress.
+#[derive(Clone, Copy, Debug)]
+pub struct Units<'u> {
+    /// Of length.
+    pub length: &'u str,
+    /// Of stress, which is force per length and unit thickness.
+    pub stress: &'u str,
+}
+
+impl Units<'_> {
+    /// Of force per unit thickness: "kPa·mm".
+    pub fn force(&self) -> String {
+        match (self.stress, self.length) {
+            ("1", length) => length.to_owned(),
+            (stress, "1") => stress.to_owned(),
+            (stress, length) => format!("{stress}·{length}"),
+        }
+    }
+
+    fn columns<const N: usize>(&self, columns: [&str; N]) -> [String; N] {
+        let force = self.force();
+        columns.map(|name| name.replace("{}", self.length).replace("{s}", self.stress).replace("{f}", &force))
+    }
+}
+
+/// Forces on a needle that slips, moment by moment; time zero is the start of the run's first tick, as in [`insertion`],
+/// `started_s` the start of the needle.
+pub fn needle(moments: &[NeedleMoment], started_s: f64, units: Units<'_>) -> Vec<u8> {
+    table(units.columns(NEEDLE), moments, |NeedleMoment { since_start_s, reading }| {
+        [
+            format!("{:.6}", started_s + since_start_s),
+            text(reading.depth),
+            text(reading.base_force),
+            text(reading.tip_force),
+            text(reading.friction()),
+            reading.cut_length.map(text).unwrap_or_default(),
+            text(reading.largest_slip()),
+        ]
+    })
+}
+
+/// The shaft from entry to tip at some of these moments, its last one included.
+pub fn shaft(moments: &[NeedleMoment], started_s: f64, units: Units<'_>) -> Vec<u8> {
+    let within: Vec<&NeedleMoment> = moments.iter().filter(|moment| !moment.reading.shaft.is_empty()).collect();
+    let stride = within.len().div_ceil(SHAFT_MOMENTS).max(1);
+    let kept = within.iter().rev().step_by(stride).rev();
+    let lines = kept.flat_map(|moment| moment.reading.shaft.iter().map(move |station| (moment, station)));
+    table(units.columns(SHAFT), lines, |(moment, station)| {
+        [
+            format!("{:.6}", started_s + moment.since_start_s),
+            text(moment.reading.depth),
+            text(station.arc_length),
+            text(station.slip),
+            text(station.friction),
+            text(station.normal),
         ]
     })
 }

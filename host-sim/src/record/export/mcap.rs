@@ -1,10 +1,11 @@
-//! A recording as [MCAP](https://mcap.dev): five topics of JSON messages, each with its JSON Schema.
+//! A recording as [MCAP](https://mcap.dev): six topics of JSON messages, each with its JSON Schema.
 //!
 //! | topic | one message per | log time |
 //! |---|---|---|
 //! | `/needle`, `/target`, `/paddle` | sample that the controller used, with the time of its measurement | arrival |
 //! | `/command` | tick of the controller | tick |
 //! | `/truth` | tick of the plant | tick |
+//! | `/needle_forces` | moment of a needle that slips; of a run, not of a recording alone | that moment |
 //!
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
 //! free-run. A metadata record `stillpoint` says which, with seed and hashes.
@@ -17,6 +18,7 @@ use std::sync::Arc;
 use ::mcap::records::Metadata;
 use ::mcap::{Channel, McapError, Message, Schema, Writer};
 use firmware::{Faults, Mode};
+use model_offline::needle::{NeedleReading, StationState};
 use model_offline::output::table_text::hex;
 use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
@@ -25,7 +27,7 @@ use sha2::{Digest, Sha256};
 use crate::record::recording::Recording;
 use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::time::mode::RunMode;
-use crate::world::truth::Truth;
+use crate::world::truth::{NeedleMoment, Truth};
 
 /// A sample of the needle's encoder.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -102,14 +104,47 @@ pub struct TruthMessage {
     pub paddle_y: f64,
 }
 
+/// Forces on a needle that slips, by the full model, per unit thickness: positive where they push it in.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct NeedleForcesMessage {
+    /// Needle depth, length.
+    pub depth: f64,
+    /// Force at the base: that of the tip and of the shaft.
+    pub base_force: f64,
+    /// Force of the tip.
+    pub tip_force: f64,
+    /// Friction all along the shaft.
+    pub friction: f64,
+    /// Length of tissue that the tip has passed, length; none while the skin holds.
+    pub cut_length: Option<f64>,
+    /// The shaft from the entry to the tip: arc length, slip, friction and normal force per length.
+    pub shaft: Vec<StationState>,
+}
+
+/// What a needle met on its way.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NeedleForces<'n> {
+    /// When the needle started, ns.
+    pub started_ns: u64,
+    /// Its moments, in order of time.
+    pub moments: &'n [NeedleMoment],
+}
+
+impl NeedleForces<'_> {
+    fn time_ns(&self, moment: &NeedleMoment) -> u64 {
+        self.started_ns + (moment.since_start_s * 1e9).round() as u64
+    }
+}
+
 /// Topic and schema of every kind of message.
-pub fn schemas() -> [(&'static str, schemars::Schema); 5] {
+pub fn schemas() -> [(&'static str, schemars::Schema); 6] {
     [
         ("/needle", schema_for!(NeedleMessage)),
         ("/target", schema_for!(TargetMessage)),
         ("/paddle", schema_for!(PaddleMessage)),
         ("/command", schema_for!(CommandMessage)),
         ("/truth", schema_for!(TruthMessage)),
+        ("/needle_forces", schema_for!(NeedleForcesMessage)),
     ]
 }
 
@@ -194,6 +229,19 @@ impl Topics {
         self.write(writer, "/command", [now, now], &message)
     }
 
+    /// What the needle met at a moment.
+    fn write_forces(&mut self, writer: &mut Output, time_ns: u64, reading: &NeedleReading) -> Result<(), McapError> {
+        let message = NeedleForcesMessage {
+            depth: reading.depth,
+            base_force: reading.base_force,
+            tip_force: reading.tip_force,
+            friction: reading.friction(),
+            cut_length: reading.cut_length,
+            shaft: reading.shaft.clone(),
+        };
+        self.write(writer, "/needle_forces", [time_ns; 2], &message)
+    }
+
     /// What really happened at a tick; `orthogonal` is n.
     fn write_truth(&mut self, writer: &mut Output, truth: &Truth, orthogonal: [f64; 2]) -> Result<(), McapError> {
         let message = TruthMessage {
@@ -209,19 +257,26 @@ impl Topics {
     }
 }
 
-/// The recording as an MCAP file; `orthogonal` is n.
+/// The recording as an MCAP file; `orthogonal` is n. What the needle met is known of a run, not of a recording.
 ///
 /// # Errors
 /// [`McapError`] of the writer.
-pub fn encode(recording: &Recording, orthogonal: [f64; 2]) -> Result<Vec<u8>, McapError> {
+pub fn encode(recording: &Recording, orthogonal: [f64; 2], needle: NeedleForces<'_>) -> Result<Vec<u8>, McapError> {
     let options = ::mcap::WriteOptions::new().compression(None).profile("").library("host-sim");
     let mut writer = options.create(Cursor::new(Vec::new()))?;
     let mut topics = Topics::new();
+    let mut moments = needle.moments.iter().map(|moment| (needle.time_ns(moment), &moment.reading)).peekable();
     for record in &recording.records {
+        while let Some((time_ns, reading)) = moments.next_if(|(time_ns, _)| *time_ns <= record.tick.inputs.time_ns) {
+            topics.write_forces(&mut writer, time_ns, reading)?;
+        }
         topics.write_tick(&mut writer, &record.tick)?;
         if let Some(truth) = &record.truth {
             topics.write_truth(&mut writer, truth, orthogonal)?;
         }
+    }
+    for (time_ns, reading) in moments {
+        topics.write_forces(&mut writer, time_ns, reading)?;
     }
     writer.write_metadata(&Metadata { name: "stillpoint".to_owned(), metadata: facts(recording) })?;
     writer.finish()?;

@@ -4,10 +4,9 @@ use std::fmt::Write as _;
 
 use model_offline::model::TissueModel;
 use model_offline::output::vtu::vtu;
-use model_offline::solver::equilibrium::NewtonSettings;
-use nalgebra::Vector2;
 
 use crate::record::files::Artifact;
+use crate::world::retrace::Retrace;
 use crate::world::truth::Truth;
 
 /// Files of a series.
@@ -22,21 +21,19 @@ pub fn series(
     started_ns: u64,
     name: &str,
 ) -> Vec<Artifact> {
-    let position = paddle.and_then(|index| model.paddle_position(index));
-    let Ok(mut body) = model.body(position, NewtonSettings::default()) else { return Vec::new() };
-    let moving: Vec<&Truth> = truths.iter().filter(|truth| truth.time_ns >= started_ns).collect();
+    let moving = &truths[truths.partition_point(|truth| truth.time_ns < started_ns)..];
+    let Ok(mut retrace) = Retrace::new(model, paddle, moving, started_ns) else { return Vec::new() };
     let Some(last) = moving.len().checked_sub(1) else { return Vec::new() };
     let mut files = Vec::new();
     let mut entries = String::new();
+    let mut coefficients = Vec::new();
     for i in 0..=FRAMES {
-        let truth = moving[last * i / FRAMES];
-        if body.drive(truth.depth, Vector2::from(truth.paddle)).is_err() {
-            break;
-        }
+        let Ok(tissue) = retrace.go_on_to(last * i / FRAMES) else { break };
+        tissue.copy_coefficients(&mut coefficients);
         let file = format!("{name}-{i:03}.vtu");
-        let time_s = (truth.time_ns - started_ns) as f64 * 1e-9;
+        let time_s = (moving[last * i / FRAMES].time_ns - started_ns) as f64 * 1e-9;
         let _ = writeln!(entries, "    <DataSet timestep=\"{time_s}\" group=\"\" part=\"0\" file=\"{file}\"/>");
-        files.push(Artifact { name: file, bytes: vtu(model, body.equilibrium().coefficients()).into_bytes() });
+        files.push(Artifact { name: file, bytes: vtu(model, &coefficients).into_bytes() });
     }
     let collection = format!(
         "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\" byte_order=\"LittleEndian\">\n  \

@@ -5,8 +5,9 @@ use model_offline::output::chart::number::{NO_NUMBER, in_unit, number, plain};
 use model_offline::output::chart::{Axis, Colour, Dash, Drawing, Panel, Place, ReferenceLine, Series};
 
 use super::embed::CHART_WIDTH;
-use crate::bench::result::{CaseResult, RunResult, StrategyResult};
+use crate::bench::result::{CaseResult, NeedlePoint, NeedleResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
+use crate::record::export::csv;
 use crate::runtime::names;
 
 /// A case in words.
@@ -132,12 +133,62 @@ fn paddle_panel(run: &RunResult, case: &CaseResult, name: &str, strategy: &Strat
     panel
 }
 
-/// Error of all strategies, error of the dynamic ones enlarged, paddle displacement.
+/// Unit of force per thickness.
+fn force_unit(run: &RunResult) -> String {
+    csv::Units { length: &run.units[0], stress: &run.units[1] }.force()
+}
+
+/// Forces on a needle that slips, under the controller or else without a paddle.
+fn force_panel(run: &RunResult, name: &str, needle: &NeedleResult) -> Panel {
+    let largest = needle.points.iter().map(|point| point.base_force).fold(0.0, f64::max);
+    let mut panel = Panel::new(
+        &format!("Forces on the needle, {name}: at most {}", number(largest, 2)),
+        Axis::linear("time since the start of the needle", "s").enclosing(needle.points.iter().map(|p| p.time_s)),
+        Axis::linear("force per thickness", &force_unit(run)),
+    );
+    panel.description = format!("Forces at the needle's base, of its tip and along its shaft over time, {name}");
+    panel.lines.push(zero());
+    let mut add = |label: &str, (colour, dash): (Colour, Dash), force: &dyn Fn(&NeedlePoint) -> f64| {
+        let points = needle.points.iter().map(|point| (point.time_s, force(point))).collect();
+        panel.series.push(Series::curve(label, colour, dash, points));
+    };
+    add("base", (Colour::Blue, Dash::Solid), &|point| point.base_force);
+    add("tip", (Colour::Vermillion, Dash::Dashed), &|point| point.tip_force);
+    add("friction along the shaft", (Colour::Green, Dash::DashDot), &|point| point.friction);
+    panel
+}
+
+/// How far the needle has slid past the tissue along its shaft, where it was deepest.
+fn slip_panel(run: &RunResult, name: &str, needle: &NeedleResult) -> Panel {
+    let unit = &run.units[0];
+    let mut panel = Panel::new(
+        &format!("Slip along the shaft at depth {}", number(needle.shaft_depth, 3)),
+        Axis::linear("length of cut from the entry", unit).enclosing(needle.shaft.iter().map(|s| s.arc_length)),
+        Axis::linear("slip", unit),
+    );
+    panel.description = format!("Slip of the needle past the tissue along its shaft where it was deepest, {name}");
+    panel.lines.push(zero());
+    let points = needle.shaft.iter().map(|station| (station.arc_length, station.slip)).collect();
+    panel.series.push(Series::curve("slip", Colour::Blue, Dash::Solid, points));
+    panel
+}
+
+/// Error of all strategies, error of the dynamic ones enlarged, paddle displacement; forces and slip of a needle that slips.
 pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> CaseCharts {
     let mut charts = vec![("error", Panel { cursor: true, ..error_panel(run, case) })];
     if let Some((strategy, result)) = case.strategies.iter().find(|shown| shown.0.has_controller()) {
         charts.push(("enlarged", Panel { cursor: true, ..enlarged_panel(run, case) }));
         charts.push(("paddle", paddle_panel(run, case, strategy.title(), result)));
+    }
+    let shown = case.strategies.iter().filter_map(|(strategy, result)| Some((strategy, result.needle.as_ref()?)));
+    // The needle under the controller; without one as it is alone.
+    let by_controller =
+        |(strategy, _): &(Strategy, &NeedleResult)| (strategy.has_controller(), strategy.is_reproducible());
+    if let Some((strategy, needle)) = shown.max_by_key(by_controller) {
+        charts.push(("forces", force_panel(run, strategy.title(), needle)));
+        if needle.shaft.len() > 1 {
+            charts.push(("slip", slip_panel(run, strategy.title(), needle)));
+        }
     }
     CaseCharts(charts.into_iter().map(|(what, panel)| (format!("case{number}-{what}"), panel)).collect())
 }

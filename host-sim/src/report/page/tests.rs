@@ -52,9 +52,11 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         scene_hash: EVIL.to_owned(),
         recording: Some(RecordingResult { file: EVIL.to_owned(), sha256: EVIL.to_owned(), ticks: 3 }),
         csv: Some(EVIL.to_owned()),
+        needle_csv: Vec::new(),
         series: series.to_vec(),
         deformed_nodes: nodes.clone(),
         frames: vec![BodyFrame { depth: 0.05, nodes: rest() }, BodyFrame { depth: 0.1, nodes }],
+        needle: None,
         plant_step_us: 1.0,
         plant: crate::world::tissue::PlantAccount::default(),
     }

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use model_offline::model::{Body, Pose, TissueModel};
 use model_offline::needle::Course;
-use model_offline::reduction::along_path::{PathBody, along};
+use model_offline::reduction::along_path::{AlongTheWay, PathBody, along};
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, Extrapolated};
 use model_offline::scene::PlantModel;
@@ -19,6 +19,7 @@ use nalgebra::Vector2;
 
 use super::error::WorldError;
 use super::needle::NeedleTrajectory;
+use super::truth::NeedleMoment;
 
 mod account;
 mod attachment;
@@ -31,6 +32,9 @@ pub use reductions::Reductions;
 /// Error of an extrapolated target displacement that is aimed at, over the depth that the scene inserts to: a thousandth of
 /// the noise that the target is seen with.
 pub const EXTRAPOLATION: f64 = 1e-7;
+
+/// Time between two readings of the needle, s.
+const READING_S: f64 = 0.02;
 
 /// Which model is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -73,6 +77,7 @@ pub struct TissuePlant<'m> {
     kind: Kind<'m>,
     at: (f64, Vector2<f64>),
     account: PlantAccount,
+    needle: Vec<NeedleMoment>,
 }
 
 #[derive(Debug)]
@@ -165,7 +170,7 @@ impl<'m> TissuePlant<'m> {
                 Err(error) => return Err(WorldError::Training(error)),
             },
         };
-        Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account })
+        Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account, needle: Vec::new() })
     }
 
     /// The full model of tissue that has a past: at every step it is taken on in time.
@@ -175,7 +180,14 @@ impl<'m> TissuePlant<'m> {
     fn on_course(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, WorldError> {
         let course = Course::at_rest(model, paddle).map_err(WorldError::Needle)?;
         let kind = Kind::Course { course: Box::new(course), since_start_s: 0.0 };
-        Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account: PlantAccount::default() })
+        Ok(Self {
+            model,
+            paddle,
+            kind,
+            at: (0.0, Vector2::zeros()),
+            account: PlantAccount::default(),
+            needle: Vec::new(),
+        })
     }
 
     /// Tissue that has a past, as a scene has it, along one insertion: by the neighbourhood of it, which is learnt unless the full model is
@@ -216,12 +228,18 @@ impl<'m> TissuePlant<'m> {
     pub fn reduced(model: &'m TissueModel, paddle: Option<usize>, trained: &Arc<ReducedModel>) -> Self {
         let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
         let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
-        Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account }
+        Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account, needle: Vec::new() }
     }
 
     /// Largest error of the target displacement so far that the model estimated of itself, length.
     pub fn largest_estimate(&self) -> Option<f64> {
         self.account.largest_estimate
+    }
+
+    /// What the needle has met, where the world has one that slips: at every moment of a full model's way, and of a reduced
+    /// one's once its [`account`](Self::account) has been made.
+    pub fn needle(&self) -> &[NeedleMoment] {
+        &self.needle
     }
 
     /// Solves the full model at every step from now on, where it answers.
@@ -256,7 +274,10 @@ impl<'m> TissuePlant<'m> {
         };
         act(self)?;
         match past {
-            Some(kind) => (self.kind, self.at) = (kind, (0.0, Vector2::zeros())),
+            Some(kind) => {
+                (self.kind, self.at) = (kind, (0.0, Vector2::zeros()));
+                self.needle.clear();
+            }
             None => drop(self.step(0.0, Vector2::zeros())?),
         }
         self.account = account;
@@ -323,9 +344,16 @@ impl<'m> TissuePlant<'m> {
                     .enumerate()
                     .map(|(k, full)| {
                         body.go_to(taken.interval_s * k as f64, taken.paddle[k]);
-                        (body.target_displacement() - full).norm()
+                        (body.target_displacement() - full.target).norm()
                     })
                     .collect();
+                if model.scene().needle.shaft.is_some() {
+                    let moment = |(k, way): (usize, AlongTheWay)| NeedleMoment {
+                        since_start_s: taken.interval_s * k as f64,
+                        reading: way.needle,
+                    };
+                    self.needle = full.into_iter().enumerate().map(moment).collect();
+                }
                 account.extrapolation_error = Some(errors.iter().copied().fold(0.0, f64::max));
                 account.error_at_end = errors.last().copied();
             }
@@ -359,6 +387,10 @@ impl TissueResponse for TissuePlant<'_> {
                     course.take_in(pose, elapsed_s).map_err(WorldError::Needle)?;
                 }
                 *before_s = moment_s;
+                let due = self.needle.last().is_none_or(|last| moment_s >= last.since_start_s + READING_S);
+                if due && since_start_s >= 0.0 && self.model.scene().needle.shaft.is_some() {
+                    self.needle.push(NeedleMoment { since_start_s, reading: course.reading() });
+                }
                 Ok(course.target_displacement())
             }
             Kind::Path(along) => {
