@@ -44,11 +44,6 @@ impl CaseCharts {
         self.0.iter().map(draw).collect()
     }
 
-    /// The charts themselves.
-    pub(super) fn panels(self) -> impl Iterator<Item = Panel> {
-        self.0.into_iter().map(|chart| chart.1)
-    }
-
     /// Where the page's slider finds the horizontal axes that it moves along.
     pub(super) fn spans(&self) -> impl Iterator<Item = (String, [f64; 4])> {
         let along_depth = self.0.iter().filter(|(_, panel)| panel.cursor);
@@ -173,24 +168,33 @@ fn slip_panel(run: &RunResult, name: &str, needle: &NeedleResult) -> Panel {
     panel
 }
 
-/// Error of all strategies, error of the dynamic ones enlarged, paddle displacement; forces and slip of a needle that slips.
-pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> CaseCharts {
+/// Error of all strategies, error of the dynamic ones enlarged, paddle displacement.
+pub(super) fn error_panels(run: &RunResult, case: &CaseResult) -> Vec<(&'static str, Panel)> {
     let mut charts = vec![("error", Panel { cursor: true, ..error_panel(run, case) })];
     if let Some((strategy, result)) = case.strategies.iter().find(|shown| shown.0.has_controller()) {
         charts.push(("enlarged", Panel { cursor: true, ..enlarged_panel(run, case) }));
         charts.push(("paddle", paddle_panel(run, case, strategy.title(), result)));
     }
+    charts
+}
+
+/// Forces on a needle that slips and its shaft: under the controller, without one as it is alone.
+pub(super) fn needle_panels(run: &RunResult, case: &CaseResult) -> Vec<(&'static str, Panel)> {
     let shown = case.strategies.iter().filter_map(|(strategy, result)| Some((strategy, result.needle.as_ref()?)));
-    // The needle under the controller; without one as it is alone.
     let by_controller =
         |(strategy, _): &(Strategy, &NeedleResult)| (strategy.has_controller(), strategy.is_reproducible());
-    if let Some((strategy, needle)) = shown.max_by_key(by_controller) {
-        charts.push(("forces", force_panel(run, strategy.title(), needle)));
-        if needle.shaft.len() > 1 {
-            charts.push(("slip", slip_panel(run, strategy.title(), needle)));
-        }
+    let Some((strategy, needle)) = shown.max_by_key(by_controller) else { return Vec::new() };
+    let mut charts = vec![("forces", force_panel(run, strategy.title(), needle))];
+    if needle.shaft.len() > 1 {
+        charts.push(("slip", slip_panel(run, strategy.title(), needle)));
     }
-    CaseCharts(charts.into_iter().map(|(what, panel)| (format!("case{number}-{what}"), panel)).collect())
+    charts
+}
+
+/// All charts of a case.
+pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> CaseCharts {
+    let charts = error_panels(run, case).into_iter().chain(needle_panels(run, case));
+    CaseCharts(charts.map(|(what, panel)| (format!("case{number}-{what}"), panel)).collect())
 }
 
 /// Every strategy of every case in numbers.

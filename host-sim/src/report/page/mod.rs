@@ -26,7 +26,7 @@ use model_offline::output::chart::number::{in_unit, number, plain};
 use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
 
 use self::embed::{charts, inline, panels};
-use self::insertion::{CaseCharts, case_charts, case_name};
+use self::insertion::{CaseCharts, case_charts, case_name, error_panels, needle_panels};
 use super::paper::{is_paper, paper_optima};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 
@@ -301,8 +301,10 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
         let body = case.strategies.controlled().map(body);
         scene.extend(body.map(|body| sheet("", &[body, surface.colour_bar(run)], 1)));
     }
-    let insertion: Vec<Panel> =
-        run.cases.iter().enumerate().flat_map(|(i, case)| case_charts(run, i, case).panels()).collect();
+    let panels = |of: fn(&RunResult, &CaseResult) -> Vec<(&'static str, Panel)>| -> Vec<Panel> {
+        run.cases.iter().flat_map(|case| of(run, case)).map(|(_, panel)| panel).collect()
+    };
+    let (insertion, needle) = (panels(error_panels), panels(needle_panels));
     let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
     let reduction = reduction(run, |case| case.improvement).map_or_else(
         || "Error along the insertion".to_owned(),
@@ -316,6 +318,9 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
         ("controllability.svg", figure(dynamic_title, placement::controllability_charts(run), 2)),
         ("error-along-insertion.svg", figure(reduction, insertion, columns)),
     ];
+    if !needle.is_empty() {
+        pictures.push(("needle-forces.svg", figure("Forces on the needle and slip along it".to_owned(), needle, 2)));
+    }
     let mut timing = timing::charts(run);
     timing.truncate(3);
     if !timing.is_empty() {

@@ -10,6 +10,7 @@ use crate::runtime::time::durations::{Distribution, LoopTiming};
 use crate::runtime::time::mode::RunMode;
 use firmware::{Discard, Faults};
 use model_offline::discretization::Integration;
+use model_offline::needle::StationState;
 use model_offline::scene::TissueVariant;
 use model_offline::solver::equilibrium::FailureReason;
 
@@ -56,9 +57,27 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         series: series.to_vec(),
         deformed_nodes: nodes.clone(),
         frames: vec![BodyFrame { depth: 0.05, nodes: rest() }, BodyFrame { depth: 0.1, nodes }],
-        needle: None,
+        needle: controlled.then(needle),
         plant_step_us: 1.0,
         plant: crate::world::tissue::PlantAccount::default(),
+    }
+}
+
+fn needle() -> NeedleResult {
+    let point = |time_s: f64| NeedlePoint {
+        time_s,
+        depth: 0.02 * time_s,
+        base_force: 3.0 * time_s,
+        tip_force: 2.0 * time_s,
+        friction: time_s,
+        cut_length: (time_s > 1.0).then_some(0.01 * time_s),
+        largest_slip: 0.01 * time_s,
+    };
+    let station = |arc_length: f64| StationState { arc_length, slip: 0.1 - arc_length, friction: 1.0, normal: 0.5 };
+    NeedleResult {
+        points: [0.0, 2.5, 5.0].map(point).to_vec(),
+        shaft_depth: 0.1,
+        shaft: [0.0, 0.1].map(station).to_vec(),
     }
 }
 
@@ -325,8 +344,14 @@ fn empty_geometry() -> Geometry {
 fn pictures_are_files_of_their_own() {
     let pictures = pictures(&run(EVIL));
     let names: Vec<_> = pictures.iter().map(|picture| picture.0).collect();
-    let expected =
-        ["scene.svg", "static-error.svg", "controllability.svg", "error-along-insertion.svg", "timing-histogram.svg"];
+    let expected = [
+        "scene.svg",
+        "static-error.svg",
+        "controllability.svg",
+        "error-along-insertion.svg",
+        "needle-forces.svg",
+        "timing-histogram.svg",
+    ];
     assert_eq!(names, expected);
     for (name, svg) in pictures {
         let document = roxmltree::Document::parse(&svg).unwrap_or_else(|error| panic!("{name}: {error}"));
