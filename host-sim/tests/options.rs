@@ -55,7 +55,7 @@ const HOST_SIM: [(&str, &str); 17] = [
     ("man", "OUT/man"),
     ("report", "IN/report"),
 ];
-const MODEL_OFFLINE: [(&str, &str); 13] = [
+const MODEL_OFFLINE: [(&str, &str); 14] = [
     ("place", "paper --quiet --json OUT/a.json"),
     ("solve", "paper --paddle 3 --depth 0.01 --json OUT/a.json"),
     ("table", "paper --paddle 3 -o OUT/a.table"),
@@ -68,6 +68,7 @@ const MODEL_OFFLINE: [(&str, &str); 13] = [
     ("new", "-o OUT/a.toml"),
     ("completions", "bash"),
     ("man", "OUT/man"),
+    ("materials", "--json OUT/a.json"),
     ("schema", ""),
 ];
 

@@ -3,8 +3,9 @@
 use assert_cmd::Command;
 use model_offline::model::TissueModel;
 use model_offline::placement::{PlacementOptions, place};
-use model_offline::scene::{BUNDLED, Scene};
+use model_offline::scene::{BUNDLED, Effect, Scene};
 use std::path::Path;
+use strum::VariantArray as _;
 
 fn model_offline() -> Command {
     Command::new(env!("CARGO_BIN_EXE_model-offline"))
@@ -163,5 +164,63 @@ fn scenes_say_what_sees_the_target() {
         let refused = with(unit, section).unwrap_err();
         let text = format!("{refused:?} {refused}");
         assert!(text.contains(said), "{section}: {text}");
+    }
+}
+
+/// All numbers of a value, in its order.
+fn numbers(value: &serde_json::Value) -> Vec<f64> {
+    match value {
+        serde_json::Value::Number(number) => number.as_f64().into_iter().collect(),
+        serde_json::Value::Array(values) => values.iter().flat_map(numbers).collect(),
+        serde_json::Value::Object(values) => values.values().flat_map(numbers).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// The scenes that have everything are those without it, with every effect of the order that the literature reports.
+#[test]
+fn the_worlds_are_the_scenes_with_every_effect() {
+    for name in ["breast", "prostate"] {
+        let plain = Scene::bundled(name).unwrap();
+        let world = Scene::bundled(&format!("{name}-world")).unwrap();
+        let expected = Effect::VARIANTS.iter().fold(plain.clone(), |scene, effect| scene.with_effect(*effect));
+        // All that is no effect.
+        assert_eq!(world.without_a_past().hash(), plain.hash(), "{name}");
+        assert_eq!((world.sensor, world.effects()), (plain.sensor, expected.effects()));
+        assert_eq!((&world.length_unit, &world.stress_unit), (&plain.length_unit, &plain.stress_unit));
+        // All that is one.
+        assert_eq!(world.material, expected.material);
+        for (own, other) in world.inclusions.iter().zip(&expected.inclusions) {
+            assert_eq!((&own.material, own.resistance), (&other.material, other.resistance));
+        }
+        assert_eq!(world.needle.deflection, expected.needle.deflection);
+        for (own, other) in [
+            (
+                serde_json::json!([world.needle.shaft, world.needle.speed]),
+                serde_json::json!([expected.needle.shaft, expected.needle.speed]),
+            ),
+            (serde_json::json!(world.motion), serde_json::json!(expected.motion)),
+        ] {
+            let (own, other) = (numbers(&own), numbers(&other));
+            assert_eq!(own.len(), other.len(), "{name}");
+            // Rounding of the last digit, and of nothing else: directions and the middle of the contact are computed.
+            assert!(
+                own.iter().zip(&other).all(|(a, b)| (a - b).abs() <= 1e-13 * b.abs().max(1.0)),
+                "{name}: {own:?} {other:?}"
+            );
+        }
+    }
+}
+
+/// Placement knows a needle whose contact moves with it only: it says so, and leaves nothing behind.
+#[test]
+fn placement_refuses_the_worlds() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("place.json");
+    for name in ["breast-world", "prostate-world"] {
+        let refused = model_offline().args(["place", name, "--json"]).arg(&json).assert().code(2);
+        let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(said.contains("slip"), "{said}");
+        assert!(!json.exists());
     }
 }

@@ -13,7 +13,8 @@ use std::path::PathBuf;
 /// A scene file, with or without its inclusions.
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
-    /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, prostate, tethered).
+    /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, breast-world, prostate, prostate-world,
+    /// tethered).
     pub(super) scene: PathBuf,
     /// Leave the inclusions out: homogeneous tissue.
     #[arg(long)]

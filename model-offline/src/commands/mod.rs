@@ -8,6 +8,7 @@ mod fit;
 mod inspect;
 mod json;
 mod man;
+mod materials;
 mod new;
 mod pareto;
 mod place;
@@ -76,6 +77,9 @@ enum Command {
     /// Writes manual pages, one for every command.
     #[command(after_help = "Example:\n  model-offline man man1 && man ./man1/model-offline.1")]
     Man(man::ManArgs),
+    /// Materials that scenes can name (`[material] preset = ...`): law, moduli, source, and what of each is a judgement.
+    #[command(after_help = "Example:\n  model-offline materials --json materials.json")]
+    Materials(materials::MaterialsArgs),
     /// JSON Schema of the scene file.
     #[command(after_help = "Example:\n  model-offline schema > scene.schema.json")]
     Schema,
@@ -99,6 +103,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
         Command::New(args) => new::run(&args),
         Command::Completions(args) => completions::run(&args, &mut Cli::command()),
         Command::Man(args) => man::run(&args, Cli::command()),
+        Command::Materials(args) => materials::run(&args),
         Command::Schema => schema::run(),
     }
 }

@@ -1,6 +1,7 @@
 //! What the catalogue of laws knows about each besides its response.
 
 use super::error::MaterialError;
+use super::lame::LameParameters;
 use super::section::MaterialSection;
 
 /// A law that scene files can name.
@@ -36,16 +37,4 @@ pub(super) trait Catalogued: Sized {
     fn with_poisson_ratio(&self, _: f64) -> Option<Result<Self, MaterialError>> {
         None
     }
-}
-
-/// λ and μ of an isotropic law at small strain, stress units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct LameParameters {
-    pub(super) lambda: f64,
-    pub(super) mu: f64,
-}
-
-/// λ = 2μν/(1 − 2ν).
-pub(super) fn lambda(mu: f64, poisson: f64) -> f64 {
-    2.0 * mu * poisson / (1.0 - 2.0 * poisson)
 }

@@ -1,5 +1,7 @@
 //! Why numbers do not make a law.
 
+use super::stress::UnknownStress;
+
 /// Why moduli do not make a law.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MaterialError {
@@ -12,6 +14,12 @@ pub enum MaterialError {
     /// A modulus is negative where none may be.
     #[error("{0} must not be negative")]
     Negative(&'static str),
+    /// Neither a law nor a preset is named.
+    #[error("neither model nor preset is given")]
+    NoLaw,
+    /// A preset where the unit of stress is not known.
+    #[error(transparent)]
+    UnknownStress(UnknownStress),
     /// A modulus that the law needs is not given.
     #[error("{0} is missing")]
     Missing(&'static str),
@@ -39,6 +47,12 @@ impl MaterialError {
     /// What to do about it.
     pub fn help(&self) -> &'static str {
         match self {
+            Self::NoLaw => {
+                "give preset = \"liver\" or another (`model-offline materials` lists them), or a model with its moduli"
+            }
+            Self::UnknownStress(_) => {
+                "name the unit of stress in [scene] units, or write out the numbers (`model-offline materials --json` has them)"
+            }
             Self::Missing(_) => "give every modulus of the law",
             Self::Meaningless(_) => "remove it, or choose another model",
             Self::NotPositive(_) | Self::Fluid(_) | Self::Unpaired(..) => {

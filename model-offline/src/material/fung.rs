@@ -1,8 +1,9 @@
 //! Fung's exponential law in isotropic form.
 
-use super::catalogue::{Catalogued, LameParameters, lambda};
+use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite, not_negative};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, zero4};
+use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::{MaterialSection, required, unused};
 use serde::Serialize;

@@ -1,8 +1,9 @@
 //! Fung's exponential law with general tensors, in the plane.
 
-use super::catalogue::{Catalogued, LameParameters};
+use super::catalogue::Catalogued;
 use super::error::{MaterialError, not_negative};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, push_forward, zero4};
+use super::lame::LameParameters;
 use super::material::{Material, Response, is_negative_somewhere, stable_at_rest};
 use super::section::{MaterialSection, TensorEntry, unused};
 use serde::Serialize;

@@ -1,11 +1,12 @@
 //! The catalogue of laws, and a law of it with an optional volumetric barrier.
 
 use super::barrier::Barrier;
-use super::catalogue::{Catalogued as _, LameParameters};
+use super::catalogue::Catalogued as _;
 use super::error::MaterialError;
 use super::fung::Fung;
 use super::fung_general::FungTensors;
 use super::kinematics::{Matrix, Tensor4};
+use super::lame::LameParameters;
 use super::linear::Linear;
 use super::material::{Material, Response};
 use super::neo_hookean::NeoHookean;
@@ -19,8 +20,9 @@ use serde::{Deserialize, Serialize};
 macro_rules! registry {
     ($($(#[$doc:meta])* $model:ident: $($law:ident($type:ty)),+;)+) => {
         /// Material models.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema, strum::Display)]
         #[serde(rename_all = "kebab-case")]
+        #[strum(serialize_all = "kebab-case")]
         pub enum MaterialModel {
             $($(#[$doc])* $model,)+
         }
@@ -32,7 +34,7 @@ macro_rules! registry {
 
         impl Form {
             fn read(section: &MaterialSection) -> Result<Self, MaterialError> {
-                match section.model {
+                match section.model.ok_or(MaterialError::NoLaw)? {
                     $(MaterialModel::$model => {
                         $(if <$type>::reads(section) {
                             return Ok(Self::$law(<$type>::read(section)?));
@@ -117,11 +119,8 @@ impl<const D: usize> Material<D> for Law {
 }
 
 impl Law {
-    /// The law that a section of a scene file describes.
-    ///
-    /// # Errors
-    /// Moduli that are missing, meaningless, or make no law that is stable at rest.
-    pub fn read(section: &MaterialSection) -> Result<Self, MaterialError> {
+    /// The law that a section without a preset describes.
+    pub(super) fn read(section: &MaterialSection) -> Result<Self, MaterialError> {
         let mut law = Self::plain(Form::read(section)?);
         if let Some(beta) = section.barrier {
             law = law.with_barrier(beta)?;

@@ -1,8 +1,9 @@
 //! Linear elasticity.
 
-use super::catalogue::{Catalogued, LameParameters, lambda};
+use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite};
 use super::kinematics::{Matrix, Tensor4, indices, zero4};
+use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::MaterialSection;
 use serde::Serialize;

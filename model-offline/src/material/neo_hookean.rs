@@ -1,8 +1,9 @@
 //! Compressible neo-Hookean law with an isochoric-volumetric split.
 
-use super::catalogue::{Catalogued, LameParameters, lambda};
+use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite};
 use super::kinematics::{Matrix, Tensor4, determinant, dilation, indices, inverse_transpose, zero4};
+use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::MaterialSection;
 use serde::Serialize;

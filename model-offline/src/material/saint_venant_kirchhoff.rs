@@ -1,8 +1,9 @@
 //! St. Venant–Kirchhoff: linear in the Green–Lagrange strain.
 
-use super::catalogue::{Catalogued, LameParameters, lambda};
+use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite};
 use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, zero4};
+use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::MaterialSection;
 use serde::Serialize;

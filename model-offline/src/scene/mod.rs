@@ -29,11 +29,13 @@ use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// The bundled scenes: name and text.
-pub const BUNDLED: [(&str, &str); 5] = [
+pub const BUNDLED: [(&str, &str); 7] = [
     ("paper", include_str!("../../scenes/paper.toml")),
     ("paper-hull", include_str!("../../scenes/paper-hull.toml")),
     ("breast", include_str!("../../scenes/breast.toml")),
+    ("breast-world", include_str!("../../scenes/breast-world.toml")),
     ("prostate", include_str!("../../scenes/prostate.toml")),
+    ("prostate-world", include_str!("../../scenes/prostate-world.toml")),
     ("tethered", include_str!("../../scenes/tethered.toml")),
 ];
 

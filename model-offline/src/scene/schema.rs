@@ -96,12 +96,12 @@ pub struct SceneSection {
     pub name: String,
     /// 2 = plane strain; 3 = solid (not available from a scene file yet).
     pub dimension: Located<u32>,
-    /// Labels for reports; nothing is converted.
+    /// Labels for reports; presets of sensors and materials are converted to them, no other number is.
     #[serde(default)]
     pub units: UnitsSection,
 }
 
-/// Unit labels, for reports only.
+/// Unit labels: what presets are converted to; no other number is.
 #[derive(Debug, Clone, Deserialize, Serialize, JsonSchema, PartialEq)]
 #[serde(deny_unknown_fields)]
 pub struct UnitsSection {

@@ -103,8 +103,8 @@ impl Layout {
         let mut out = String::new();
         let _ = write!(
             out,
-            "# A scene for model-offline and host-sim. All numbers are in consistent units of your choice; the labels are\n\
-             # only for reports. `model-offline schema` describes every key.\n\
+            "# A scene for model-offline and host-sim. All numbers are in consistent units of your choice; presets\n\
+             # of materials and sensors go by the labels. `model-offline schema` describes every key.\n\
              #   model-offline place FILE                  which paddle position is best\n\
              #   host-sim run --scene FILE                 simulate the insertion and write a report\n\n\
              [scene]\nname = {name:?}\ndimension = 2                       # plane strain\n\
@@ -112,7 +112,9 @@ impl Layout {
              [domain]                            # the body: a simple polygon\noutline = {}\n\n\
              [material]                          # Young's modulus 2.8, Poisson's ratio 0.4: soft tissue if stress is in kPa\n\
              model = \"neo-hookean\"               # fung | neo-hookean | saint-venant-kirchhoff | linear\n\
-             lambda = 4.0                        # E ν / ((1 + ν)(1 − 2ν))\nmu = 1.0                            # E / (2 (1 + ν))\n",
+             lambda = 4.0                        # E ν / ((1 + ν)(1 − 2ν))\nmu = 1.0                            # E / (2 (1 + ν))\n\
+             # In place of these three, where the unit of stress is known: preset = \"breast-fat\", or another of the literature;\n\
+             # `model-offline materials` lists them.\n",
             polygon(&imported.outline)
         );
         for inclusion in &imported.inclusions {

@@ -330,7 +330,8 @@ impl Validator<'_> {
     }
 
     fn material(&self, located: &Located<MaterialSection>) -> Checked<Law> {
-        Law::read(located.get()).map_err(|error| self.error(located.span(), format!("material: {error}"), error.help()))
+        let law = located.get().law(&self.file.scene.units.stress);
+        law.map_err(|error| self.error(located.span(), format!("material: {error}"), error.help()))
     }
 
     fn actuator(&self, needle: &Needle) -> Checked<Actuator> {
