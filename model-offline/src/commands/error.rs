@@ -7,6 +7,7 @@ use model_offline::output::{OutputError, OutputRefused};
 use model_offline::scene::{LimitError, Scene, SceneError};
 use model_offline::solver::equilibrium::Failure;
 use model_offline::study::effects::EffectsError;
+use model_offline::study::fit::FitError;
 use model_offline::table::TableBuildError;
 use std::path::{Path, PathBuf};
 
@@ -58,6 +59,13 @@ pub(crate) enum CliError {
     #[error(transparent)]
     #[diagnostic(help("insert less deep or in more increments, or with less cutting force and friction"))]
     Needle(#[from] NeedleError),
+    /// The model of everything that a scene has cannot be followed.
+    #[error(transparent)]
+    #[diagnostic(help(
+        "insert less deep, or with less cutting force and friction; give [discretization] spacing in place of a tolerance; \
+         where the law loses stability, add a barrier to the material"
+    ))]
+    World(FitError),
     /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -77,6 +85,21 @@ impl From<EffectsError> for CliError {
         match error {
             EffectsError::Model(error) => Self::Model(error),
             EffectsError::Needle(error) => Self::Needle(error),
+        }
+    }
+}
+
+impl From<FitError> for CliError {
+    fn from(error: FitError) -> Self {
+        match error {
+            FitError::Model(error) => Self::Model(error),
+            FitError::Table(error) => error.into(),
+            // What is no fault of the tissue has an answer of its own.
+            FitError::World { source: EffectsError::Model(error), .. } if error.is_usage() => Self::Model(error),
+            FitError::World { source: EffectsError::Needle(NeedleError::HeldWeakly), .. } => {
+                Self::Needle(NeedleError::HeldWeakly)
+            }
+            world @ FitError::World { .. } => Self::World(world),
         }
     }
 }
@@ -109,6 +132,7 @@ impl CliError {
             Self::Model(error) => error.kind().to_string(),
             Self::Needle(NeedleError::Equilibrium { source, .. }) => source.reason.to_string(),
             Self::Needle(_) => "no-shaft-forces".into(),
+            Self::World(_) => "no-insertion".into(),
             Self::Table(_) => "no-table".into(),
             Self::Output(_) => "not-written".into(),
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => "bad-input".into(),

@@ -58,8 +58,11 @@ enum Command {
     /// What the mesh does to the choice of a paddle: both rankings along a refinement, sweep.csv and sweep.svg.
     #[command(after_help = "Example:\n  model-offline sweep paper --without-inclusion --out charts")]
     Sweep(sweep::SweepArgs),
-    /// The smallest model that keeps a tolerance, chosen from the cheapest up; what was rejected, and by which number.
-    #[command(after_help = "Example:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json")]
+    /// The smallest model that keeps a tolerance, chosen from the cheapest up, and the fewest of the scene's effects (shaft,
+    /// creep, breathing); what was rejected, and by which number.
+    #[command(
+        after_help = "Examples:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json\n  model-offline fit breast-world --tolerance 0.02 -o fitted.toml"
+    )]
     Fit(fit::FitArgs),
     /// Which effects a scene needs: what a needle that slips, tissue that creeps and a patient that breathes add.
     #[command(after_help = "Example:\n  model-offline compare breast --svg effects.svg")]

@@ -162,6 +162,16 @@ impl Resolution {
         }
     }
 
+    /// Twice the error, or so.
+    #[must_use]
+    pub fn coarser(self) -> Self {
+        match self {
+            Self::Spacing(h) => Self::Spacing(2.0 * h),
+            Self::Tolerance(t) => Self::Tolerance(2.0 * t),
+            Self::Level(level) => Self::Level(level - 1),
+        }
+    }
+
     /// Whether nodes gather where the solution is singular.
     pub fn is_graded(self) -> bool {
         !matches!(self, Self::Spacing(_))

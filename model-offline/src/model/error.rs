@@ -78,7 +78,7 @@ pub enum ModelError {
     /// What is asked for is not known of a needle that slips.
     #[error(
         "this needle slips (mechanics = \"shaft\"), and placements, studies and reduced models are of a contact that moves with \
-         the needle: use mechanics = \"patch\"; `solve`, `table`, `compare` and `host-sim run` take the needle as it is"
+         the needle: use mechanics = \"patch\"; `solve`, `table`, `fit`, `compare` and `host-sim run` take it as it is"
     )]
     NeedleSlips,
     /// A law that was changed on the way is none.

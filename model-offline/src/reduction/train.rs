@@ -54,7 +54,7 @@ const USUAL_TOLERANCE: f64 = 0.01;
 impl TrainingOptions {
     /// To the accuracy that the scene itself asks for: what its fit has left to the plant, else that of its nodes.
     pub fn of(scene: &Scene) -> Self {
-        let fitted = scene.fit.and_then(|fit| fit.plant_tolerance);
+        let fitted = scene.fit.as_ref().and_then(|fit| fit.plant_tolerance);
         let tolerance = fitted.unwrap_or(match scene.discretization.resolution {
             Resolution::Tolerance(tolerance) => tolerance,
             Resolution::Spacing(_) | Resolution::Level(_) => USUAL_TOLERANCE,

@@ -3,6 +3,7 @@
 use super::{Breathing, Resistance, Scene, Shaft};
 use crate::choice::choice;
 use crate::material::{Law, Material, Relaxation};
+use strum::VariantArray as _;
 
 choice! {
     /// An effect that a scene can be given, with numbers of the order that the literature reports where it has none of its own.
@@ -66,27 +67,47 @@ impl Scene {
     /// The simplest model of the scene with these effects alone: with the scene's own numbers where it has them.
     #[must_use]
     pub fn with_only(&self, effects: &[Effect]) -> Self {
-        let mut scene = self.without_a_past();
-        for effect in effects {
+        effects.iter().fold(self.without_a_past(), |scene, effect| {
             let is_own = *effect == Effect::Creep && self.relaxes();
-            let with = if is_own { self.clone() } else { self.with_effect(*effect) };
-            match effect {
-                Effect::Shaft => {
-                    (scene.needle.shaft, scene.needle.deflection) = (with.needle.shaft, with.needle.deflection);
-                    for (own, with) in scene.inclusions.iter_mut().zip(&with.inclusions) {
-                        own.resistance = with.resistance;
-                    }
+            if is_own { scene.taking(*effect, self) } else { scene.taking(*effect, &self.with_effect(*effect)) }
+        })
+    }
+
+    /// The effects that the scene itself has. A needle that bends counts as a shaft, everything that moves the patient as
+    /// breathing.
+    pub fn own_effects(&self) -> Vec<Effect> {
+        let has = |effect: &Effect| match effect {
+            Effect::Shaft => self.needle.shaft.is_some() || self.needle.deflection != 0.0,
+            Effect::Creep => self.relaxes(),
+            Effect::Breathing => !self.motion.is_none(),
+        };
+        Effect::VARIANTS.iter().copied().filter(has).collect()
+    }
+
+    /// The scene without its effects but these: none is added that it does not have.
+    #[must_use]
+    pub fn keeping_only(&self, effects: &[Effect]) -> Self {
+        effects.iter().fold(self.without_a_past(), |scene, effect| scene.taking(*effect, self))
+    }
+
+    /// The same scene with an effect as another one of the same tissue has it.
+    fn taking(mut self, effect: Effect, from: &Self) -> Self {
+        match effect {
+            Effect::Shaft => {
+                (self.needle.shaft, self.needle.deflection) = (from.needle.shaft, from.needle.deflection);
+                for (own, from) in self.inclusions.iter_mut().zip(&from.inclusions) {
+                    own.resistance = from.resistance;
                 }
-                Effect::Creep => {
-                    scene.material = with.material;
-                    for (own, with) in scene.inclusions.iter_mut().zip(with.inclusions) {
-                        own.material = with.material;
-                    }
-                }
-                Effect::Breathing => scene.motion = with.motion,
             }
+            Effect::Creep => {
+                self.material = from.material.clone();
+                for (own, from) in self.inclusions.iter_mut().zip(&from.inclusions) {
+                    own.material = from.material.clone();
+                }
+            }
+            Effect::Breathing => self.motion = from.motion.clone(),
         }
-        scene
+        self
     }
 
     /// Has the needle go at this speed, length per second.

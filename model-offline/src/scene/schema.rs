@@ -1,6 +1,7 @@
 //! The scene file as it is written: the public contract, field for field. Validation turns it into a
 //! [`Scene`](super::Scene).
 
+use super::effect::Effect;
 use super::sensor::SensorPreset;
 use super::shaft::Mechanics;
 use crate::choice::choice;
@@ -85,7 +86,7 @@ pub struct SceneFile {
     /// How fine and by which method the tissue is modelled.
     pub discretization: Located<DiscretizationSection>,
     /// What else a fit to a tolerance has chosen.
-    pub fit: Option<FitSection>,
+    pub fit: Option<Located<FitSection>>,
 }
 
 /// Name, dimension and unit labels.
@@ -363,7 +364,7 @@ impl TableScalar {
 }
 
 /// What a fit to a tolerance has chosen besides the discretization.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitSection {
     /// What the simulator solves.
@@ -376,6 +377,10 @@ pub struct FitSection {
     pub table_knots: u32,
     /// Number type that the controller needs.
     pub table_scalar: TableScalar,
+    /// Those of the scene's effects that a model of it needs at the tolerance; none where the scene has none. Simulations
+    /// take all that the scene has, whatever stands here.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effects: Option<Vec<Effect>>,
 }
 
 fn relative_error<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<f64>, D::Error> {

@@ -102,7 +102,8 @@ pub struct Effects {
 }
 
 /// One insertion, as far as it is compared.
-struct Followed {
+#[derive(Debug, Clone)]
+pub(super) struct Followed {
     targets: Vec<Vector2<f64>>,
     base_force: f64,
     jacobian: Matrix2<f64>,
@@ -156,7 +157,8 @@ pub fn compare(scene: &Scene, tolerance: f64, threads: usize) -> Result<Effects,
     })
 }
 
-fn with_linear_laws(scene: &Scene) -> Scene {
+/// The scene with the small-strain limit of every law that has one.
+pub(super) fn with_linear_laws(scene: &Scene) -> Scene {
     let mut linear = Scene { material: scene.material.linearised(), ..scene.clone() };
     for law in linear.inclusions.iter_mut().filter_map(|inclusion| inclusion.material.as_mut()) {
         *law = law.linearised();
@@ -164,12 +166,14 @@ fn with_linear_laws(scene: &Scene) -> Scene {
     linear
 }
 
-fn followed(scene: &Scene, paddle: u32) -> Result<Followed, EffectsError> {
+/// The same of a scene that is discretised as it says.
+pub(super) fn followed(scene: &Scene, paddle: u32) -> Result<Followed, EffectsError> {
     let (model, _) = discretise(scene)?;
     follow(&model, paddle)
 }
 
-fn follow(model: &TissueModel, paddle: u32) -> Result<Followed, EffectsError> {
+/// The insertion of the model's scene, this paddle attached and held where it rests.
+pub(super) fn follow(model: &TissueModel, paddle: u32) -> Result<Followed, EffectsError> {
     let scene = model.scene();
     let position = scene.paddle_position(paddle).map_err(ModelError::from)?;
     let mut course = Course::at_rest(model, Some(position))?;
@@ -184,11 +188,13 @@ fn follow(model: &TissueModel, paddle: u32) -> Result<Followed, EffectsError> {
 }
 
 impl Followed {
-    fn largest(&self) -> f64 {
+    /// Largest target displacement on the way, length.
+    pub(super) fn largest(&self) -> f64 {
         self.targets.iter().map(Vector2::norm).fold(0.0, f64::max)
     }
 
-    fn over(&self, base: &Self, scene: &Scene) -> Added {
+    /// What this one has that another one, the base, has not.
+    pub(super) fn over(&self, base: &Self, scene: &Scene) -> Added {
         let (axis, normal) = (scene.needle.axis, scene.needle.orthogonal());
         let largest = |along: Vector2<f64>| {
             let changes = self.targets.iter().zip(&base.targets).map(|(own, base)| along.dot(&(own - base)).abs());

@@ -143,7 +143,7 @@ impl<'m> TissuePlant<'m> {
             return Self::on_course(model, paddle);
         }
         let mut account = PlantAccount::default();
-        let wanted = match (choice, model.scene().fit) {
+        let wanted = match (choice, &model.scene().fit) {
             (WantedPlant::Full, _) => PlantModel::Full,
             (WantedPlant::Condensed, _) => PlantModel::Condensed,
             (WantedPlant::Reduced, _) | (WantedPlant::Auto, None) => PlantModel::Reduced,

@@ -74,7 +74,7 @@ impl Validator<'_> {
             .iter()
             .map(|i| self.inclusion(i, &outline, needle.shaft.as_ref()))
             .collect::<Checked<_>>()?;
-        Ok(Scene {
+        let scene = Scene {
             name: file.scene.name.clone(),
             length_unit: file.scene.units.length.clone(),
             stress_unit: file.scene.units.stress.clone(),
@@ -87,10 +87,32 @@ impl Validator<'_> {
             discretization: self.discretization(&file.discretization, &outline)?,
             sensor: self.sensor(needle.depth)?,
             motion: self.motion()?,
-            fit: file.fit,
+            fit: file.fit.as_ref().map(|fit| fit.get().clone()),
             needle,
             outline,
-        })
+        };
+        self.fitted_effects(&scene)?;
+        Ok(scene)
+    }
+
+    /// What a fit says that the scene needs is something that the scene has.
+    fn fitted_effects(&self, scene: &Scene) -> Checked<()> {
+        let Some((section, effects)) = self.file.fit.as_ref().and_then(|fit| Some((fit, fit.get().effects.as_ref()?)))
+        else {
+            return Ok(());
+        };
+        let own = scene.own_effects();
+        for (place, effect) in effects.iter().enumerate() {
+            let message = if effects[..place].contains(effect) {
+                format!("[fit] effects names {effect} twice")
+            } else if !own.contains(effect) {
+                format!("[fit] effects names {effect}, and the scene has no such effect")
+            } else {
+                continue;
+            };
+            return Err(self.error(section.span(), message, "take it out, or fit the scene again: model-offline fit"));
+        }
+        Ok(())
     }
 
     fn error(&self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> SceneError {

@@ -24,7 +24,7 @@ const STATIONS: u32 = 10;
 const TICKS: u32 = 500;
 
 /// The chosen plant's target displacement along the insertion, the best paddle held still, against the full nonlinear model
-/// two levels finer.
+/// two levels finer; that of a world against the one with all effects, one level finer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndToEnd {
     /// Worst error over the largest displacement; none where the finer model cannot be had or goes nowhere.
@@ -41,7 +41,7 @@ pub(super) struct FittedPlant {
     pub plant: PlantModel,
     /// Depth up to which it holds, length units.
     pub depth: f64,
-    /// Time of a step, µs.
+    /// Time of a step, µs; not a number where it was not timed.
     pub step_us: f64,
     /// Paddle that the insertion is followed with, by its place.
     paddle: Option<usize>,

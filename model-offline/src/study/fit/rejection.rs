@@ -1,8 +1,11 @@
 //! What a fit did not choose, and the number that spoke against it.
 
+use super::change::Change;
 use crate::discretization::Discretization;
 use crate::model::ModelError;
 use crate::reduction::train::TrainingError;
+use crate::scene::Effect;
+use crate::study::effects::EffectsError;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
@@ -10,6 +13,8 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Decision {
+    /// Which of its own effects a scene needs.
+    World,
     /// How the tissue is discretized.
     Discretization,
     /// Whether the linear law will do.
@@ -23,10 +28,14 @@ pub enum Decision {
 /// What was considered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Alternative {
+    /// These of the scene's effects alone.
+    Effects(&'static [Effect]),
     /// A discretization.
     Discretization(Discretization),
     /// The law's small-strain limit, and the condensed plant that it allows.
     LinearLaw,
+    /// The law's small-strain limit, with the effects that the scene needs.
+    LinearLawInWorld,
     /// A reduced plant.
     ReducedPlant,
     /// A table of so many depth knots.
@@ -39,8 +48,9 @@ impl Alternative {
     /// What it would have decided.
     pub fn decision(&self) -> Decision {
         match self {
+            Self::Effects(_) => Decision::World,
             Self::Discretization(_) => Decision::Discretization,
-            Self::LinearLaw => Decision::Law,
+            Self::LinearLaw | Self::LinearLawInWorld => Decision::Law,
             Self::ReducedPlant => Decision::Plant,
             Self::Knots(_) | Self::SinglePrecision => Decision::Table,
         }
@@ -51,7 +61,10 @@ impl fmt::Display for Alternative {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Discretization(discretization) => discretization.fmt(f),
+            Self::Effects([]) => f.pad("no effect"),
+            Self::Effects(effects) => f.pad(&format!("{} alone", names(effects))),
             Self::LinearLaw => f.pad("linear law, condensed plant"),
+            Self::LinearLawInWorld => f.pad("linear law"),
             Self::ReducedPlant => f.pad("reduced plant"),
             Self::Knots(count) => f.pad(&format!("{count} knots")),
             Self::SinglePrecision => f.pad("f32"),
@@ -59,9 +72,23 @@ impl fmt::Display for Alternative {
     }
 }
 
+/// Effects by name.
+pub(super) fn names(effects: &[Effect]) -> String {
+    effects.iter().map(|effect| effect.name()).collect::<Vec<_>>().join(", ")
+}
+
 /// Why something was not chosen. Errors are relative.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RejectionReason {
+    /// What is left out counts.
+    #[error("change against the model with all effects: {0}")]
+    LeavesOut(Change),
+    /// The nonlinear part of the law counts.
+    #[error("change against the scene's own law with these effects: {0}")]
+    LinearLawInWorld(Change),
+    /// The insertion cannot be followed with it.
+    #[error("does not work: {0}")]
+    NotFollowed(EffectsError),
     /// Its estimated error is above its share of the tolerance.
     #[error("estimated error")]
     EstimatedError(f64),
@@ -95,13 +122,14 @@ impl RejectionReason {
     /// The number that rejects; none where there is only a failure.
     pub fn number(&self) -> Option<f64> {
         match *self {
+            Self::LeavesOut(change) | Self::LinearLawInWorld(change) => Some(change.worst()),
             Self::EstimatedError(number)
             | Self::NotConfirmed(number)
             | Self::Dearer(number)
             | Self::LinearLaw(number)
             | Self::Interpolation(number)
             | Self::Rounding(number) => Some(number),
-            Self::DoesNotWork(_) | Self::NoFinerModel(_) | Self::NotReduced(_) => None,
+            Self::NotFollowed(_) | Self::DoesNotWork(_) | Self::NoFinerModel(_) | Self::NotReduced(_) => None,
         }
     }
 

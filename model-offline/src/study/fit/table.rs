@@ -4,6 +4,7 @@ use super::LAW_NODES;
 use super::rejection::{Alternative, Rejected, RejectionReason};
 use crate::model::{TissueModel, graded_model};
 use crate::placement::study::best_dynamic;
+use crate::scene::Scene;
 use crate::scene::schema::TableScalar;
 use crate::table::{TableBuildError, TableOptions, build as build_table};
 use firmware::contract::Table;
@@ -17,6 +18,15 @@ pub(super) struct FittedTable {
     pub knots: u32,
     pub scalar: TableScalar,
     pub rejected: Vec<Rejected>,
+}
+
+/// The table that the scene asks for, else the usual one: not fitted.
+pub(super) fn usual(scene: &Scene) -> FittedTable {
+    let (knots, scalar) = scene.fit.as_ref().map_or_else(
+        || (TableOptions::default().knots as u32, TableScalar::default()),
+        |fit| (fit.table_knots, fit.table_scalar),
+    );
+    FittedTable { knots, scalar, rejected: Vec::new() }
 }
 
 /// The fewest knots, and the number type.

@@ -26,7 +26,7 @@ impl Fit {
             section["support"] = toml_edit::value(support);
             section["basis"] = toml_edit::value(self.chosen.basis.name());
         }
-        let FitSection { plant, plant_tolerance, table_knots, table_scalar } = self.section();
+        let FitSection { plant, plant_tolerance, table_knots, table_scalar, effects } = self.section();
         let mut fit = toml_edit::Table::new();
         fit["plant"] = toml_edit::value(plant.to_string());
         if let Some(tolerance) = plant_tolerance {
@@ -34,6 +34,10 @@ impl Fit {
         }
         fit["table_knots"] = toml_edit::value(i64::from(table_knots));
         fit["table_scalar"] = toml_edit::value(table_scalar.to_string());
+        if let Some(effects) = effects {
+            let names: toml_edit::Array = effects.iter().map(|effect| effect.name()).collect();
+            fit["effects"] = toml_edit::value(names);
+        }
         document["fit"] = toml_edit::Item::Table(fit);
         Ok(document.to_string())
     }
@@ -45,6 +49,7 @@ impl Fit {
             plant_tolerance: Some(self.chosen.plant_tolerance),
             table_knots: self.chosen.table_knots,
             table_scalar: self.chosen.table_scalar,
+            effects: self.world.as_ref().map(|world| world.needed.clone()),
         }
     }
 
@@ -52,32 +57,42 @@ impl Fit {
     pub fn summary(&self) -> String {
         use std::fmt::Write as _;
         let c = &self.chosen;
+        // Their plant is learnt by a simulation: there is no step to time.
+        let in_time = self.world.as_ref().filter(|world| !world.needed.is_empty());
+        let plant =
+            in_time.map_or_else(|| format!("{} plant", c.plant), |_| "plant along the path of an insertion,".into());
+        let step = in_time.map_or_else(
+            || format!("one step of the plant in {:.2} µs", self.step_us),
+            |_| "the plant is learnt by a simulation and was not timed".into(),
+        );
         let nodes = match c.level {
             Some(level) => format!("graded nodes, level {level}"),
             None => format!("nodes {:.4} apart", c.spacing),
         };
         let support = c.support.map_or(String::new(), |s| format!(", {} basis, support {s}", c.basis));
         let mut out = format!(
-            "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {} plant to depth {:.4}; {} table knots, {}\n\
+            "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {plant} to depth {:.4}; {} table knots, {}\n\
              estimated error {:.3} %, distance from the next finer model {:.3} %\n\
-             all Jacobians in {:.2} ms, one step of the plant in {:.2} µs (fitted in {:.1} s)\n",
+             all Jacobians in {:.2} ms, {step} (fitted in {:.1} s)\n",
             self.scene,
             self.tissue,
             self.tolerance,
             c.integration,
             c.nodes,
             c.law,
-            c.plant,
             c.plant_depth,
             c.table_knots,
             c.table_scalar,
             100.0 * self.error_estimate,
             100.0 * self.verified_error,
             1e3 * self.wall_s,
-            self.step_us,
             self.fit_wall_s,
         );
+        if let Some(world) = &self.world {
+            out.push_str(&world.summary(self.tolerance));
+        }
         let _ = match self.end_to_end {
+            _ if in_time.is_some() => writeln!(out),
             EndToEnd { error: Some(error), depth, nodes } => {
                 let beyond = if error > self.tolerance { ": ABOVE the tolerance" } else { "" };
                 writeln!(
