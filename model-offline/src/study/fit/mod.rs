@@ -241,7 +241,8 @@ impl Parts<'_> {
             true => table::usual(self.scene),
         };
         let depth = self.scene.needle.depth;
-        let apart = world.end_to_end.change.map(|change| change.target);
+        let on_chosen_nodes = world.end_to_end.change.filter(|_| !world.end_to_end.is_coarser);
+        let apart = on_chosen_nodes.map(|change| change.target);
         let reached = if apart.is_some() { depth } else { 0.0 };
         Ok(Rest {
             law,

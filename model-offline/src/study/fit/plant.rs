@@ -24,7 +24,7 @@ const STATIONS: u32 = 10;
 const TICKS: u32 = 500;
 
 /// The chosen plant's target displacement along the insertion, the best paddle held still, against the full nonlinear model
-/// two levels finer; that of a world against the one with all effects, one level finer.
+/// two levels finer; that of a world against the one with all effects, one level finer, where the chosen nodes can be followed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EndToEnd {
     /// Worst error over the largest displacement; none where the finer model cannot be had or goes nowhere.

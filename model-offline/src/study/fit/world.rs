@@ -57,8 +57,10 @@ pub struct World {
 pub struct WorldEndToEnd {
     /// How far the two are apart; none where one of them fails.
     pub change: Option<Change>,
-    /// Nodes of the two. Where the finer one would be too large to be followed, both are coarser than what was chosen.
+    /// Nodes of the two.
     pub nodes: [usize; 2],
+    /// Whether both are coarser than what was chosen, because the finer one would be too large to be followed.
+    pub is_coarser: bool,
     /// Why there is no number.
     pub failure: Option<String>,
 }
@@ -184,6 +186,8 @@ impl JudgedWorld {
         let kept = if law == Linearity::Linear { with_linear_laws(&kept) } else { kept };
         let models = pair(&kept, &self.on, chosen);
         let nodes = models.as_ref().map_or([0; 2], |models| [models[0].nodes(), models[1].nodes()]);
+        let is_coarser =
+            models.as_ref().is_ok_and(|models| models[0].scene().discretization.resolution != chosen.resolution);
         let found = models.map_err(EffectsError::from).and_then(|models| {
             let followed = parallel::map(2, threads, |k| follow(&models[k], self.paddle));
             followed.into_iter().collect::<Result<Vec<Followed>, EffectsError>>()
@@ -201,6 +205,7 @@ impl JudgedWorld {
             end_to_end: WorldEndToEnd {
                 change: apart.as_ref().ok().copied(),
                 nodes,
+                is_coarser,
                 failure: apart.err().map(|error| error.to_string()),
             },
         }
@@ -230,7 +235,11 @@ impl World {
         let [chosen, finer] = self.end_to_end.nodes;
         let _ = match (&self.end_to_end.change, &self.end_to_end.failure) {
             (Some(change), _) => {
-                let beyond = if change.worst() <= tolerance { "" } else { ": ABOVE the tolerance" };
+                let beyond = match self.end_to_end.is_coarser {
+                    true => " (coarser than the chosen ones, which take too long to follow)",
+                    false if change.worst() <= tolerance => "",
+                    false => ": ABOVE the tolerance",
+                };
                 writeln!(out, "{chosen} nodes with these effects against {finer} with all: {change}{beyond}")
             }
             (None, failure) => {
