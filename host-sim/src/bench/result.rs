@@ -7,6 +7,7 @@ use model_offline::discretization::Integration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::causes::CausesResult;
 use super::strategy::Strategy;
 use super::study_failure::StudyFailure;
 use super::table_tissue::TableTissue;
@@ -248,6 +249,9 @@ pub struct CaseResult {
     /// Largest error without a paddle over that of `dynamic`; results of older versions have none.
     #[serde(default)]
     pub improvement_over_none: Option<f64>,
+    /// What the error of `dynamic` is made of, where that was asked for.
+    #[serde(default)]
+    pub causes: Option<CausesResult>,
 }
 
 /// A controller table in short.

@@ -62,6 +62,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     for case in &run.cases {
         write_case(text, case, digits)?;
     }
+    write_causes(text, run, digits)?;
     write_plant(text, run)?;
     write_loop(text, run)?;
     writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
@@ -131,6 +132,23 @@ fn write_case(text: &mut String, case: &CaseResult, digits: usize) -> std::fmt::
         }
         _ => writeln!(text),
     }
+}
+
+/// What the controller's error is made of, where that was asked for.
+fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::Result {
+    for case in &run.cases {
+        let Some(causes) = &case.causes else { continue };
+        let left = causes.without.iter().map(|w| format!("{:.digits$} without the {}", w.left.peak, w.cause.title()));
+        let left: Vec<String> = left.collect();
+        writeln!(
+            text,
+            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it",
+            case.tissue,
+            left.join(", "),
+            causes.without_all.peak
+        )?;
+    }
+    Ok(())
 }
 
 /// An error over another one, of which it is this many times smaller; a digit more where that is few.
