@@ -297,3 +297,39 @@ fn a_needle_waits_at_breathing_skin() {
         assert!(inside > 0.0, "{name}");
     }
 }
+
+/// A body that a breath carries along the needle, towards it and away from it: the skin is met, gives way or is open, and the
+/// needle comes to its depth. Over whole breaths of the same depth the tip finds more tissue passed than without.
+#[test]
+fn a_breath_along_the_needle_is_followed() {
+    for name in ["paper", "breast", "prostate"] {
+        for sign in [1.0, -1.0] {
+            for open in [true, false] {
+                let mut scene = Scene::bundled(name).unwrap().with_only(&[Effect::Shaft, Effect::Breathing]);
+                let depth = scene.needle.depth;
+                scene.motion.breathing.as_mut().unwrap().direction = scene.needle.axis * sign;
+                scene.motion.breathing.as_mut().unwrap().amplitude = 0.1 * depth;
+                if open {
+                    scene.needle.shaft.as_mut().unwrap().puncture_force = 0.0;
+                }
+                let model = TissueModel::new(&scene).unwrap();
+                let mut course = Course::at_rest(&model, None).unwrap();
+                let steps = 100;
+                let mut cut = 0.0_f64;
+                for k in 1..=steps {
+                    let time = 5.0 * f64::from(k) / f64::from(steps);
+                    let pose = model.pose_at(time, depth * f64::from(k) / f64::from(steps));
+                    course
+                        .take_in(pose, 5.0 / f64::from(steps))
+                        .unwrap_or_else(|e| panic!("{name} {sign} {open} {time}: {e}"));
+                    let reading = course.reading();
+                    let now = reading.cut_length.unwrap_or(0.0);
+                    assert!(now >= cut - 1e-9 * depth, "{name}: what has been passed stays passed: {now} after {cut}");
+                    cut = now;
+                }
+                assert!(cut > 0.2 * depth && cut < 1.2 * depth, "{name} {sign} {open}: {cut} of {depth}");
+                assert!(course.base_force() > 0.0);
+            }
+        }
+    }
+}

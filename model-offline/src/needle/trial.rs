@@ -17,6 +17,9 @@ const AGREED: f64 = 1e-7;
 const SETTLED: f64 = 1e-6;
 /// Part of the largest force so far below which forces are none: of a body that has come back to rest all are rounding.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Change of the stations' displacements, over the spacing, that is rounding, whatever it is of the forces: of a body that is
+/// carried along there are none.
+const ROUNDING: f64 = 1e-13;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
 /// A compliance that leaves more than this part of the error is computed anew.
@@ -172,7 +175,7 @@ impl SlippingNeedle<'_> {
             let moved = &known * (&found - &forces);
             let change = moved.amax().max(off);
             let scale = found.amax().max(NEGLIGIBLE * self.largest_force);
-            let settled = (&found - &forces).amax() <= SETTLED * scale;
+            let settled = (&found - &forces).amax() <= SETTLED * scale || change <= ROUNDING * self.model.spacing();
             if change <= enough && settled && loose <= STEP_TOLERANCE {
                 for (k, contact) in contacts.iter_mut().enumerate() {
                     (contact.across, contact.along) = (forces[k], forces[m + k]);
