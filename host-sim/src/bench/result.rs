@@ -88,6 +88,9 @@ pub struct SimulationSettings {
     pub duration_s: f64,
     /// Depth of the insertion, length.
     pub depth: f64,
+    /// How deep the needle goes, length; none in results of older versions, whose needles went to the insertion's depth.
+    #[serde(default)]
+    pub needle_depth: Option<f64>,
     /// What the simulated world has besides a contact that moves with the needle in elastic tissue at rest; empty: nothing.
     #[serde(default)]
     pub world: Vec<String>,

@@ -30,7 +30,7 @@ const LOOSEST: f64 = 1e-4;
 /// Stations nearer to the tip than this part of their distance from each other give way to it.
 const CLEARANCE: f64 = 0.3;
 /// A tip that is in by less than this part of it is held across the needle by the skin alone.
-const AT_THE_SKIN: f64 = 0.02;
+const AT_THE_SKIN: f64 = 0.3;
 
 /// The tip of one trial.
 #[derive(Clone, Copy)]

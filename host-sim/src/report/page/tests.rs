@@ -173,6 +173,7 @@ fn run(scene: &str) -> RunResult {
         mode: RunMode::Lockstep,
         seed: 1,
         settings: SimulationSettings {
+            needle_depth: None,
             rate_hz: 1000.0,
             insertion_s: 5.0,
             wait_s: 0.0,
