@@ -22,6 +22,8 @@ const NEGLIGIBLE: f64 = 1e-3;
 const ROUNDING: f64 = 1e-13;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
+/// Round from which on what has broken loose stays loose: just where it does, one round may hold it and the next not.
+const DOUBTFUL: usize = 10;
 /// A compliance that leaves more than this part of the error is computed anew.
 const STALE: f64 = 0.5;
 /// Error of the equilibria on the way, over what the forces changed last, and the largest.
@@ -132,7 +134,7 @@ impl SlippingNeedle<'_> {
         let places: Vec<f64> = contacts.iter().map(|contact| contact.arc_length).collect();
         let lengths = hat_integrals(&places, 0.0, tip.engaged);
         let spread = spread(&places, tip.engaged, self.shaft.tip_length);
-        let before: Vec<Slide> = contacts.iter().map(|contact| contact.slide).collect();
+        let mut before: Vec<Slide> = contacts.iter().map(|contact| contact.slide).collect();
         let m = contacts.len();
         let mut forces = DVector::from_fn(2 * m + 1, |i, _| match i {
             i if i < m => contacts[i].across,
@@ -142,7 +144,7 @@ impl SlippingNeedle<'_> {
         let enough = AGREED * self.model.spacing();
         let mut compliance: Option<DMatrix<f64>> = None;
         let (mut last, mut fresh) = (f64::INFINITY, false);
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let external = self.external(&contacts, &forces, &spread);
             // As good as the forces are that it is for; a linear tissue's is found in one step.
             let loosest = if self.is_small_strain() { STEP_TOLERANCE } else { LOOSEST };
@@ -161,7 +163,7 @@ impl SlippingNeedle<'_> {
             };
             let at_zero = &felt - &known * &forces;
             let found = self.friction(&mut contacts, (&lengths, &before, tip.bounds), (&known, &at_zero), &forces);
-            let Some(found) = found else {
+            let Some((found, regimes)) = found else {
                 if std::mem::replace(&mut fresh, true) {
                     return Err(NeedleError::NoForces { depth });
                 }
@@ -169,6 +171,9 @@ impl SlippingNeedle<'_> {
                 // A compliance of several states may be none.
                 continue;
             };
+            if round >= DOUBTFUL {
+                before = regimes;
+            }
             // Responses of several states make a compliance that is not symmetric: what is felt across the needle decides too.
             // Points that are to lie on the line are as far off it as what is felt.
             let off = felt.rows(0, m).amax();
@@ -239,14 +244,14 @@ impl SlippingNeedle<'_> {
     ///
     /// Static friction holds what kinetic friction would not, so that there may be two answers. What slid before the
     /// increment is asked to stick by kinetic friction alone, what stuck by static friction, in every round: no guess on the
-    /// way to the answer may decide which of the two it is.
+    /// way to the answer may decide which of the two it is. Returned with how each was asked in the end.
     fn friction(
         &self,
         contacts: &mut [Station],
         (lengths, before, tip): (&[f64], &[Slide], Bounds),
         (compliance, at_zero): (&DMatrix<f64>, &DVector<f64>),
         start: &DVector<f64>,
-    ) -> Option<DVector<f64>> {
+    ) -> Option<(DVector<f64>, Vec<Slide>)> {
         let m = contacts.len();
         let (mut start, mut regimes) = (start.clone(), before.to_vec());
         for _ in 0..ROUNDS {
@@ -284,7 +289,7 @@ impl SlippingNeedle<'_> {
                 contact.slide = if regimes[k] == before[k] { slides } else { regimes[k] };
             }
             if !broke {
-                return Some(forces);
+                return Some((forces, regimes));
             }
             start = forces;
         }
