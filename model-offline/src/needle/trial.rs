@@ -146,13 +146,7 @@ impl SlippingNeedle<'_> {
         let (mut last, mut fresh) = (f64::INFINITY, false);
         for round in 0..ROUNDS {
             let external = self.external(&contacts, &forces, &spread);
-            // As good as the forces are that it is for; a linear tissue's is found in one step.
-            let loosest = if self.is_small_strain() { STEP_TOLERANCE } else { LOOSEST };
-            let loose = (FORCING * last / self.model.spacing()).clamp(STEP_TOLERANCE, loosest);
-            self.equilibrium.set_settings(newton_settings(loose));
-            self.equilibrium
-                .drive_loaded(&self.prescribed(), &external)
-                .map_err(|source| NeedleError::Equilibrium { depth, source })?;
+            let loose = self.drive(depth, &external, last)?;
             let felt = self.felt(&contacts, depth, tip.engaged, &spread);
             let known = match compliance.take() {
                 Some(known) => known,
@@ -201,6 +195,17 @@ impl SlippingNeedle<'_> {
             forces = found;
         }
         Err(NeedleError::NoForces { depth })
+    }
+
+    /// Takes the tissue to its equilibrium under loads, as good as the forces are that it is for, which changed it by `last`;
+    /// a linear tissue's is found in one step. How good it is: Newton's last step, over the spacing.
+    fn drive(&mut self, depth: f64, external: &[f64], last: f64) -> Result<f64, NeedleError> {
+        let loosest = if self.is_small_strain() { STEP_TOLERANCE } else { LOOSEST };
+        let loose = (FORCING * last / self.model.spacing()).clamp(STEP_TOLERANCE, loosest);
+        self.equilibrium.set_settings(newton_settings(loose));
+        let driven = self.equilibrium.drive_loaded(&self.prescribed(), external);
+        driven.map_err(|source| NeedleError::Equilibrium { depth, source })?;
+        Ok(loose)
     }
 
     /// Friction of a station that has slid so far and goes on, or what it was.
