@@ -40,8 +40,8 @@ fn forces_add_up_and_are_the_same_in_every_file() {
             let shaft = columns(&report.join(format!("inclusion-{strategy}-shaft.csv")));
             let length = needle["time"].len();
             assert!(length > 50 && needle["time"].windows(2).all(|pair| pair[0] < pair[1]), "{length}");
-            for k in 0..length {
-                let [base, tip, friction] = ["base_force", "tip_force", "shaft_friction"].map(|name| needle[name][k]);
+            let forces = ["base_force", "tip_force", "shaft_friction"].map(|name| &needle[name]);
+            for ((base, tip), friction) in forces[0].iter().zip(forces[1]).zip(forces[2]) {
                 assert!((base - tip - friction).abs() < 1e-9 * base.abs().max(1.0), "{base} {tip} {friction}");
             }
             // The skin holds first; then what the tip has passed grows, and never beyond the depth.

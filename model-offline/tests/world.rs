@@ -297,3 +297,62 @@ fn a_needle_waits_at_breathing_skin() {
         assert!(inside > 0.0, "{name}");
     }
 }
+
+/// Through a patient who breathes by a tenth of the depth: waits at the skin, goes in, and comes back out.
+fn in_and_out_of_a_breath(name: &str, direction: impl Fn(&Scene) -> Vector2<f64>, open: bool, wait: f64) {
+    let mut scene = Scene::bundled(name).unwrap().with_only(&[Effect::Shaft, Effect::Breathing]);
+    let depth = scene.needle.depth;
+    let direction = direction(&scene);
+    let breathing = scene.motion.breathing.as_mut().unwrap();
+    (breathing.direction, breathing.amplitude) = (direction, 0.1 * depth);
+    if open {
+        scene.needle.shaft.as_mut().unwrap().puncture_force = 0.0;
+    }
+    let model = TissueModel::new(&scene).unwrap();
+    let mut course = Course::at_rest(&model, None).unwrap();
+    let (interval, mut cut) = (0.05, 0.0_f64);
+    // To the end of a breath, when the skin is where it was.
+    let steps = (((wait + 8.0) / 4.0).ceil() * 4.0 / interval).round() as u32;
+    let mut deepest = (0.0, 0.0, 0.0);
+    for k in 1..=steps {
+        let time = interval * f64::from(k);
+        // In within five seconds, out within three.
+        let at = if time <= wait + 5.0 { (time - wait).max(0.0) / 5.0 } else { 1.0 - (time - wait - 5.0) / 3.0 };
+        let taken = course.take_in(model.pose_at(time, depth * at.max(0.0)), interval);
+        taken.unwrap_or_else(|error| panic!("{name} {direction} open: {open} wait: {wait}, {time} s: {error}"));
+        let reading = course.reading();
+        let now = reading.cut_length.unwrap_or(0.0);
+        assert!(now >= cut - 1e-9 * depth, "{name}: what has been passed stays passed: {now} after {cut}");
+        cut = now;
+        if reading.depth > deepest.0 {
+            deepest = (reading.depth, reading.base_force, cut);
+        }
+    }
+    assert!(deepest.1 > 0.0 && deepest.2 > 0.2 * depth && deepest.2 < 1.2 * depth, "{name} {deepest:?}");
+    // A needle that is out holds nothing.
+    let left = course.reading();
+    assert!(left.base_force.abs() < 0.05 * deepest.1, "{name}: {} of {}", left.base_force, deepest.1);
+}
+
+#[test]
+fn a_breath_along_the_needle_is_followed_in_and_out() {
+    for name in ["paper", "breast", "prostate"] {
+        for sign in [1.0, -1.0] {
+            for open in [true, false] {
+                in_and_out_of_a_breath(name, |scene| scene.needle.axis * sign, open, 0.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_needle_that_waited_at_the_skin_is_drawn_back_to_it() {
+    for name in ["paper", "breast", "prostate"] {
+        for wait in [0.0, 1.0] {
+            in_and_out_of_a_breath(name, |scene| scene.needle.orthogonal(), false, wait);
+        }
+        for (sign, open) in [(1.0, true), (-1.0, true), (1.0, false), (-1.0, false)] {
+            in_and_out_of_a_breath(name, |scene| scene.needle.axis * sign, open, 1.0);
+        }
+    }
+}

@@ -30,6 +30,7 @@ pub fn settings(scene: &Scene, simulation: &Simulation, table_knows_the_world: b
         pauses_s: simulation.needle.pauses_s(),
         duration_s: simulation.duration_s,
         depth: simulation.depth,
+        needle_depth: Some(simulation.needle.depth()),
         world: scene.effects().into_iter().map(str::to_owned).collect(),
         table_knows_the_world,
         sensor: simulation.sensor.title(),

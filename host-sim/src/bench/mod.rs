@@ -1,10 +1,12 @@
 //! What is tried and measured: strategies and whole comparisons, faults, timing, stability, tables, boards.
 
 pub mod board;
+pub mod causes;
 pub mod comparison;
 pub mod describe;
 pub mod error;
 pub mod faults;
+pub mod in_process;
 pub mod insertion;
 pub mod loop_stability;
 pub mod paper_table;

@@ -7,6 +7,7 @@ use model_offline::discretization::Integration;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::causes::CausesResult;
 use super::strategy::Strategy;
 use super::study_failure::StudyFailure;
 use super::table_tissue::TableTissue;
@@ -87,6 +88,9 @@ pub struct SimulationSettings {
     pub duration_s: f64,
     /// Depth of the insertion, length.
     pub depth: f64,
+    /// How deep the needle goes, length; none in results of older versions, whose needles went to the insertion's depth.
+    #[serde(default)]
+    pub needle_depth: Option<f64>,
     /// What the simulated world has besides a contact that moves with the needle in elastic tissue at rest; empty: nothing.
     #[serde(default)]
     pub world: Vec<String>,
@@ -248,6 +252,9 @@ pub struct CaseResult {
     /// Largest error without a paddle over that of `dynamic`; results of older versions have none.
     #[serde(default)]
     pub improvement_over_none: Option<f64>,
+    /// What the error of `dynamic` is made of, where that was asked for.
+    #[serde(default)]
+    pub causes: Option<CausesResult>,
 }
 
 /// A controller table in short.

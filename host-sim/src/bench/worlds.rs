@@ -5,33 +5,22 @@
 //! insertion in its world, whose error against the full model is part of the result.
 
 use firmware::contract::Table;
-use firmware::{Controller, Mode, State};
 use model_offline::model::{ModelError, TissueModel};
 use model_offline::parallel;
 use model_offline::placement::{PlacementOptions, PlacementStudy, discretise};
 use model_offline::scene::{Effect, Scene, Sensor, SensorPreset};
 use model_offline::table::{TableOptions, build};
-use nalgebra::Vector2;
 use serde::Serialize;
 
 use super::error::SimError;
+use super::in_process::{Errors, InProcess, Run};
 use crate::runtime::signals;
-use crate::world::World;
 use crate::world::loop_settings::{FeedbackLaw, LoopSettings};
 use crate::world::simulation::Simulation;
 use crate::world::tissue::{AttachedPaddle, Reductions};
 
 /// Effects of a world: all combinations are tried.
 const EFFECTS: [Effect; 3] = [Effect::Shaft, Effect::Creep, Effect::Breathing];
-
-/// Orthogonal error of one insertion, length.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Errors {
-    /// Largest.
-    pub peak: f64,
-    /// Root mean square.
-    pub rms: f64,
-}
 
 /// A number over many seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -197,7 +186,8 @@ impl Basis<'_> {
         let (model, _) = discretise(&scene)?;
         let reductions = Reductions::default();
         let [fixture, dynamic] = self.paddles;
-        let uncontrolled = |paddle| insertion(&model, &simulation, paddle, false, &reductions).map(|run| run.errors);
+        let uncontrolled =
+            |paddle| InProcess::new(&model, &simulation, &reductions).run(paddle, false).map(|run| run.errors);
         let table = match effects.iter().any(|effect| *effect != Effect::Breathing) {
             true => Some(build(&model, dynamic, &options(&simulation))),
             false => None,
@@ -246,7 +236,8 @@ impl Basis<'_> {
         let reductions = Reductions::default();
         let [fixture, dynamic] = self.paddles;
         let table = build(&model, dynamic, &options(&simulation))?;
-        let uncontrolled = |paddle| insertion(&model, &simulation, paddle, false, &reductions).map(|run| run.errors);
+        let uncontrolled =
+            |paddle| InProcess::new(&model, &simulation, &reductions).run(paddle, false).map(|run| run.errors);
         let sensors = self.sensors.iter().map(|sensor| {
             let by = |feedback| {
                 let loop_settings = LoopSettings { feedback, ..LoopSettings::of(sensor) };
@@ -271,7 +262,7 @@ impl Basis<'_> {
         let runs = (1..=self.seeds).map(|seed| {
             signals::check()?;
             let simulation = Simulation { seed, ..simulation.clone() };
-            insertion(model, &simulation, AttachedPaddle::Steered(table), seed == 1, reductions)
+            InProcess::new(model, &simulation, reductions).run(AttachedPaddle::Steered(table), seed == 1)
         });
         let runs: Vec<Run> = runs.collect::<Result<_, SimError>>()?;
         Ok(Controlled {
@@ -282,59 +273,6 @@ impl Basis<'_> {
             tissue_error: runs.first().and_then(|run| run.tissue_error),
         })
     }
-}
-
-/// What became of one insertion.
-struct Run {
-    errors: Errors,
-    run_share: f64,
-    tissue_estimate: f64,
-    tissue_error: Option<f64>,
-}
-
-/// One insertion: with a controller where the paddle is steered. The tissue is held against the full model where that is
-/// asked for.
-fn insertion(
-    model: &TissueModel,
-    simulation: &Simulation,
-    paddle: AttachedPaddle<'_>,
-    is_verified: bool,
-    reductions: &Reductions,
-) -> Result<Run, SimError> {
-    let settings = simulation.loop_settings.settings(simulation.depth);
-    let mut world = World::sharing(model, paddle, simulation, reductions)?;
-    let controller = match paddle {
-        AttachedPaddle::Steered(table) => Some(Controller::new(table, &settings)?),
-        _ => None,
-    };
-    let mut state = State::new();
-    let mut command = None;
-    let normal = model.scene().needle.orthogonal();
-    let (mut peak, mut squares, mut ticks, mut in_run) = (0.0_f64, 0.0, 0_u64, 0_u64);
-    if controller.is_none() {
-        world.start_needle(0);
-    }
-    for tick in 0..simulation.ticks() {
-        let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns)?;
-        let since_start_s = world.since_start_s(truth.time_ns);
-        if since_start_s >= simulation.duration_s {
-            break;
-        }
-        command = controller.as_ref().map(|controller| controller.step(&mut state, &inputs));
-        if since_start_s >= 0.0 && since_start_s >= simulation.needle.wait_s() {
-            let error = normal.dot(&Vector2::from(truth.target));
-            (peak, squares, ticks) = (peak.max(error.abs()), squares + error * error, ticks + 1);
-            in_run += u64::from(command.as_ref().is_some_and(|command| command.state == Mode::Run as u32));
-        }
-    }
-    let account = is_verified.then(|| world.plant_account());
-    let estimate = world.tissue.largest_estimate();
-    Ok(Run {
-        errors: Errors { peak, rms: (squares / ticks.max(1) as f64).sqrt() },
-        run_share: in_run as f64 / ticks.max(1) as f64,
-        tissue_estimate: estimate.unwrap_or(0.0),
-        tissue_error: account.and_then(|account| account.extrapolation_error),
-    })
 }
 
 /// Median, and the range of the middle nine tenths.

@@ -69,6 +69,10 @@ pub(crate) struct RunArgs {
     /// Also write the body along every insertion as a VTU series with a .pvd, for ParaView
     #[arg(long)]
     pub(crate) vtu: bool,
+    /// Also take the controller's error apart: the same insertion without the sensor's noise, without its delay, with a
+    /// table that knows everything, and so on
+    #[arg(long)]
+    pub(crate) causes: bool,
     /// Also write the result here, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -111,6 +115,7 @@ impl RunArgs {
         options.hardware = self.hardware;
         options.scalar = self.scalar;
         options.extras = Extras { mcap: self.mcap, vtu: self.vtu };
+        options.causes = self.causes;
         options.threads = parallel::threads(self.threads);
         Ok(options)
     }

@@ -154,7 +154,8 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
         period_ns: u64,
     ) -> Result<(Truth, Inputs), WorldError> {
         let time_ns = tick * period_ns;
-        self.act(command, time_ns, period_ns);
+        // The command is the answer to the tick before: where it says RUN first, the needle started then.
+        self.act(command, time_ns.saturating_sub(period_ns), period_ns);
         let truth = self.advance(tick, time_ns)?;
         let (needle, paddle) = self.encoders(time_ns);
         let target = self.target_samples(&truth).last();

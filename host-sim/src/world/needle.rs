@@ -115,9 +115,11 @@ impl NeedleTrajectory {
     #[must_use]
     pub fn in_steps(depth: f64, insertion_s: f64, steps: u32, pause_s: f64) -> Self {
         let (count, each_s) = (f64::from(steps.max(1)), insertion_s / f64::from(steps.max(1)));
+        // The last step ends at the depth itself, not a rounding beyond it, where no table reaches.
+        let after = |k: f64| if k < count { depth * k / count } else { depth };
         let step = |k: u32| {
             let k = f64::from(k);
-            Move::new(k * (each_s + pause_s), each_s, depth * k / count, depth * (k + 1.0) / count)
+            Move::new(k * (each_s + pause_s), each_s, after(k), after(k + 1.0))
         };
         Self::of((0..steps.max(1)).map(step).collect())
     }
@@ -376,5 +378,17 @@ mod tests {
         assert_eq!(refuse(&back), RecordedNeedleError::NotLater { row: 3, time_s: 1.0 });
         assert_eq!(refuse(&[(0.0, 0.0), (1.0, 0.0)]), RecordedNeedleError::StaysOut);
         assert_eq!(refuse(&[(0.0, 1.0), (1.0, 2.0)]), RecordedNeedleError::NotAtRest { depth: 1.0 });
+    }
+
+    /// A table ends at the depth: what a rounding lies beyond it is a fault.
+    #[test]
+    fn steps_end_at_the_depth_to_the_last_bit() {
+        for depth in [0.1, 0.7, 12.0, 1.0 / 3.0] {
+            for steps in [1, 3, 6, 7, 12, 24, 49] {
+                let needle = NeedleTrajectory::in_steps(depth, 5.0, steps, 0.5);
+                assert_eq!(needle.depth(), depth, "{steps} steps");
+                assert_eq!(needle.at(needle.end_s()).depth, depth, "{steps} steps");
+            }
+        }
     }
 }

@@ -59,7 +59,7 @@ impl SlippingNeedle<'_> {
                 Err(_) => 0.5,
             };
             *self = before;
-            if parts >= MOST_PARTS || goal - done < SHORTEST_PART {
+            if parts >= MOST_PARTS || outcome.is_err() && goal - done < SHORTEST_PART {
                 return outcome.and(Err(NeedleError::NoForces { depth: pose.depth }));
             }
             goal = done + (goal - done) * shorter;
@@ -206,6 +206,10 @@ impl SlippingNeedle<'_> {
             {
                 self.tip_slope = ((off - then) / (engaged - there)).clamp(0.2, 50.0);
             }
+            if engaged <= 0.0 && off > 0.0 {
+                // Even the skin is further on than the tip: the needle is out.
+                return Ok((0.0, trial));
+            }
             let narrow = beyond.0 - behind.0 <= enough;
             if off.abs() <= enough || narrow && off.abs() <= JUMP * self.model.spacing() {
                 return Ok((engaged, trial));
@@ -219,7 +223,11 @@ impl SlippingNeedle<'_> {
             };
             last = Some((engaged, off));
             let inside = behind.0 < next && next < beyond.0;
-            engaged = if inside { next } else { 0.5 * (behind.0 + beyond.0) };
+            engaged = match next {
+                next if next <= 0.0 => 0.0,
+                next if inside => next,
+                _ => 0.5 * (behind.0 + beyond.0),
+            };
             near = Some(trial);
         }
         Err(NeedleError::NoForces { depth })

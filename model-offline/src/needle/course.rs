@@ -83,15 +83,23 @@ impl<'m> Course<'m> {
                 outcome
             }
             State::Pushing { body, puncture_force, so_far } => {
+                let Some(force) = *puncture_force else {
+                    return body.take_in(pose, seconds).map_err(failed(pose.depth));
+                };
+                let before = body.clone();
                 body.take_in(pose, seconds).map_err(failed(pose.depth))?;
-                let Some(force) = *puncture_force else { return Ok(()) };
                 so_far.push((pose, seconds));
-                if body.contact_force() >= force {
-                    let mut needle = SlippingNeedle::at_rest(self.model, self.paddle)?;
-                    for (pose, seconds) in so_far.iter() {
-                        enter(&mut needle, *pose, *seconds)?;
+                if body.contact_force() < force {
+                    return Ok(());
+                }
+                match within(self.model, self.paddle, so_far) {
+                    Ok(needle) => self.state = State::Within(Box::new(needle)),
+                    Err(error) => {
+                        // Whoever comes in smaller steps begins where this one did.
+                        so_far.pop();
+                        *body = before;
+                        return Err(error);
                     }
-                    self.state = State::Within(Box::new(needle));
                 }
                 Ok(())
             }
@@ -151,6 +159,19 @@ impl<'m> Course<'m> {
             State::Within(needle) => needle.actuation_jacobian(),
         }
     }
+}
+
+/// A needle that has come this way through skin that was open.
+fn within<'m>(
+    model: &'m TissueModel,
+    paddle: Option<usize>,
+    so_far: &[(Pose, f64)],
+) -> Result<SlippingNeedle<'m>, NeedleError> {
+    let mut needle = SlippingNeedle::at_rest(model, paddle)?;
+    for (pose, seconds) in so_far {
+        enter(&mut needle, *pose, *seconds)?;
+    }
+    Ok(needle)
 }
 
 fn failed(depth: f64) -> impl FnOnce(Failure) -> NeedleError {

@@ -17,8 +17,13 @@ const AGREED: f64 = 1e-7;
 const SETTLED: f64 = 1e-6;
 /// Part of the largest force so far below which forces are none: of a body that has come back to rest all are rounding.
 const NEGLIGIBLE: f64 = 1e-3;
+/// Change of the stations' displacements, over the spacing, that is rounding, whatever it is of the forces: of a body that is
+/// carried along there are none.
+const ROUNDING: f64 = 1e-13;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
+/// Round from which on what has broken loose stays loose: just where it does, one round may hold it and the next not.
+const DOUBTFUL: usize = 10;
 /// A compliance that leaves more than this part of the error is computed anew.
 const STALE: f64 = 0.5;
 /// Error of the equilibria on the way, over what the forces changed last, and the largest.
@@ -27,7 +32,7 @@ const LOOSEST: f64 = 1e-4;
 /// Stations nearer to the tip than this part of their distance from each other give way to it.
 const CLEARANCE: f64 = 0.3;
 /// A tip that is in by less than this part of it is held across the needle by the skin alone.
-const AT_THE_SKIN: f64 = 0.02;
+const AT_THE_SKIN: f64 = 0.3;
 
 /// The tip of one trial.
 #[derive(Clone, Copy)]
@@ -129,7 +134,7 @@ impl SlippingNeedle<'_> {
         let places: Vec<f64> = contacts.iter().map(|contact| contact.arc_length).collect();
         let lengths = hat_integrals(&places, 0.0, tip.engaged);
         let spread = spread(&places, tip.engaged, self.shaft.tip_length);
-        let before: Vec<Slide> = contacts.iter().map(|contact| contact.slide).collect();
+        let mut before: Vec<Slide> = contacts.iter().map(|contact| contact.slide).collect();
         let m = contacts.len();
         let mut forces = DVector::from_fn(2 * m + 1, |i, _| match i {
             i if i < m => contacts[i].across,
@@ -139,15 +144,9 @@ impl SlippingNeedle<'_> {
         let enough = AGREED * self.model.spacing();
         let mut compliance: Option<DMatrix<f64>> = None;
         let (mut last, mut fresh) = (f64::INFINITY, false);
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let external = self.external(&contacts, &forces, &spread);
-            // As good as the forces are that it is for; a linear tissue's is found in one step.
-            let loosest = if self.is_small_strain() { STEP_TOLERANCE } else { LOOSEST };
-            let loose = (FORCING * last / self.model.spacing()).clamp(STEP_TOLERANCE, loosest);
-            self.equilibrium.set_settings(newton_settings(loose));
-            self.equilibrium
-                .drive_loaded(&self.prescribed(), &external)
-                .map_err(|source| NeedleError::Equilibrium { depth, source })?;
+            let loose = self.drive(depth, &external, last)?;
             let felt = self.felt(&contacts, depth, tip.engaged, &spread);
             let known = match compliance.take() {
                 Some(known) => known,
@@ -158,7 +157,7 @@ impl SlippingNeedle<'_> {
             };
             let at_zero = &felt - &known * &forces;
             let found = self.friction(&mut contacts, (&lengths, &before, tip.bounds), (&known, &at_zero), &forces);
-            let Some(found) = found else {
+            let Some((found, regimes)) = found else {
                 if std::mem::replace(&mut fresh, true) {
                     return Err(NeedleError::NoForces { depth });
                 }
@@ -166,13 +165,16 @@ impl SlippingNeedle<'_> {
                 // A compliance of several states may be none.
                 continue;
             };
+            if round >= DOUBTFUL {
+                before = regimes;
+            }
             // Responses of several states make a compliance that is not symmetric: what is felt across the needle decides too.
             // Points that are to lie on the line are as far off it as what is felt.
             let off = felt.rows(0, m).amax();
             let moved = &known * (&found - &forces);
             let change = moved.amax().max(off);
             let scale = found.amax().max(NEGLIGIBLE * self.largest_force);
-            let settled = (&found - &forces).amax() <= SETTLED * scale;
+            let settled = (&found - &forces).amax() <= SETTLED * scale || change <= ROUNDING * self.model.spacing();
             if change <= enough && settled && loose <= STEP_TOLERANCE {
                 for (k, contact) in contacts.iter_mut().enumerate() {
                     (contact.across, contact.along) = (forces[k], forces[m + k]);
@@ -193,6 +195,17 @@ impl SlippingNeedle<'_> {
             forces = found;
         }
         Err(NeedleError::NoForces { depth })
+    }
+
+    /// Takes the tissue to its equilibrium under loads, as good as the forces are that it is for, which changed it by `last`;
+    /// a linear tissue's is found in one step. How good it is: Newton's last step, over the spacing.
+    fn drive(&mut self, depth: f64, external: &[f64], last: f64) -> Result<f64, NeedleError> {
+        let loosest = if self.is_small_strain() { STEP_TOLERANCE } else { LOOSEST };
+        let loose = (FORCING * last / self.model.spacing()).clamp(STEP_TOLERANCE, loosest);
+        self.equilibrium.set_settings(newton_settings(loose));
+        let driven = self.equilibrium.drive_loaded(&self.prescribed(), external);
+        driven.map_err(|source| NeedleError::Equilibrium { depth, source })?;
+        Ok(loose)
     }
 
     /// Friction of a station that has slid so far and goes on, or what it was.
@@ -236,14 +249,14 @@ impl SlippingNeedle<'_> {
     ///
     /// Static friction holds what kinetic friction would not, so that there may be two answers. What slid before the
     /// increment is asked to stick by kinetic friction alone, what stuck by static friction, in every round: no guess on the
-    /// way to the answer may decide which of the two it is.
+    /// way to the answer may decide which of the two it is. Returned with how each was asked in the end.
     fn friction(
         &self,
         contacts: &mut [Station],
         (lengths, before, tip): (&[f64], &[Slide], Bounds),
         (compliance, at_zero): (&DMatrix<f64>, &DVector<f64>),
         start: &DVector<f64>,
-    ) -> Option<DVector<f64>> {
+    ) -> Option<(DVector<f64>, Vec<Slide>)> {
         let m = contacts.len();
         let (mut start, mut regimes) = (start.clone(), before.to_vec());
         for _ in 0..ROUNDS {
@@ -281,7 +294,7 @@ impl SlippingNeedle<'_> {
                 contact.slide = if regimes[k] == before[k] { slides } else { regimes[k] };
             }
             if !broke {
-                return Some(forces);
+                return Some((forces, regimes));
             }
             start = forces;
         }

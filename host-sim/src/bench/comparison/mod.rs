@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use firmware::Controller;
+use firmware::contract::Table;
 use model_offline::model::{ModelError, TissueModel};
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
@@ -21,6 +22,7 @@ use sha2::{Digest, Sha256};
 use self::cases::{Case, cases};
 pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
 pub use self::progress::{Progress, Silent};
+use super::causes::{CausesResult, Examined};
 use super::describe;
 use super::insertion::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
 use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
@@ -59,6 +61,8 @@ pub struct ComparisonOptions {
     pub scalar: TableScalar,
     /// Files for other tools.
     pub extras: Extras,
+    /// Whether the error of the controlled insertion is taken apart by its causes.
+    pub causes: bool,
     /// Threads for placement and for strategies without a controller.
     pub threads: usize,
     /// The program that serves as the controller's process: `host-sim`.
@@ -78,6 +82,7 @@ impl ComparisonOptions {
             hardware: Hardware::default(),
             scalar: TableScalar::default(),
             extras: Extras::default(),
+            causes: false,
             threads: parallel::available(),
             program,
         }
@@ -405,6 +410,7 @@ impl<'p> Comparison<'p> {
             };
             dynamic.and_then(factor)
         };
+        let causes = self.options.causes.then(|| self.causes(case, table)).transpose()?;
         let (improvement, improvement_over_none) = (over(&strategies.static_paddle), over(&strategies.none));
         Ok(CaseResult {
             tissue: case.tissue,
@@ -423,7 +429,17 @@ impl<'p> Comparison<'p> {
             strategies,
             improvement,
             improvement_over_none,
+            causes,
         })
+    }
+
+    /// What the error of the controlled insertion is made of.
+    fn causes(&self, case: &Case, table: &Table<f64, 2>) -> Result<CausesResult, SimError> {
+        self.progress.say(&format!("{}: causes of the error", case.tissue));
+        let studied = self.studied(case.tissue);
+        let examined =
+            Examined { model: studied.plant(), table, simulation: &self.simulation, reductions: &studied.reductions };
+        signals::ends_at_once(|| examined.causes())
     }
 
     fn placements(&self) -> Vec<PlacementResult> {

@@ -2,9 +2,10 @@
 
 use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, in_unit, number, plain};
-use model_offline::output::chart::{Axis, Colour, Dash, Drawing, Panel, Place, ReferenceLine, Series};
+use model_offline::output::chart::{Axis, Bars, Colour, Dash, Drawing, Panel, Place, ReferenceLine, Series};
 
 use super::embed::CHART_WIDTH;
+use crate::bench::in_process::Errors;
 use crate::bench::result::{CaseResult, NeedlePoint, NeedleResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
 use crate::record::export::csv;
@@ -191,9 +192,64 @@ pub(super) fn needle_panels(run: &RunResult, case: &CaseResult) -> Vec<(&'static
     charts
 }
 
+/// What the controller's error is made of: a bar for what is left without each cause.
+pub(super) fn cause_panel(run: &RunResult, case: &CaseResult) -> Option<Panel> {
+    let causes = case.causes.as_ref()?;
+    let mut names = vec!["nothing".to_owned()];
+    names.extend(causes.without.iter().map(|without| without.cause.word().to_owned()));
+    names.push("all".to_owned());
+    let errors = || {
+        let left = causes.without.iter().map(|without| &without.left);
+        std::iter::once(&causes.whole).chain(left).chain([&causes.without_all])
+    };
+    let title = causes.chief().map_or_else(
+        || "Nothing but the controller leaves an error".to_owned(),
+        |chief| {
+            let (whole, left) = (number(causes.whole.peak, 2), number(chief.left.peak, 2));
+            format!("Largest error {whole}; without the {} {left}", chief.cause.title())
+        },
+    );
+    let heights = Axis::linear("largest and RMS orthogonal error", &run.units[0]);
+    let mut panel = Panel::new(
+        &title,
+        Axis::categories("without", names),
+        heights.enclosing(errors().map(|errors| errors.peak).chain([0.0])),
+    );
+    panel.description = format!("Largest and RMS error without each of its causes, {}", case_name(case));
+    let mut add = |label: &str, (colour, from): (Colour, f64), of: &dyn Fn(&Errors) -> f64| {
+        let bar = |(k, errors): (usize, &Errors)| [k as f64 + from, k as f64 + from + 0.35, of(errors)];
+        panel.bars.push(Bars { label: label.to_owned(), colour, bars: errors().enumerate().map(bar).collect() });
+    };
+    add("largest", (Colour::Blue, -0.35), &|errors| errors.peak);
+    add("RMS", (Colour::Orange, 0.0), &|errors| errors.rms);
+    Some(panel)
+}
+
+/// What is left without each cause in numbers.
+pub(super) fn cause_table(run: &RunResult, case: &CaseResult) -> Option<Markup> {
+    let causes = case.causes.as_ref()?;
+    let unit = &run.units[0];
+    let row = |name: &str, errors: &Errors| {
+        html! { tr { td.left { (name) } td { (number(errors.peak, 3)) } td { (number(errors.rms, 3)) } } }
+    };
+    Some(html! {
+        div.scroll { table {
+            caption { span { "What is left of the controlled insertion's error without each of its causes, in lockstep" } }
+            thead { tr { th.left { "without" } th { (in_unit("largest", unit)) } th { (in_unit("RMS", unit)) } } }
+            tbody {
+                (row("nothing: as it is", &causes.whole))
+                @for without in &causes.without { (row(without.cause.title(), &without.left)) }
+                (row("all of these", &causes.without_all))
+            }
+        } }
+        p.quiet { "Causes do not add up: each row is the same insertion with one thing taken away." }
+    })
+}
+
 /// All charts of a case.
 pub(super) fn case_charts(run: &RunResult, number: usize, case: &CaseResult) -> CaseCharts {
-    let charts = error_panels(run, case).into_iter().chain(needle_panels(run, case));
+    let causes = cause_panel(run, case).map(|panel| ("causes", panel));
+    let charts = error_panels(run, case).into_iter().chain(causes).chain(needle_panels(run, case));
     CaseCharts(charts.map(|(what, panel)| (format!("case{number}-{what}"), panel)).collect())
 }
 

@@ -26,7 +26,7 @@ use model_offline::output::chart::number::{in_unit, number, plain};
 use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
 
 use self::embed::{charts, inline, panels};
-use self::insertion::{CaseCharts, case_charts, case_name, error_panels, needle_panels};
+use self::insertion::{CaseCharts, case_charts, case_name, cause_panel, error_panels, needle_panels};
 use super::paper::{is_paper, paper_optima};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 
@@ -221,6 +221,7 @@ fn insertion_part(run: &RunResult, cases: &[CaseCharts]) -> Markup {
         @for (case, drawn) in run.cases.iter().zip(cases) {
             h3 { "Tissue: " (case_name(case)) }
             (charts(&drawn.drawings()))
+            @if let Some(table) = insertion::cause_table(run, case) { (table) }
         }
         (insertion::table(run))
     }
@@ -320,6 +321,10 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     ];
     if !needle.is_empty() {
         pictures.push(("needle-forces.svg", figure("Forces on the needle and slip along it".to_owned(), needle, 2)));
+    }
+    let causes: Vec<Panel> = run.cases.iter().filter_map(|case| cause_panel(run, case)).collect();
+    if !causes.is_empty() {
+        pictures.push(("causes.svg", figure("What the controller's error is made of".to_owned(), causes, 1)));
     }
     let mut timing = timing::charts(run);
     timing.truncate(3);

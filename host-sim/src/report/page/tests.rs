@@ -1,6 +1,8 @@
 //! Every chart is there, every string escaped, every number finite.
 
 use super::*;
+use crate::bench::causes::{Cause, CausesResult, Without};
+use crate::bench::in_process::Errors;
 use crate::bench::result::*;
 use crate::bench::study_failure::StudyFailure;
 use crate::bench::table_tissue::TableTissue;
@@ -60,6 +62,15 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         needle: controlled.then(needle),
         plant_step_us: 1.0,
         plant: crate::world::tissue::PlantAccount::default(),
+    }
+}
+
+fn causes() -> CausesResult {
+    let errors = |peak: f64| Errors { peak, rms: 0.5 * peak };
+    CausesResult {
+        whole: errors(4e-4),
+        without: vec![Without { cause: Cause::SensorNoise, left: errors(1e-4) }],
+        without_all: errors(1e-5),
     }
 }
 
@@ -152,6 +163,7 @@ fn run(scene: &str) -> RunResult {
         },
         improvement: Some(40.0),
         improvement_over_none: Some(200.0),
+        causes: Some(causes()),
     };
     RunResult {
         format: FORMAT,
@@ -161,6 +173,7 @@ fn run(scene: &str) -> RunResult {
         mode: RunMode::Lockstep,
         seed: 1,
         settings: SimulationSettings {
+            needle_depth: None,
             rate_hz: 1000.0,
             insertion_s: 5.0,
             wait_s: 0.0,
@@ -350,6 +363,7 @@ fn pictures_are_files_of_their_own() {
         "controllability.svg",
         "error-along-insertion.svg",
         "needle-forces.svg",
+        "causes.svg",
         "timing-histogram.svg",
     ];
     assert_eq!(names, expected);

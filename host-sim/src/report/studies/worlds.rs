@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use model_offline::number::length;
 
-use crate::bench::worlds::{Controlled, Errors, Spread, Worlds};
+use crate::bench::in_process::Errors;
+use crate::bench::worlds::{Controlled, Spread, Worlds};
 use model_offline::scene::Effect;
 
 /// The table, in Markdown: readable in a terminal too.

@@ -4,12 +4,17 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use model_offline::number::{decimals, smallest_told};
+use model_offline::output::chart::number::plain;
 use model_offline::scene::PlantModel;
 
 use crate::bench::result::{CaseResult, RunResult, SimulationSettings, StrategyResult};
 use crate::report::paper::paper_optima;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
+use crate::world::tissue::PlantAccount;
+
+/// Part of the largest error above which the tissue's own is said beside it.
+const TELLING: f64 = 0.1;
 
 /// The summary of a run that is at `directory`.
 pub fn summary(run: &RunResult, directory: &Path) -> String {
@@ -44,7 +49,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
         text,
         "\nLargest target displacement orthogonal to the needle, depth {} in {} s{},\n\
          target seen by {}: {} Hz, {} ms late, noise {}; feedback: {}; paddle in brackets",
-        settings.depth,
+        reached(settings),
         settings.insertion_s,
         programme(settings),
         settings.sensor,
@@ -62,9 +67,20 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     for case in &run.cases {
         write_case(text, case, digits)?;
     }
+    write_causes(text, run, digits)?;
     write_plant(text, run)?;
     write_loop(text, run)?;
     writeln!(text, "\nReport: {}   ({:.1} s)", directory.join("report.html").display(), run.wall_s)
+}
+
+/// How deep the needle goes, and how deep the scene's does where that is another depth.
+fn reached(settings: &SimulationSettings) -> String {
+    match settings.needle_depth {
+        Some(depth) if (depth - settings.depth).abs() > 1e-9 * settings.depth => {
+            format!("{} (of the scene's {})", plain(depth), settings.depth)
+        }
+        _ => settings.depth.to_string(),
+    }
 }
 
 /// What the needle does besides going in.
@@ -133,6 +149,23 @@ fn write_case(text: &mut String, case: &CaseResult, digits: usize) -> std::fmt::
     }
 }
 
+/// What the controller's error is made of, where that was asked for.
+fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::Result {
+    for case in &run.cases {
+        let Some(causes) = &case.causes else { continue };
+        let left = causes.without.iter().map(|w| format!("{:.digits$} without the {}", w.left.peak, w.cause.title()));
+        let left: Vec<String> = left.collect();
+        writeln!(
+            text,
+            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it",
+            case.tissue,
+            left.join(", "),
+            causes.without_all.peak
+        )?;
+    }
+    Ok(())
+}
+
 /// An error over another one, of which it is this many times smaller; a digit more where that is few.
 fn share(factor: f64, other: &str) -> String {
     if factor < 1.0 {
@@ -166,9 +199,7 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
                 write!(text, " ({modes} modes, {points} of {all} points)")?;
             }
             write!(text, ", {:.1} µs a step", strategy.plant_step_us)?;
-            if let Some(error) = plant.error_at_end {
-                write!(text, ", {error:.1e} from the full model at the end")?;
-            }
+            write_accuracy(text, plant, strategy.max_orthogonal_error)?;
             if let Some(full) = plant.full_step_us {
                 write!(text, "; the full model takes {full:.0} µs, too long for the period")?;
             }
@@ -182,6 +213,32 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
         }
     }
     Ok(())
+}
+
+/// How far a reduced model was off: along the whole way where the full one went it again, else at its end.
+fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fmt::Result {
+    let off = match (&plant.not_verified, plant.path_knots, plant.extrapolation_error, plant.error_at_end) {
+        (Some(why), _, _, _) => {
+            write!(text, ", NOT VERIFIED: the full model cannot go the same way ({why})")?;
+            if let Some(estimate) = plant.largest_estimate {
+                write!(text, "; it takes itself to be {estimate:.1e} off at most")?;
+            }
+            plant.largest_estimate
+        }
+        (None, Some(_), Some(error), _) => {
+            write!(text, ", at most {error:.1e} from the full model on the same way")?;
+            Some(error)
+        }
+        (_, _, _, Some(error)) => {
+            write!(text, ", {error:.1e} from the full model at the end")?;
+            Some(error)
+        }
+        _ => None,
+    };
+    match off {
+        Some(off) if off > TELLING * peak => write!(text, " ({:.0} % of the largest error)", 100.0 * off / peak),
+        _ => Ok(()),
+    }
 }
 
 /// Both sides of a loop on the machine's clock: the counts first, then how late.
@@ -230,4 +287,37 @@ fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {
          ticks not recorded",
         ledgers.len()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn how_far_the_tissue_is_off_is_said_for_the_whole_way_and_not_for_its_end_alone() {
+        let said = |plant: PlantAccount| {
+            let mut text = String::new();
+            write_accuracy(&mut text, &plant, 0.5).unwrap();
+            text
+        };
+        // Back at the skin every model is at rest.
+        let path = PlantAccount {
+            path_knots: Some(9),
+            extrapolation_error: Some(0.2),
+            error_at_end: Some(1e-9),
+            largest_estimate: Some(0.3),
+            ..PlantAccount::default()
+        };
+        assert_eq!(
+            said(path.clone()),
+            ", at most 2.0e-1 from the full model on the same way (40 % of the largest error)"
+        );
+        let small = PlantAccount { extrapolation_error: Some(0.04), ..path.clone() };
+        assert_eq!(said(small), ", at most 4.0e-2 from the full model on the same way");
+        let unknown = PlantAccount { not_verified: Some("no way".to_owned()), extrapolation_error: None, ..path };
+        let words = said(unknown);
+        assert!(words.contains("NOT VERIFIED") && words.contains("no way") && words.contains("60 %"), "{words}");
+        let trained = PlantAccount { error_at_end: Some(0.01), ..PlantAccount::default() };
+        assert_eq!(said(trained), ", 1.0e-2 from the full model at the end");
+    }
 }

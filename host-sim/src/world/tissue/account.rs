@@ -36,6 +36,9 @@ pub struct PlantAccount {
     /// Largest error of an extrapolated target displacement that solving found, the end of the run included, length.
     #[serde(default)]
     pub extrapolation_error: Option<f64>,
+    /// Why the full model could not be taken the same way, where it could not: then nothing is known of how far off this was.
+    #[serde(default)]
+    pub not_verified: Option<String>,
     /// Distance from the full model's target displacement at the end of the run, length; computed after it.
     #[serde(default)]
     pub error_at_end: Option<f64>,
@@ -55,6 +58,7 @@ impl Default for PlantAccount {
             path_knots: None,
             solves: None,
             extrapolation_error: None,
+            not_verified: None,
             error_at_end: None,
         }
     }

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use model_offline::model::{Body, Pose, TissueModel};
 use model_offline::needle::Course;
-use model_offline::reduction::along_path::{AlongTheWay, PathBody, along};
+use model_offline::reduction::along_path::{PathBody, along};
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
-use model_offline::reduction::{Condensed, Extrapolated};
+use model_offline::reduction::{Condensed, Extrapolated, TrainingError};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector2;
@@ -115,6 +115,25 @@ impl AlongInsertion {
     fn afresh(&self) -> Self {
         let Self { body, trajectory, interval_s, .. } = self;
         Self { body: body.afresh(), trajectory: trajectory.clone(), interval_s: *interval_s, paddle: Vec::new() }
+    }
+
+    /// The full model on the same way: how far off its target displacement this was, moment by moment, and what the needle
+    /// met.
+    fn held_against_full(
+        &self,
+        model: &TissueModel,
+        paddle: Option<usize>,
+    ) -> Result<(Vec<f64>, Vec<NeedleMoment>), TrainingError> {
+        let way = |time: f64| model.pose_at(time, self.trajectory.at(time).depth);
+        let full = along(model, paddle, &way, self.interval_s, &self.paddle)?;
+        let mut body = self.body.afresh();
+        let held = full.into_iter().zip(&self.paddle).enumerate().map(|(k, (full, paddle))| {
+            let since_start_s = self.interval_s * k as f64;
+            body.go_to(since_start_s, *paddle);
+            let error = (body.target_displacement() - full.target).norm();
+            (error, NeedleMoment { since_start_s, reading: full.needle })
+        });
+        Ok(held.unzip())
     }
 }
 
@@ -334,28 +353,15 @@ impl<'m> TissuePlant<'m> {
             account.solves = Some(body.account().solves);
             account.extrapolation_error = Some(body.account().largest_error);
         } else if let Kind::Path(taken) = &self.kind {
-            let (trajectory, model) = (&taken.trajectory, self.model);
-            let way = |time: f64| model.pose_at(time, trajectory.at(time).depth);
-            // Where the full model cannot go the same way nothing is known.
-            if let Ok(full) = along(model, self.paddle, &way, taken.interval_s, &taken.paddle) {
-                let mut body = taken.body.afresh();
-                let errors: Vec<f64> = full
-                    .iter()
-                    .enumerate()
-                    .map(|(k, full)| {
-                        body.go_to(taken.interval_s * k as f64, taken.paddle[k]);
-                        (body.target_displacement() - full.target).norm()
-                    })
-                    .collect();
-                if model.scene().needle.shaft.is_some() {
-                    let moment = |(k, way): (usize, AlongTheWay)| NeedleMoment {
-                        since_start_s: taken.interval_s * k as f64,
-                        reading: way.needle,
-                    };
-                    self.needle = full.into_iter().enumerate().map(moment).collect();
+            match taken.held_against_full(self.model, self.paddle) {
+                Ok((errors, moments)) => {
+                    account.extrapolation_error = Some(errors.iter().copied().fold(0.0, f64::max));
+                    account.error_at_end = errors.last().copied();
+                    if self.model.scene().needle.shaft.is_some() {
+                        self.needle = moments;
+                    }
                 }
-                account.extrapolation_error = Some(errors.iter().copied().fold(0.0, f64::max));
-                account.error_at_end = errors.last().copied();
+                Err(error) => account.not_verified = Some(error.to_string()),
             }
         } else if !matches!(self.kind, Kind::Full(_) | Kind::Course { .. }) {
             let (depth, paddle) = self.at;
