@@ -149,11 +149,14 @@ pub const BREATH_SIGMAS: f64 = 7.0;
 /// How much a breath differs from the one before, standard deviation over its size.
 pub const BREATH_WANDER: f64 = 0.3;
 
-/// Change of the period, part of it, from which on a breath is another one and learnt anew.
+/// Change of the period, part of it, from which on a breath is another one: the second in a row is learnt anew.
 pub const BREATH_CHANGE: f64 = 0.25;
 
 /// How much a new period counts against those before: its own scatter, seen by ultrasound, is a tenth.
 pub const BREATH_LEARNS: f64 = 0.3;
+
+/// Time without a sample, over the shortest breath, in which a breath may begin unseen.
+pub const BREATH_GAP: f64 = 0.5;
 
 /// Breaths that may be missed before none is predicted any more.
 pub const BREATHS_MISSED: f64 = 1.5;

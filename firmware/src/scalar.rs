@@ -36,8 +36,8 @@ impl ScalarKind {
 
 /// A real scalar: `f32` or `f64`.
 ///
-/// The control law uses only `+ − × ÷ √` and comparisons. IEEE 754 rounds all of these correctly, so the same
-/// inputs give the same bits on every target.
+/// The control law uses only `+ − × ÷ √`, rounding to whole numbers and comparisons. IEEE 754 has one right answer for each of
+/// these, so the same inputs give the same bits on every target.
 pub trait Scalar: RealField + Copy + Debug + Display + Default + Serialize + DeserializeOwned {
     /// Kind written into the table header.
     const KIND: ScalarKind;

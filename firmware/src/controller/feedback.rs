@@ -2,7 +2,7 @@
 
 use nalgebra::SVector;
 
-use super::state::{Estimate, from_frame};
+use super::state::{Added, Estimate, from_frame};
 use super::{Controller, D, State};
 use crate::inputs::sample::Measurement;
 use crate::limits::Limits;
@@ -29,10 +29,8 @@ pub(super) struct Setting<'t, T: Scalar> {
 /// What the feedback of a tick comes to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fed<T: Scalar> {
-    /// What it adds to the feed-forward now, length.
-    pub(super) now: SVector<T, D>,
-    /// The same at the last sample that it used, length.
-    pub(super) at_sample: SVector<T, D>,
+    /// What it adds to the feed-forward.
+    pub(super) added: Added<T>,
     /// A correction that acts, for the monitors.
     pub(super) correction: Option<Correction>,
 }
@@ -51,9 +49,9 @@ impl<T: Scalar> Controller<'_, T> {
     pub(super) fn integrate(&self, state: &State<T>, sample: Option<Measurement>, setting: &Setting<'_, T>) -> Fed<T> {
         let runtime = &self.runtime;
         let Setting { location, feed_forward, previous, limits, .. } = setting;
-        let integral = state.integral.unwrap_or(previous - feed_forward);
+        let integral = state.added.map_or(previous - feed_forward, |added| added.at_sample);
         let Some(sample) = sample else {
-            return Fed { now: integral, at_sample: integral, correction: None };
+            return Fed { added: Added { now: integral, at_sample: integral }, correction: None };
         };
         let n = &self.table.orthogonal;
         let error = n.dot(&from_frame(&sample.values));
@@ -68,11 +66,11 @@ impl<T: Scalar> Controller<'_, T> {
         let taken = (corrected - integral).dot(&correction);
         let acted = taken > correction.norm_squared() * T::of(0.5);
         let correction = Correction { error: error.to_f64(), size: change.abs().to_f64() };
-        Fed { now: corrected, at_sample: corrected, correction: acted.then_some(correction) }
+        Fed { added: Added { now: corrected, at_sample: corrected }, correction: acted.then_some(correction) }
     }
 
-    /// As much as the observer believes that the table leaves. What it knows is changed where it is: a copy would be a
-    /// tenth of a microcontroller's stack.
+    /// As much as the observer believes that the table leaves, at every tick: the needle goes on between two samples, and a
+    /// breath turns. What the observer knows is changed where it is: a copy would be a tenth of a microcontroller's stack.
     pub(super) fn observe(
         &self,
         state: &mut State<T>,
@@ -81,50 +79,42 @@ impl<T: Scalar> Controller<'_, T> {
     ) -> Fed<T> {
         let Setting { time_ns, location, feed_forward, previous, limits } = setting;
         let n = &self.table.orthogonal;
+        let jacobian = location.jacobian();
         // Whoever placed the paddle beside its path had a reason: so much is left there.
-        let before = state.integral.unwrap_or(previous - feed_forward);
+        let before = state.added.map_or(previous - feed_forward, |added| added.at_sample);
         let estimate = state.estimate.get_or_insert_with(|| {
-            let level = -n.dot(&(location.jacobian() * before));
+            let level = -n.dot(&(jacobian * before));
             self.first_estimate(level, location.depth, *time_ns)
         });
-        let mut now = before + estimate.drift * (location.depth - estimate.depth);
-        if estimate.observer.predicts_breaths() {
-            now += estimate.breath * T::of(seconds(time_ns.saturating_sub(estimate.since_ns)));
-        }
         let then = sample.and_then(|sample| state.history.at(sample.time_ns));
         let measured = then.and_then(|then| Some((then, self.table.locate(then.depth)?)));
-        let (Some(sample), Some((then, measured))) = (sample, measured) else {
-            return Fed { now, at_sample: before, correction: None };
-        };
+        let mut seen = None;
+        if let (Some(sample), Some((then, measured))) = (sample, measured) {
+            let error = n.dot(&from_frame(&sample.values));
+            let by_paddle = n.dot(&(measured.jacobian() * (then.paddle - measured.paddle_path())));
+            let elapsed = T::of(seconds(sample.time_ns.saturating_sub(estimate.time_ns)));
+            estimate.observer.update(&self.runtime.belief, error - by_paddle, measured.depth, elapsed);
+            estimate.time_ns = sample.time_ns;
+            seen = Some(error);
+        }
 
-        let error = n.dot(&from_frame(&sample.values));
-        let by_paddle = n.dot(&(measured.jacobian() * (then.paddle - measured.paddle_path())));
-        let elapsed = T::of(seconds(sample.time_ns.saturating_sub(estimate.time_ns)));
-        estimate.observer.update(&self.runtime.belief, error - by_paddle, measured.depth, elapsed);
-
-        // Changed along d alone: where the paddle was placed across it, it stays.
-        let jacobian = location.jacobian();
-        let direction = self.runtime.direction.solve(&jacobian, n);
         let acts_ns = time_ns.saturating_add(self.runtime.actuator_delay_ns);
-        let (breath, rate) = estimate.observer.ahead(T::of(seconds(acts_ns.saturating_sub(sample.time_ns))));
-        let change = -(estimate.observer.at(location.depth) + breath + n.dot(&(jacobian * now)));
-        let corrected = now + direction * change;
-        estimate.time_ns = sample.time_ns;
-        estimate.depth = location.depth;
-        estimate.drift = -direction * estimate.observer.slope();
-        (estimate.since_ns, estimate.breath) = (*time_ns, -direction * rate);
+        let breath = estimate.observer.ahead(T::of(seconds(acts_ns.saturating_sub(estimate.time_ns))));
+        let change = -(estimate.observer.at(location.depth) + breath + n.dot(&(jacobian * before)));
+        // Changed along d alone: where the paddle was placed across it, it stays.
+        let now = before + self.runtime.direction.solve(&jacobian, n) * change;
+        let Some(error) = seen else {
+            return Fed { added: Added { now, at_sample: before }, correction: None };
+        };
         // A correction that saturation swallows proves nothing about the sign of the plant.
-        let setpoint = feed_forward + corrected;
+        let setpoint = feed_forward + now;
         let acted = limits.clamp_position(&setpoint) == setpoint;
         let correction = Correction { error: error.to_f64(), size: change.abs().to_f64() };
-        let correction = acted.then_some(correction);
-        Fed { now: corrected, at_sample: corrected, correction }
+        Fed { added: Added { now, at_sample: now }, correction: acted.then_some(correction) }
     }
 
     fn first_estimate(&self, level: T, depth: T, time_ns: u64) -> Estimate<T> {
         let surface = T::of(self.runtime.table_depth.0);
-        let observer = Observer::starting(&self.runtime.belief, level, depth, surface);
-        let drift = SVector::zeros();
-        Estimate { observer, time_ns, depth, drift, since_ns: time_ns, breath: drift }
+        Estimate { observer: Observer::starting(&self.runtime.belief, level, depth, surface), time_ns }
     }
 }

@@ -59,7 +59,7 @@ impl<T: Scalar> Controller<'_, T> {
             faults.set_if(Faults::DIVERGENCE, diverges);
         }
 
-        let limited = limits.command(&previous, &(feed_forward + feedback.now));
+        let limited = limits.command(&previous, &(feed_forward + feedback.added.now));
         if !to_frame(&limited.displacement).iter().all(|component| component.is_finite()) {
             *faults |= Faults::INTERNAL;
             return;
@@ -72,8 +72,7 @@ impl<T: Scalar> Controller<'_, T> {
         }
         let [x, y] = &mut state.gate.travel.paddle;
         (*x, *y) = (*x + step.x.abs().to_f64(), *y + step.y.abs().to_f64());
-        state.integral = Some(feedback.at_sample);
-        state.added = Some(feedback.now);
+        state.added = Some(feedback.added);
         state.displacement = Some(limited.displacement);
     }
 

@@ -28,10 +28,8 @@ pub struct State<T: Scalar> {
     pub(super) armed: bool,
     /// Last displacement commanded; `None` until the measured position has been adopted.
     pub(super) displacement: Option<SVector<T, D>>,
-    /// What the feedback adds, at the last sample that it used; `None` until the first tick in RUN makes it continue from the adopted position.
-    pub(super) integral: Option<SVector<T, D>>,
-    /// What the feedback adds at the last tick in RUN.
-    pub(super) added: Option<SVector<T, D>>,
+    /// What the feedback adds; `None` until the first tick in RUN makes it continue from the adopted position.
+    pub(super) added: Option<Added<T>>,
     /// What the observer knows; `None` until the first tick in RUN, and without one.
     pub(super) estimate: Option<Estimate<T>>,
     /// Where needle and paddle were.
@@ -75,18 +73,18 @@ impl<T: Scalar> State<T> {
 
     /// What the feedback adds to the feed-forward since the last sample that it used, length; `None` before RUN.
     pub fn integral(&self) -> Option<[f64; 2]> {
-        self.integral.as_ref().map(to_frame)
+        self.added.map(|added| to_frame(&added.at_sample))
     }
 
     /// What the feedback added to the feed-forward at the last tick in RUN, length: the depth may have changed it since the
     /// last sample. `None` before RUN.
     pub fn added(&self) -> Option<[f64; 2]> {
-        self.added.as_ref().map(to_frame)
+        self.added.map(|added| to_frame(&added.now))
     }
 
     /// The paddle's position is no longer known.
     pub(super) fn forget_position(&mut self) {
-        (self.displacement, self.integral, self.added, self.estimate) = (None, None, None, None);
+        (self.displacement, self.added, self.estimate) = (None, None, None);
         self.rest = RestMonitor::default();
     }
 
@@ -106,20 +104,21 @@ impl<T: Scalar> State<T> {
     }
 }
 
-/// What the observer knows, and what it asks of the paddle between two samples.
+/// What the feedback adds to the feed-forward, length.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Added<T: Scalar> {
+    /// At the last tick in RUN.
+    pub(super) now: SVector<T, D>,
+    /// At the last sample that it used.
+    pub(super) at_sample: SVector<T, D>,
+}
+
+/// What the observer knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Estimate<T: Scalar> {
     pub(super) observer: Observer<T>,
     /// Time of the last sample, ns.
     pub(super) time_ns: u64,
-    /// Where the integral holds, length.
-    pub(super) depth: T,
-    /// d(what the feedback adds)/d(depth).
-    pub(super) drift: SVector<T, D>,
-    /// When the integral was computed, ns.
-    pub(super) since_ns: u64,
-    /// d(what the feedback adds)/dt, 1/s: a breath's.
-    pub(super) breath: SVector<T, D>,
 }
 
 /// A motion at full rate: longer than the delay that the gain was chosen for knows of.

@@ -54,7 +54,7 @@ impl<'r, T: Scalar> Checks<'r, T> {
         // What the needle says about its speed holds for the whole gap; what it might have done besides only for as
         // long as a gap is no fault: a wrong unit must not become plausible by being refused long enough.
         let speed = previous_velocity.abs().max(velocity.abs());
-        let unseen = elapsed.min(seconds(runtime.needle_age.hold_ns));
+        let unseen = elapsed.min(runtime.needle_gap);
         let plausible = NEEDLE_JUMP_MARGIN * (speed * elapsed + runtime.needle_speed * unseen)
             + NEEDLE_JUMP_FLOOR * runtime.depth_range();
         if (depth - previous_depth).abs() > plausible {

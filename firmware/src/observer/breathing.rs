@@ -14,8 +14,8 @@
 
 use super::{Belief, left_of};
 use crate::detection::{
-    BREATH_CHANGE, BREATH_LEARNS, BREATH_SIGMAS, BREATH_SMOOTHING, BREATH_WANDER, BREATHS_MISSED, LONGEST_BREATH,
-    SHORTEST_BREATH,
+    BREATH_CHANGE, BREATH_GAP, BREATH_LEARNS, BREATH_SIGMAS, BREATH_SMOOTHING, BREATH_WANDER, BREATHS_MISSED,
+    LONGEST_BREATH, SHORTEST_BREATH,
 };
 use crate::scalar::Scalar;
 
@@ -57,18 +57,21 @@ struct Turn<T> {
 }
 
 impl<T: Scalar> Turn<T> {
-    /// By `angle` (rad), to its third power over 192: a rotation for any angle, without a sine. Half a second without the
-    /// sensor is a radian of a fast breath.
+    /// By `angle`, rad: a rotation whatever the angle is, to 8e-6 up to half a turn either way and 6e-8 up to a quarter.
+    ///
+    /// Padé's approximation of the tangent of an eighth, tan y ≈ y·(15 − y²)/(15 − 6y²), is the half of a quarter of it; what
+    /// is more than half a turn is taken off before, because a sensor may be away for several breaths.
     fn by(angle: T) -> Self {
-        Self::roughly_by(T::of(0.25) * angle).twice().twice()
-    }
-
-    /// To its third power over twelve.
-    fn roughly_by(angle: T) -> Self {
-        let half = T::of(0.5) * angle;
-        let squared = half * half;
-        let scale = T::one() / (T::one() + squared);
-        Self { cos: (T::one() - squared) * scale, sin: (half + half) * scale }
+        let turns = angle * T::of(core::f64::consts::FRAC_1_PI * 0.5);
+        let angle = if turns.abs() > T::of(0.5) { (turns - turns.round()) * T::two_pi() } else { angle };
+        let eighth = T::of(0.125) * angle;
+        let squared = eighth * eighth;
+        let opposite = eighth * (T::of(15.0) - squared);
+        let adjacent = T::of(15.0) - T::of(6.0) * squared;
+        let (square, other) = (adjacent * adjacent, opposite * opposite);
+        let scale = T::one() / (square + other);
+        let product = adjacent * opposite;
+        Self { cos: (square - other) * scale, sin: (product + product) * scale }.twice().twice()
     }
 
     fn twice(self) -> Self {
@@ -110,6 +113,8 @@ struct Swing<T: Scalar> {
     bottom: Option<T>,
     /// Since it last rose through the middle, s.
     since_rise: Option<T>,
+    /// Whether the sensor was away meanwhile: a rise may have been missed.
+    has_gap: bool,
 }
 
 /// A rise through the middle.
@@ -124,13 +129,20 @@ struct Rise<T> {
 
 impl<T: Scalar> Swing<T> {
     fn watch(&mut self, belief: &BreathBelief<T>, measured: T, elapsed: T) -> Option<Rise<T>> {
-        let before = self.smooth.unwrap_or(measured);
-        let now = before + belief.share * (measured - before);
         if self.smooth.is_none() {
-            self.extreme = now;
+            self.extreme = measured;
         }
+        let mut before = self.smooth.unwrap_or(measured);
+        if elapsed > T::of(BREATH_GAP * SHORTEST_BREATH) {
+            // What was smoothed is gone, and the time until the next rise will be no period.
+            before = measured;
+            self.has_gap = true;
+            self.since_rise = self.since_rise.map(|_| T::zero());
+        } else {
+            self.since_rise = self.since_rise.map(|since| since + elapsed);
+        }
+        let now = before + belief.share * (measured - before);
         self.smooth = Some(now);
-        self.since_rise = self.since_rise.map(|since| since + elapsed);
         match self.rises {
             Some(true) if now > self.extreme => self.extreme = now,
             Some(false) if now < self.extreme => self.extreme = now,
@@ -149,7 +161,9 @@ impl<T: Scalar> Swing<T> {
         let middle = self.bottom? + T::of(0.5) * swing;
         if self.rises == Some(true) && before < middle && middle <= now && swing > T::of(STEPS_PER_SWING) * belief.step
         {
-            return Some(Rise { period: self.since_rise.replace(T::zero()), middle, swing });
+            let since = self.since_rise.replace(T::zero());
+            let period = if core::mem::take(&mut self.has_gap) { None } else { since };
+            return Some(Rise { period, middle, swing });
         }
         None
     }
@@ -161,6 +175,8 @@ pub(super) struct Breathing<T: Scalar> {
     swing: Swing<T>,
     /// 2π over the period, rad/s, and the waves; none until a breath has been seen.
     waves: Option<Waves<T>>,
+    /// The last breath took another time than those before: once is a pause, twice is another period.
+    doubted: bool,
 }
 
 /// Both waves, and what is known of them.
@@ -324,10 +340,10 @@ impl<T: Scalar> Waves<T> {
         self.second_beside = less_between(self.second_beside, second, line);
     }
 
-    fn ahead(&self, seconds: T) -> (T, T) {
+    fn ahead(&self, seconds: T) -> T {
         let turn = Turn::by(self.rate * seconds);
-        let ([first, first_later], [second, second_later]) = (turn.pair(self.first), turn.twice().pair(self.second));
-        (first + second, self.rate * (first_later + second_later + second_later))
+        let ([first, _], [second, _]) = (turn.pair(self.first), turn.twice().pair(self.second));
+        first + second
     }
 }
 
@@ -369,9 +385,9 @@ impl<T: Scalar> Breathing<T> {
         self.waves.as_ref().map_or((T::zero(), T::zero()), |waves| (waves.now(), waves.variance()))
     }
 
-    /// Displacement and its rate in so many seconds, length and length/s.
-    pub(super) fn ahead(&self, seconds: T) -> (T, T) {
-        self.waves.as_ref().map_or((T::zero(), T::zero()), |waves| waves.ahead(seconds))
+    /// Displacement in so many seconds, length.
+    pub(super) fn ahead(&self, seconds: T) -> T {
+        self.waves.as_ref().map_or(T::zero(), |waves| waves.ahead(seconds))
     }
 
     /// Looks for breaths.
@@ -385,13 +401,17 @@ impl<T: Scalar> Breathing<T> {
                 self.waves = Some(Waves::beginning(period, swing));
                 News::Begins { middle, swing }
             }
-            (Some(waves), Some((period, middle, swing))) => {
+            (Some(waves), Some((period, _, swing))) => {
                 let rate = T::two_pi() / period;
-                if (rate - waves.rate).abs() > T::of(BREATH_CHANGE) * waves.rate {
+                if (rate - waves.rate).abs() <= T::of(BREATH_CHANGE) * waves.rate {
+                    waves.rate += T::of(BREATH_LEARNS) * (rate - waves.rate);
+                    self.doubted = false;
+                } else {
+                    // The phase is known either way.
+                    let period = if self.doubted { period } else { T::two_pi() / waves.rate };
                     *waves = Waves::beginning(period, swing);
-                    return News::Begins { middle, swing };
+                    self.doubted = !self.doubted;
                 }
-                waves.rate += T::of(BREATH_LEARNS) * (rate - waves.rate);
                 News::Nothing
             }
             (Some(waves), None) => {
@@ -400,7 +420,8 @@ impl<T: Scalar> Breathing<T> {
                     return News::Nothing;
                 }
                 let left = waves.now();
-                self.waves = None;
+                // Until it rises again is a pause and no period.
+                (self.waves, self.doubted, self.swing.since_rise) = (None, false, None);
                 News::Ends { left }
             }
             (None, None) => News::Nothing,
@@ -474,7 +495,7 @@ mod tests {
             let time_s = f64::from(k) * ULTRASOUND_S;
             observer.update(belief, target(time_s) + belief.noise.sqrt() * noise.next(), 0.0, ULTRASOUND_S);
             if time_s > 0.5 * seconds {
-                let off = observer.at(0.0) + observer.ahead(ahead_s).0 - target(time_s + ahead_s);
+                let off = observer.at(0.0) + observer.ahead(ahead_s) - target(time_s + ahead_s);
                 (squares, counted) = (squares + off * off, counted + 1.0);
             }
         }
@@ -483,13 +504,14 @@ mod tests {
 
     #[test]
     fn a_turn_is_a_rotation_by_its_angle() {
-        for angle in [1e-3_f64, 0.05, 0.1, 0.3, 1.0, 7.0] {
+        for k in -400..=400 {
+            let angle = 0.05 * f64::from(k);
             let [now, later] = Turn::by(angle).pair([0.6, 0.8]);
             assert!((now.hypot(later) - 1.0).abs() < 1e-14, "{angle}");
-            if angle < 2.0 {
-                let exact = 0.6 * angle.cos() + 0.8 * angle.sin();
-                assert!((now - exact).abs() < angle.powi(3) / 192.0 + 1e-15, "{angle}: {now} {exact}");
-            }
+            let exact = 0.6 * angle.cos() + 0.8 * angle.sin();
+            let within_a_turn = (angle / TAU - (angle / TAU).round()).abs() * TAU;
+            let bound = if within_a_turn < PI / 2.0 { 6e-8 } else { 8e-6 };
+            assert!((now - exact).abs() < bound, "{angle}: {now} {exact}");
         }
     }
 
@@ -629,26 +651,95 @@ mod tests {
     /// Deeper and quicker breaths are taken up.
     #[test]
     fn a_breath_that_changes_is_followed() {
-        let changes = |time_s: f64| if time_s < 20.0 { lujan(2.0, 5.0, time_s) } else { lujan(4.0, 4.0, time_s) };
-        let left = foretold(&belief(0.1), 80.0, 0.1, &changes);
-        assert!(left < 0.25, "{left}");
+        for (before_s, after_s) in [(5.0, 4.0), (6.0, 3.5), (3.0, 6.0), (2.0, 4.0)] {
+            let changes =
+                |time_s: f64| if time_s < 20.0 { lujan(2.0, before_s, time_s) } else { lujan(4.0, after_s, time_s) };
+            let left = foretold(&belief(0.1), 80.0, 0.1, &changes);
+            assert!(left < 0.25, "{before_s} s and then {after_s} s: {left}");
+        }
     }
 
-    /// The loop of estimate and paddle whose true effect is λ times the assumed one. Root mean square of the last breaths.
-    fn held(lambda: f64, delay: usize, noise: f64) -> f64 {
+    /// A camera that loses the target for a while: the breath goes on meanwhile, and nothing is learnt from the time between
+    /// the two rises that were seen.
+    #[test]
+    fn a_breath_goes_on_while_the_sensor_is_away() {
+        let scenes = [2.0, 4.0, 5.5].map(|period_s| [40.0, 41.1, 42.2, 43.3].map(|from_s| (period_s, from_s)));
+        for (period_s, from_s) in scenes.into_iter().flatten() {
+            for away_s in [0.5, 1.0, 2.0, 3.1, 6.0, 9.0] {
+                let scene = || std::format!("{period_s} s, away for {away_s} s at {from_s} s");
+                let breath = |time_s: f64| lujan(3.0, period_s, time_s);
+                let belief = belief(0.1);
+                let mut observer = having_seen(&belief, from_s, breath, 3);
+                let from_s = (from_s / ULTRASOUND_S).floor() * ULTRASOUND_S - ULTRASOUND_S;
+                let exact = breath(from_s + away_s);
+                let foretold = observer.at(0.0) + observer.ahead(away_s);
+                // The period is known to some hundredths, and the whole breath is 3.
+                let bound = 0.25 + 0.04 * 3.0 * TAU * away_s / period_s;
+                assert!((foretold - exact).abs() < bound, "{}: {foretold} {exact}", scene());
+                let mut noise = Noise(9);
+                let mut worst = 0.0f64;
+                for k in 0..450u32 {
+                    let time_s = from_s + away_s + f64::from(k) * ULTRASOUND_S;
+                    let elapsed = if k == 0 { away_s } else { ULTRASOUND_S };
+                    observer.update(&belief, breath(time_s) + 0.1 * noise.next(), 0.0, elapsed);
+                    let rate = observer.breathing.waves.expect("it is still foretold").rate;
+                    assert!((rate * period_s / TAU - 1.0).abs() < 0.06, "{}: {rate}", scene());
+                    let off = observer.at(0.0) + observer.ahead(0.1) - breath(time_s + 0.1);
+                    worst = if k < 15 { worst } else { worst.max(off.abs()) };
+                }
+                assert!(worst < 0.6, "{}: {worst}", scene());
+            }
+        }
+    }
+
+    /// A patient who holds the breath: what is predicted before and after has the patient's period, and the pause is none.
+    #[test]
+    fn a_pause_is_no_period() {
+        let period_s = 4.0;
+        for (held_s, ends) in [(1.4, false), (1.8, false), (4.0, true), (7.0, true), (15.0, true)] {
+            for at_s in [40.0, 41.0, 42.0] {
+                // Time within the breath, which stands still for a while.
+                let target = |time_s: f64| lujan(3.0, period_s, (time_s - held_s).max(time_s.min(at_s)));
+                let belief = belief(0.1);
+                let mut noise = Noise(3);
+                let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+                let (mut ended, mut worst) = (false, 0.0f64);
+                for k in 0..(80.0 / ULTRASOUND_S) as u32 {
+                    let time_s = f64::from(k) * ULTRASOUND_S;
+                    observer.update(&belief, target(time_s) + 0.1 * noise.next(), 0.0, ULTRASOUND_S);
+                    ended |= time_s > 20.0 && !observer.predicts_breaths();
+                    if let Some(waves) = observer.breathing.waves {
+                        let wrong = (waves.rate * period_s / TAU - 1.0).abs();
+                        assert!(wrong < 0.1, "held for {held_s} s at {at_s} s: {wrong} at {time_s} s");
+                    }
+                    let off = observer.at(0.0) + observer.ahead(0.1) - target(time_s + 0.1);
+                    worst = if time_s < at_s + held_s + 3.0 * period_s { worst } else { worst.max(off.abs()) };
+                }
+                assert!(observer.predicts_breaths() && worst < 0.5, "held for {held_s} s at {at_s} s: {worst}");
+                assert_eq!(ended, ends, "held for {held_s} s at {at_s} s");
+            }
+        }
+    }
+
+    /// The loop of estimate and paddle whose true effect is λ times the assumed one, with a breath that the observer
+    /// expects, of this period, and a needle that goes on in time. Root mean square of the last breaths.
+    fn held<T: Scalar>(lambda: f64, delay: usize, period_s: f64, speed: f64) -> f64 {
         let gain = crate::loop_stability::default_gain(delay as u32, 1.3);
-        let belief = Belief::<f64>::new(noise, 0.2, 12.0, 10.0, gain).with_breathing(ULTRASOUND_S);
+        let belief = Belief::<T>::new(0.1, 0.2, 12.0, 10.0, gain).with_breathing(ULTRASOUND_S);
         let mut random = Noise(11);
-        let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
+        let mut observer = Observer::starting(&belief, T::ZERO, T::ZERO, T::ZERO);
         let mut shown = std::collections::VecDeque::from(std::vec![0.0; delay + 1]);
         let (mut squares, mut counted) = (0.0, 0.0);
         for k in 0..6000 {
             let time_s = f64::from(k) * ULTRASOUND_S;
+            // In, and out again: a table is not without an end.
+            let at = |time_s: f64| speed * (25.0 - ((time_s + 25.0) % 50.0 - 25.0).abs());
             let applied = shown.pop_front().unwrap();
-            let error = lujan(3.0, 4.0, time_s) - lambda * applied;
-            observer.update(&belief, error + applied + noise * random.next(), 0.0, ULTRASOUND_S);
+            let error = lujan(3.0, period_s, time_s) + 0.1 * at(time_s) - lambda * applied;
+            let measured = T::of(error + applied + 0.1 * random.next());
+            observer.update(&belief, measured, T::of(at(time_s)), T::of(ULTRASOUND_S));
             let ahead_s = (delay + 1) as f64 * ULTRASOUND_S;
-            shown.push_back(observer.at(0.0) + observer.ahead(ahead_s).0);
+            shown.push_back((observer.at(T::of(at(time_s + ahead_s))) + observer.ahead(T::of(ahead_s))).to_f64());
             if k > 3000 {
                 (squares, counted) = (squares + error * error, counted + 1.0);
             }
@@ -659,10 +750,16 @@ mod tests {
     /// Tissue that the table is wrong about does not make the prediction swing.
     #[test]
     fn the_loop_stays_stable_with_other_tissue() {
-        for delay in [1, 3, 5] {
-            for lambda in [0.5, 0.8, 1.0, 1.3, 1.6] {
-                let left = held(lambda, delay, 0.1);
-                assert!(left < 0.35, "delay {delay}, λ {lambda}: {left}");
+        for period_s in [4.0, 2.0, 1.7] {
+            for delay in [1, 3, 5] {
+                for lambda in [0.5, 0.8, 1.0, 1.3, 1.6] {
+                    for speed in [0.0, 0.3] {
+                        let double = held::<f64>(lambda, delay, period_s, speed);
+                        let single = held::<f32>(lambda, delay, period_s, speed);
+                        let scene = || std::format!("{period_s} s, delay {delay}, λ {lambda}, speed {speed}");
+                        assert!(double < 0.25 && single < 0.25, "{}: {double} {single}", scene());
+                    }
+                }
             }
         }
     }
@@ -684,8 +781,7 @@ mod tests {
                 observer.update(&belief, measured, 0.0, elapsed);
                 let variances = observer.breathing.waves.map(|waves| [waves.of_first, waves.of_second]);
                 prop_assert!(variances.iter().flatten().all(|[a, both, b]| *a >= 0.0 && *b >= 0.0 && both * both <= 1.0001 * a * b), "{observer:?}");
-                let (displacement, rate) = observer.ahead(0.1);
-                prop_assert!(displacement.is_finite() && rate.is_finite() && observer.at(0.0).is_finite());
+                prop_assert!(observer.ahead(0.1).is_finite() && observer.at(0.0).is_finite());
             }
         }
 
@@ -703,7 +799,12 @@ mod tests {
             for (measured, depth, elapsed) in samples {
                 observer.update(&belief, measured, depth, elapsed);
                 prop_assert!(observer.level_variance >= 0.0 && observer.slope_variance >= 0.0, "{observer:?}");
-                prop_assert!(observer.at(6.0).is_finite() && observer.ahead(0.1).0.is_finite(), "{observer:?}");
+                prop_assert!(observer.at(6.0).is_finite() && observer.ahead(0.1).is_finite(), "{observer:?}");
+                prop_assert!(observer.surprise.is_finite() && observer.surprise_variance.is_finite(), "{observer:?}");
+                let waves = observer.breathing.waves.map(|waves| [waves.of_first, waves.of_second]);
+                // Within rounding of the larger one.
+                let some = |[a, both, b]: Variance<f32>| a >= 0.0 && b >= 0.0 && both * both <= a * b + 1e-5 * a.max(b).powi(2);
+                prop_assert!(waves.iter().flatten().all(|block| some(*block)), "{observer:?}");
             }
         }
 
@@ -717,7 +818,7 @@ mod tests {
                 for k in 0..600 {
                     observer.update(&belief, unit * lujan(3.0, 4.0, f64::from(k) * ULTRASOUND_S), 0.0, ULTRASOUND_S);
                 }
-                observer.ahead(0.1).0 / unit
+                observer.ahead(0.1) / unit
             };
             prop_assert!((seen(unit) - seen(1.0)).abs() < 1e-9);
         }

@@ -90,7 +90,7 @@ impl<T: Scalar> Belief<T> {
 /// }
 /// assert!((observer.at(0.1) - 1.0).abs() < 0.2);
 /// // At rest nothing changes with time.
-/// assert_eq!(observer.ahead(0.1), (0.0, 0.0));
+/// assert_eq!(observer.ahead(0.1), 0.0);
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Observer<T: Scalar> {
@@ -165,8 +165,8 @@ impl<T: Scalar> Observer<T> {
         self.slope
     }
 
-    /// What a breath adds to the estimate in so many seconds, and its rate, length and length/s.
-    pub fn ahead(&self, seconds: T) -> (T, T) {
+    /// What a breath adds to the estimate so many seconds after the last sample, length.
+    pub fn ahead(&self, seconds: T) -> T {
         self.breathing.ahead(seconds)
     }
 

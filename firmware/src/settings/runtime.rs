@@ -6,6 +6,7 @@ use crate::detection::{
     DEPTH_MARGIN, FOLLOWING_FRACTION, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN, RESOLUTION_PER_FOLLOWING_ERROR,
     SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
 };
+use crate::inputs::monitors::InnovationGate;
 use crate::law::{Direction, Feedback};
 use crate::limits::Limits;
 use crate::loop_stability;
@@ -40,6 +41,8 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) target_period: f64,
     pub(crate) target_noise: f64,
     pub(crate) needle_age: AgeLimits,
+    /// From which age of the needle's samples on it holds, s.
+    pub(crate) needle_gap: f64,
     pub(crate) target_age: AgeLimits,
     pub(crate) paddle_age: AgeLimits,
     /// Depths that the table covers.
@@ -51,6 +54,8 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) plausible_speed: f64,
     /// Largest plausible target displacement, length.
     pub(crate) target_range: f64,
+    /// How far two samples of the target may be apart without any motion, length.
+    pub(crate) target_jump: f64,
     /// Largest plausible measured paddle displacement, length.
     pub(crate) paddle_range: f64,
     /// Largest |d(target displacement)/d(depth)|, with or without paddle motion.
@@ -127,6 +132,7 @@ impl<T: Scalar> Runtime<T> {
             target_period: seconds(settings.target_period_ns),
             target_noise: noise,
             needle_age: loop_age,
+            needle_gap: seconds(loop_age.hold_ns),
             target_age,
             paddle_age: loop_age,
             table_depth: (start, end),
@@ -134,6 +140,7 @@ impl<T: Scalar> Runtime<T> {
             needle_speed: table.validity.needle_speed.to_f64(),
             plausible_speed: NEEDLE_SPEED_MARGIN * table.validity.needle_speed.to_f64(),
             target_range,
+            target_jump: InnovationGate::floor(noise, target_range),
             paddle_range: PADDLE_MARGIN * max_displacement,
             target_slope: bounds.target_slope,
             jacobian_norm: bounds.jacobian_norm,

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::controller::feedback::Setting;
-use crate::controller::state::Underway;
+use crate::controller::state::{Added, Underway};
 use crate::inputs::sample::Measurement;
 use crate::law::Feedback;
 
@@ -144,7 +144,8 @@ fn monitors_hear_of_corrections_that_act_by_more_than_half() {
     let sample = Measurement { sequence: 0, time_ns: 0, values: [error, 0.0] };
     for (room, heard) in [(2.0, true), (0.6, true), (0.4, false), (0.0, false)] {
         let previous = correction.normalize() * 0.05 - correction * room;
-        let state = State { integral: Some(previous), ..State::new() };
+        let added = Some(Added { now: previous, at_sample: previous });
+        let state = State { added, ..State::new() };
         let setting = Setting {
             time_ns: 0,
             location: table.locate(0.0).unwrap(),
@@ -349,4 +350,22 @@ fn the_observer_bears_an_effect_that_is_not_the_table_s() {
             assert!(left < 1e-6, "effect {scale}, gain {actuator_gain}: {left}");
         }
     }
+}
+
+/// A slow sensor of a patient who breathes fast: between two samples the paddle goes the breath's way, and not straight on.
+#[test]
+fn between_samples_a_breath_turns() {
+    let table = table();
+    let slow = Settings { target_period_ns: 200 * MS, feedback: Feedback::Harmonic, target_noise: 2e-4, ..settings() };
+    let mut closed = Loop::new(&table, &slow);
+    closed.plant.target_period = 200;
+    closed.plant.speed = 0.0;
+    let mut worst = 0.0f64;
+    for tick in 0..60_000 {
+        closed.plant.offset = 2e-3 * (1.0 - (core::f64::consts::PI * f64::from(tick) / 2000.0).cos().powi(4));
+        closed.tick(|_| {});
+        worst = if tick < 40_000 { worst } else { worst.max(closed.plant.target().x.abs()) };
+    }
+    assert_eq!(closed.state.mode(), Mode::Run, "{}", closed.state.faults());
+    assert!(worst < 2e-5, "{worst} of 2e-3");
 }

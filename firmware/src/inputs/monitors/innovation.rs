@@ -52,6 +52,12 @@ impl InnovationGate {
         self.at_arrival.get(self.newest.wrapping_add(samples_ago) % GATE_HISTORY).copied().unwrap_or_default()
     }
 
+    /// What noise alone explains, length: 8σ√2 and a part of the target's range.
+    pub(crate) fn floor(target_noise: f64, target_range: f64) -> f64 {
+        let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * target_noise;
+        noise + target_range * if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR }
+    }
+
     /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + ‖J‖·paddle travel) + floor, where the travel reaches back
     /// to everything that can lie between the two measurements.
     pub(crate) fn check<T: Scalar>(
@@ -64,9 +70,7 @@ impl InnovationGate {
         let oldest = self.at_arrival(reach);
         let motion = runtime.target_slope * (self.travel.needle - oldest.needle)
             + runtime.jacobian_norm * self.travel.paddle_since(&oldest);
-        let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * runtime.target_noise;
-        let floor = if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR };
-        let gate = noise + GATE_MOTION * motion + floor * runtime.target_range;
+        let gate = GATE_MOTION * motion + runtime.target_jump;
         if are_within(current, previous, gate) { Ok(()) } else { Err(Discard::Innovation) }
     }
 }
