@@ -50,6 +50,25 @@ fn what_is_left_without_a_cause_is_what_a_run_without_it_leaves() {
     assert!(none < 0.5 * peak(&whole), "{none} of {}", peak(&whole));
 }
 
+fn bound(case: &serde_json::Value, of: &str) -> f64 {
+    case["causes"]["bound"][of]["rms"].as_f64().unwrap()
+}
+
+/// A sensor that is noisier tells less, one that is later as well; without noise only the delay is left, and where the
+/// table knows everything nothing is.
+#[test]
+fn no_controller_could_know_more_than_the_sensor_tells() {
+    let case = |more: &str| case(&format!("--scene breast --plant reduced --causes {more}"));
+    let whole = case("--table-tissue homogeneous");
+    let rms = whole["causes"]["whole"]["rms"].as_f64().unwrap();
+    assert!(bound(&whole, "sensor") < rms && bound(&whole, "delay") < 0.2 * bound(&whole, "sensor"));
+    assert!(bound(&case("--table-tissue homogeneous --noise 2"), "sensor") > 1.2 * bound(&whole, "sensor"));
+    assert!(bound(&case("--table-tissue homogeneous --latency 200"), "delay") > 2.0 * bound(&whole, "delay"));
+    let slow = whole["causes"]["bound"]["paddle"].as_f64().unwrap();
+    assert_eq!(slow, 0.0, "a paddle at its own rate is fast enough");
+    assert_eq!(bound(&case(""), "sensor"), 0.0);
+}
+
 #[test]
 fn a_patient_who_does_not_move_and_a_table_that_knows_are_no_causes() {
     let whole = case("--world creep,breathing --causes");

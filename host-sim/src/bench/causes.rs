@@ -13,8 +13,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use strum::VariantArray as _;
 
+use super::bound::{Bound, Seen, Unknown, least_error_at_rate};
 use super::error::SimError;
 use super::in_process::{Errors, InProcess};
+use crate::world::loop_settings::LoopSettings;
 use crate::world::simulation::Simulation;
 use crate::world::tissue::{AttachedPaddle, Reductions};
 
@@ -83,6 +85,8 @@ pub struct CausesResult {
     pub without: Vec<Without>,
     /// Error without any of them: what the controller itself leaves.
     pub without_all: Errors,
+    /// What any other controller would leave at least.
+    pub bound: Bound,
 }
 
 impl CausesResult {
@@ -116,6 +120,48 @@ impl Examined<'_> {
             whole: left(&[])?,
             without: without.collect::<Result<_, SimError>>()?,
             without_all: left(&present)?,
+            bound: self.bound(&present, knowing.as_ref())?,
+        })
+    }
+
+    /// What no causal controller with this table, sensor and paddle can leave less than. It does not know how large what the
+    /// table leaves is, cause by cause.
+    fn bound(&self, present: &[Cause], knowing: Option<&Table<f64, 2>>) -> Result<Bound, SimError> {
+        let Self { table, simulation, .. } = self;
+        let blind = |causes: &[Cause]| {
+            self.inserted(causes, knowing, |insertion, table| {
+                insertion.fed_forward().moments(AttachedPaddle::Steered(table))
+            })
+        };
+        let whole = blind(&[])?;
+        let unknown = present.iter().filter(|cause| matches!(cause, Cause::Table | Cause::Motion | Cause::Deflection));
+        let shapes = unknown.map(|cause| {
+            let without = blind(&[*cause])?;
+            Ok(whole.iter().zip(without).map(|(with, without)| with.error - without.error).collect())
+        });
+        let shapes = shapes.collect::<Result<Vec<Vec<f64>>, SimError>>()?;
+        let times_s: Vec<f64> = whole.iter().map(|moment| moment.since_start_s).collect();
+        let unknown = Unknown {
+            times_s: &times_s,
+            shapes: &shapes,
+            counts_from: whole.iter().position(|moment| moment.counts).unwrap_or(0),
+        };
+        let LoopSettings { target_rate, latency, quantisation, rate, .. } = simulation.loop_settings;
+        let rounding = quantisation * quantisation / 12.0;
+        let seen = Seen {
+            period_s: 1.0 / target_rate,
+            latency_s: 1e-3 * latency + simulation.actuator.delay_ticks as f64 / rate,
+            noise: (simulation.loop_settings.noise_for(simulation.depth).powi(2) + rounding).sqrt(),
+        };
+        let alone = self.inserted(&[], knowing, |insertion, _| insertion.moments(AttachedPaddle::None))?;
+        let pushed: Vec<f64> = alone.iter().map(|moment| moment.error).collect();
+        let times_alone: Vec<f64> = alone.iter().map(|moment| moment.since_start_s).collect();
+        let normal = self.model.scene().needle.orthogonal();
+        let effect = table.knots.iter().map(|knot| knot.jacobian.tr_mul(&normal).norm()).fold(0.0, f64::max);
+        Ok(Bound {
+            sensor: unknown.least_error(&seen),
+            delay: unknown.least_error(&Seen { noise: 0.0, ..seen }),
+            paddle: least_error_at_rate(&times_alone, &pushed, effect * simulation.actuator.max_rate),
         })
     }
 
@@ -142,6 +188,18 @@ impl Examined<'_> {
     }
 
     fn without(&self, causes: &[Cause], knowing: Option<&Table<f64, 2>>) -> Result<Errors, SimError> {
+        self.inserted(causes, knowing, |insertion, table| {
+            insertion.run(AttachedPaddle::Steered(table), false).map(|run| run.errors)
+        })
+    }
+
+    /// The insertion without some causes, and the table that it is steered by.
+    fn inserted<R>(
+        &self,
+        causes: &[Cause],
+        knowing: Option<&Table<f64, 2>>,
+        then: impl Fn(InProcess<'_>, &Table<f64, 2>) -> Result<R, SimError>,
+    ) -> Result<R, SimError> {
         let is_gone = |cause| causes.contains(&cause);
         let mut believed = self.simulation.clone();
         if is_gone(Cause::SensorDelay) {
@@ -161,8 +219,7 @@ impl Examined<'_> {
         }
         let table = knowing.filter(|_| is_gone(Cause::Table)).unwrap_or(self.table);
         let run = |model: &TissueModel, reductions: &Reductions| {
-            let insertion = InProcess::new(model, &simulation, reductions).set_for(&believed);
-            insertion.run(AttachedPaddle::Steered(table), false).map(|run| run.errors)
+            then(InProcess::new(model, &simulation, reductions).set_for(&believed), table)
         };
         if !is_gone(Cause::Motion) && !is_gone(Cause::Deflection) {
             return run(self.model, self.reductions);

@@ -1,7 +1,7 @@
 //! One insertion with the firmware's own controller in this process and in simulated time: what a lockstep run does, without
 //! its processes and its files.
 
-use firmware::{Controller, Mode, Settings, State};
+use firmware::{Controller, Feedback, Mode, Settings, State};
 use model_offline::model::TissueModel;
 use nalgebra::Vector2;
 use schemars::JsonSchema;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::error::SimError;
 use crate::world::World;
 use crate::world::simulation::Simulation;
-use crate::world::tissue::{AttachedPaddle, Reductions};
+use crate::world::tissue::{AttachedPaddle, Reductions, TissuePlant};
 
 /// Orthogonal error of one insertion, length.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,6 +32,22 @@ pub(super) struct Run {
     pub(super) tissue_error: Option<f64>,
 }
 
+/// A tick of an insertion.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    /// Time since the start of the needle, s; −1 before.
+    pub(super) since_start_s: f64,
+    /// Orthogonal displacement of the target, length.
+    pub(super) error: f64,
+    /// Whether the needle has set out, and has waited long enough.
+    pub(super) counts: bool,
+    /// Whether the controller is in RUN.
+    pub(super) in_run: bool,
+}
+
+/// As good as no gain: none is refused.
+const NO_GAIN: f64 = 1e-12;
+
 /// An insertion that is to be simulated.
 pub(super) struct InProcess<'a> {
     model: &'a TissueModel,
@@ -52,14 +68,61 @@ impl<'a> InProcess<'a> {
         Self { settings: believed.loop_settings.settings(believed.depth), ..self }
     }
 
+    /// The same with a controller that follows its table and does not look at the target.
+    pub(super) fn fed_forward(self) -> Self {
+        let settings = Settings { feedback: Feedback::Integral, loop_gain: Some(NO_GAIN), ..self.settings };
+        Self { settings, ..self }
+    }
+
     /// Simulates it: with a controller where the paddle is steered. The tissue is held against the full model where that
     /// is asked for.
     ///
     /// # Errors
     /// [`SimError`].
     pub(super) fn run(&self, paddle: AttachedPaddle<'_>, is_verified: bool) -> Result<Run, SimError> {
-        let Self { model, simulation, settings, reductions } = self;
-        let mut world = World::sharing(model, paddle, simulation, reductions)?;
+        let mut world = World::sharing(self.model, paddle, self.simulation, self.reductions)?;
+        let (mut peak, mut squares, mut ticks, mut in_run) = (0.0_f64, 0.0, 0_u64, 0_u64);
+        self.insert(&mut world, paddle, |moment| {
+            if moment.counts {
+                peak = peak.max(moment.error.abs());
+                squares += moment.error * moment.error;
+                ticks += 1;
+                in_run += u64::from(moment.in_run);
+            }
+        })?;
+        let account = is_verified.then(|| world.plant_account());
+        let estimate = world.tissue.largest_estimate();
+        Ok(Run {
+            errors: Errors { peak, rms: (squares / ticks.max(1) as f64).sqrt() },
+            run_share: in_run as f64 / ticks.max(1) as f64,
+            tissue_estimate: estimate.unwrap_or(0.0),
+            tissue_error: account.and_then(|account| account.extrapolation_error),
+        })
+    }
+
+    /// The way from the needle's start on.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub(super) fn moments(&self, paddle: AttachedPaddle<'_>) -> Result<Vec<Moment>, SimError> {
+        let mut world = World::sharing(self.model, paddle, self.simulation, self.reductions)?;
+        let mut moments = Vec::new();
+        self.insert(&mut world, paddle, |moment| {
+            if moment.since_start_s >= 0.0 {
+                moments.push(moment);
+            }
+        })?;
+        Ok(moments)
+    }
+
+    /// Goes through the insertion, tick by tick.
+    fn insert(
+        &self,
+        world: &mut World<TissuePlant<'_>>,
+        paddle: AttachedPaddle<'_>,
+        mut visit: impl FnMut(Moment),
+    ) -> Result<(), SimError> {
+        let Self { model, simulation, settings, .. } = self;
         let controller = match paddle {
             AttachedPaddle::Steered(table) => Some(Controller::new(table, settings)?),
             _ => None,
@@ -67,7 +130,6 @@ impl<'a> InProcess<'a> {
         let mut state = State::new();
         let mut command = None;
         let normal = model.scene().needle.orthogonal();
-        let (mut peak, mut squares, mut ticks, mut in_run) = (0.0_f64, 0.0, 0_u64, 0_u64);
         if controller.is_none() {
             world.start_needle(0);
         }
@@ -78,19 +140,13 @@ impl<'a> InProcess<'a> {
                 break;
             }
             command = controller.as_ref().map(|controller| controller.step(&mut state, &inputs));
-            if since_start_s >= 0.0 && since_start_s >= simulation.needle.wait_s() {
-                let error = normal.dot(&Vector2::from(truth.target));
-                (peak, squares, ticks) = (peak.max(error.abs()), squares + error * error, ticks + 1);
-                in_run += u64::from(command.as_ref().is_some_and(|command| command.state == Mode::Run as u32));
-            }
+            visit(Moment {
+                since_start_s,
+                error: normal.dot(&Vector2::from(truth.target)),
+                counts: since_start_s >= 0.0 && since_start_s >= simulation.needle.wait_s(),
+                in_run: command.as_ref().is_some_and(|command| command.state == Mode::Run as u32),
+            });
         }
-        let account = is_verified.then(|| world.plant_account());
-        let estimate = world.tissue.largest_estimate();
-        Ok(Run {
-            errors: Errors { peak, rms: (squares / ticks.max(1) as f64).sqrt() },
-            run_share: in_run as f64 / ticks.max(1) as f64,
-            tissue_estimate: estimate.unwrap_or(0.0),
-            tissue_error: account.and_then(|account| account.extrapolation_error),
-        })
+        Ok(())
     }
 }

@@ -1,6 +1,7 @@
 //! What is tried and measured: strategies and whole comparisons, faults, timing, stability, tables, boards.
 
 pub mod board;
+pub mod bound;
 pub mod causes;
 pub mod comparison;
 pub mod describe;

@@ -197,10 +197,10 @@ pub(super) fn cause_panel(run: &RunResult, case: &CaseResult) -> Option<Panel> {
     let causes = case.causes.as_ref()?;
     let mut names = vec!["nothing".to_owned()];
     names.extend(causes.without.iter().map(|without| without.cause.word().to_owned()));
-    names.push("all".to_owned());
+    names.extend(["all", "(bound)"].map(str::to_owned));
     let errors = || {
         let left = causes.without.iter().map(|without| &without.left);
-        std::iter::once(&causes.whole).chain(left).chain([&causes.without_all])
+        std::iter::once(&causes.whole).chain(left).chain([&causes.without_all, &causes.bound.sensor])
     };
     let title = causes.chief().map_or_else(
         || "Nothing but the controller leaves an error".to_owned(),
@@ -240,9 +240,16 @@ pub(super) fn cause_table(run: &RunResult, case: &CaseResult) -> Option<Markup> 
                 (row("nothing: as it is", &causes.whole))
                 @for without in &causes.without { (row(without.cause.title(), &without.left)) }
                 (row("all of these", &causes.without_all))
+                (row("bound: any controller, this sensor", &causes.bound.sensor))
+                (row("bound: any controller, a sensor as late without noise", &causes.bound.delay))
             }
         } }
-        p.quiet { "Causes do not add up: each row is the same insertion with one thing taken away." }
+        p.quiet {
+            "Causes do not add up: each row is the same insertion with one thing taken away. The bounds are what a controller would leave on "
+            "average that is told beforehand what the table does not know and how the patient moves, but not how much of it there is "
+            "(a standard normal factor each). The paddle's rate alone allows for "
+            (number(causes.bound.paddle, 3)) " " (unit) "."
+        }
     })
 }
 

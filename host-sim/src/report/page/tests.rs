@@ -1,6 +1,7 @@
 //! Every chart is there, every string escaped, every number finite.
 
 use super::*;
+use crate::bench::bound::Bound;
 use crate::bench::causes::{Cause, CausesResult, Without};
 use crate::bench::in_process::Errors;
 use crate::bench::result::*;
@@ -71,6 +72,7 @@ fn causes() -> CausesResult {
         whole: errors(4e-4),
         without: vec![Without { cause: Cause::SensorNoise, left: errors(1e-4) }],
         without_all: errors(1e-5),
+        bound: Bound { sensor: errors(5e-5), delay: errors(2e-5), paddle: 0.0 },
     }
 }
 

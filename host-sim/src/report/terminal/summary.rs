@@ -157,10 +157,11 @@ fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::
         let left: Vec<String> = left.collect();
         writeln!(
             text,
-            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it",
+            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it; no controller could leave less than {:.digits$}",
             case.tissue,
             left.join(", "),
-            causes.without_all.peak
+            causes.without_all.peak,
+            causes.bound.sensor.peak.max(causes.bound.paddle)
         )?;
     }
     Ok(())
