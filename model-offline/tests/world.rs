@@ -356,3 +356,51 @@ fn a_needle_that_waited_at_the_skin_is_drawn_back_to_it() {
         }
     }
 }
+
+/// The skin gives way between two steps of the path: when, and how far the target jumps, is what the full model finds in steps
+/// a hundredth as long.
+#[test]
+fn the_moment_when_the_skin_gives_way_is_found_within_a_step() {
+    for name in ["breast", "prostate", "paper"] {
+        let model = TissueModel::new(&scene(name, &[Effect::Shaft])).unwrap();
+        let path = Arc::new(AlongPath::learn(&model, None, &way(&model), &PathOptions::new(5.5)).unwrap());
+        let interval = path.interval();
+        let mut course = Course::at_rest(&model, None).unwrap();
+        let mut k = 0_u32;
+        while course.pushes_the_skin() {
+            k += 1;
+            course.take_in(way(&model)(interval * f64::from(k)), interval).unwrap();
+        }
+        // The same way up to the step before, and then in small steps.
+        let mut course = Course::at_rest(&model, None).unwrap();
+        (1..k).for_each(|k| course.take_in(way(&model)(interval * f64::from(k)), interval).unwrap());
+        let begin = interval * f64::from(k - 1);
+        let mut body = path.body();
+        let (mut jump, mut before) = (0.0, course.target_displacement());
+        let (mut given_way, mut late) = (false, 0);
+        for part in 1..=100 {
+            let time = begin + interval * f64::from(part) / 100.0;
+            course.take_in(way(&model)(time), interval / 100.0).unwrap();
+            if !course.pushes_the_skin() && !given_way {
+                given_way = true;
+                jump = (course.target_displacement() - before).norm();
+            }
+            before = course.target_displacement();
+            body.go_to(time, Vector2::zeros());
+            let off = (body.target_displacement() - before).norm();
+            late += u32::from(off > 0.01 * before.norm());
+        }
+        // Between a hundredth and the next nobody knows.
+        assert!(given_way && jump > 0.1 * before.norm() && late <= 2, "{name}: off in {late} hundredths of a step");
+        // And outside of that step a cubic does not swing.
+        let mut swing = 0.0_f64;
+        for part in 0..40 {
+            let time = begin - interval * (0.05 + 0.05 * f64::from(part));
+            body.go_to(time.max(0.0), Vector2::zeros());
+            let here = body.target_displacement();
+            body.go_to(begin, Vector2::zeros());
+            swing = swing.max(here.norm() - body.target_displacement().norm());
+        }
+        assert!(swing < 0.02 * jump, "{name}: {swing} of a jump by {jump}");
+    }
+}

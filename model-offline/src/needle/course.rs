@@ -106,6 +106,11 @@ impl<'m> Course<'m> {
         }
     }
 
+    /// Whether the needle pushes the skin, which may give way.
+    pub fn pushes_the_skin(&self) -> bool {
+        matches!(self.state, State::Pushing { puncture_force: Some(_), .. })
+    }
+
     /// Where everything is that moves the body.
     pub fn pose(&self) -> Pose {
         match &self.state {

@@ -4,7 +4,7 @@
 //! steered so that the target stays on the needle's line as well as one step's delay allows; what a paddle does that goes
 //! another way is the actuation Jacobian there times the difference. A step costs a lookup. How far off that is, which no
 //! state of the model itself can tell, is learnt from ways that the paddle does not go in training, and estimated with every
-//! step from how far it has been off the path so far.
+//! step from how far it has been off the path so far. The step in which the skin gives way is looked into: the body jumps there.
 
 use super::error::TrainingError;
 use crate::model::{Pose, TissueModel};
@@ -12,7 +12,7 @@ use crate::needle::{Course, NeedleError, NeedleReading};
 use crate::parallel;
 use crate::random::SplitMix64;
 use crate::scene::Motion;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 use std::sync::Arc;
 
 /// Steps of an insertion, if nothing asks for more, and as many as are tried.
@@ -70,6 +70,41 @@ struct Knot {
     coefficients: Vec<f64>,
 }
 
+/// What is known of the moment when the skin gives way: it is found within its step, because target and Jacobian jump there.
+#[derive(Debug, Clone)]
+struct Jump {
+    /// The knot before it.
+    knot: usize,
+    /// When it has not happened and when it has, parts of the interval after that knot.
+    between: [f64; 2],
+    /// The states then.
+    states: Box<[Knot; 2]>,
+}
+
+impl Jump {
+    /// How far it is known: halvings of an interval.
+    const HALVINGS: u32 = 7;
+
+    /// Something at a part of the interval whose `ends` are known: straight before and after the jump.
+    fn at<const C: usize>(
+        &self,
+        share: f64,
+        ends: [SMatrix<f64, 2, C>; 2],
+        of: impl Fn(&Knot) -> SMatrix<f64, 2, C>,
+    ) -> SMatrix<f64, 2, C> {
+        let [from, to] = self.between;
+        let [before, after] = [of(&self.states[0]), of(&self.states[1])];
+        let ([start, end], low, high) = if share < from {
+            ([ends[0], before], 0.0, from)
+        } else if share < to {
+            ([before, after], from, to)
+        } else {
+            ([after, ends[1]], to, 1.0)
+        };
+        if high > low { start + (end - start) * ((share - low) / (high - low)) } else { end }
+    }
+}
+
 /// What errors grow with: the largest distance from the path so far, and its square.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct ErrorGrowth {
@@ -91,6 +126,7 @@ impl ErrorGrowth {
 pub struct AlongPath {
     interval: f64,
     knots: Vec<Knot>,
+    jump: Option<Jump>,
     growth: ErrorGrowth,
 }
 
@@ -130,7 +166,7 @@ impl AlongPath {
         // How far it is off the plan, along the one direction that moves the target across the needle and not along it: steered
         // by the Jacobians on the way it would drift where no controller goes.
         let (mut now, mut then) = (0.0, 0.0);
-        let knots = walk.knots(|knots| {
+        let (knots, jump) = walk.knots(|knots| {
             let ([.., before, last], Some(direction)) = (knots, knots.first().and_then(|rest| across(rest, normal)))
             else {
                 return Vector2::zeros();
@@ -146,7 +182,7 @@ impl AlongPath {
             }
             direction * now
         })?;
-        let mut path = Self { interval: walk.interval, knots, growth: ErrorGrowth::default() };
+        let mut path = Self { interval: walk.interval, knots, jump, growth: ErrorGrowth::default() };
         path.growth.still = path.between_knots();
         if steered && options.trials > 0 {
             path.learn_errors(&walk, options)?;
@@ -155,13 +191,14 @@ impl AlongPath {
     }
 
     /// What cubics between knots leave out: an eighth of second differences is what straight lines would, of fourth ones 3/128
-    /// what cubics do.
+    /// what cubics do. Where the skin gives way they do not go.
     fn between_knots(&self) -> f64 {
         let fourth = |k: usize| {
             let at = |i: usize| self.knots[k + i].target;
             (at(0) - at(1) * 4.0 + at(2) * 6.0 - at(3) * 4.0 + at(4)).norm()
         };
-        (0..self.knots.len().saturating_sub(4)).map(fourth).fold(0.0, f64::max) * 3.0 / 128.0
+        let is_smooth = |k: &usize| !self.jump.as_ref().is_some_and(|jump| (*k..k + 4).contains(&jump.knot));
+        (0..self.knots.len().saturating_sub(4)).filter(is_smooth).map(fourth).fold(0.0, f64::max) * 3.0 / 128.0
     }
 
     /// Takes the full model along ways beside the path and sees how far off the reduction is.
@@ -212,13 +249,21 @@ impl AlongPath {
         Between { knot, share: place - knot as f64 }
     }
 
-    /// A cubic through the knots around, its slopes those of their differences.
+    /// The jump, if it lies after this knot.
+    fn jump_after(&self, knot: usize) -> Option<&Jump> {
+        self.jump.as_ref().filter(|jump| jump.knot == knot)
+    }
+
+    /// A cubic through the knots around, its slopes those of their differences on this side of the jump.
     fn cubic(&self, Between { knot, share }: &Between, of: impl Fn(&Knot) -> Vector2<f64>) -> Vector2<f64> {
         let at = |k: usize| of(&self.knots[k]);
+        if let Some(jump) = self.jump_after(*knot) {
+            return jump.at(*share, [at(*knot), at(knot + 1)], of);
+        }
         let last = self.knots.len() - 1;
         let slope = |k: usize| match k {
-            0 => at(1) - at(0),
-            k if k == last => at(k) - at(k - 1),
+            k if k == 0 || self.jump_after(k - 1).is_some() => at(k + 1) - at(k),
+            k if k == last || self.jump_after(k).is_some() => at(k) - at(k - 1),
             k => 0.5 * (at(k + 1) - at(k - 1)),
         };
         let (s, a, b) = (*share, at(*knot), at(knot + 1));
@@ -277,8 +322,11 @@ impl PathBody {
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector2<f64> {
         let between = self.path.between(self.time);
-        let [before, after] = [&self.path.knots[between.knot], &self.path.knots[between.knot + 1]];
-        let jacobian = before.jacobian * (1.0 - between.share) + after.jacobian * between.share;
+        let [before, after] = [0, 1].map(|k| self.path.knots[between.knot + k].jacobian);
+        let jacobian = match self.path.jump_after(between.knot) {
+            Some(jump) => jump.at(between.share, [before, after], |knot| knot.jacobian),
+            None => before * (1.0 - between.share) + after * between.share,
+        };
         self.path.cubic(&between, |knot| knot.target) + jacobian * self.off
     }
 
@@ -291,7 +339,8 @@ impl PathBody {
     /// Coefficients of the path's nearest knot: what a picture shows.
     pub fn coefficients(&self) -> &[f64] {
         let Between { knot, share } = self.path.between(self.time);
-        &self.path.knots[if share < 0.5 { knot } else { knot + 1 }].coefficients
+        let turn = self.path.jump_after(knot).map_or(0.5, |jump| jump.between[1]);
+        &self.path.knots[if share < turn { knot } else { knot + 1 }].coefficients
     }
 }
 
@@ -314,28 +363,61 @@ impl<'w> Walk<'w> {
         course.take_in(Pose { paddle, ..(self.way)(time) }, self.interval).map_err(failed(time))
     }
 
-    /// The knots of a way whose paddle is decided step by step.
-    fn knots(&self, mut decide: impl FnMut(&[Knot]) -> Vector2<f64>) -> Result<Vec<Knot>, TrainingError> {
+    /// The knots of a way whose paddle is decided step by step, and where between them the skin gives way.
+    fn knots(
+        &self,
+        mut decide: impl FnMut(&[Knot]) -> Vector2<f64>,
+    ) -> Result<(Vec<Knot>, Option<Jump>), TrainingError> {
         let mut course = self.course()?;
-        let mut knots = Vec::with_capacity(self.steps + 1);
-        for k in 0..=self.steps {
-            if k > 0 {
-                let paddle = (self.way)(self.interval * k as f64).paddle + decide(&knots);
-                self.step(&mut course, k, paddle)?;
-            }
+        let mut knots = vec![self.knot(&mut course, 0.0)?];
+        let mut jump = None;
+        for k in 1..=self.steps {
             let time = self.interval * k as f64;
-            let jacobian = match self.paddle {
-                Some(_) => course.actuation_jacobian().map_err(failed(time))?,
-                None => Matrix2::zeros(),
-            };
-            knots.push(Knot {
-                paddle: course.pose().paddle,
-                target: course.target_displacement(),
-                jacobian,
-                coefficients: course.coefficients().to_vec(),
-            });
+            let paddle = (self.way)(time).paddle + decide(&knots);
+            let before = course.pushes_the_skin().then(|| course.clone());
+            self.step(&mut course, k, paddle)?;
+            if let Some(before) = before.filter(|_| !course.pushes_the_skin()) {
+                jump = self.jump(&before, k, paddle);
+            }
+            knots.push(self.knot(&mut course, time)?);
         }
-        Ok(knots)
+        Ok((knots, jump))
+    }
+
+    fn knot(&self, course: &mut Course<'_>, time: f64) -> Result<Knot, TrainingError> {
+        let jacobian = match self.paddle {
+            Some(_) => course.actuation_jacobian().map_err(failed(time))?,
+            None => Matrix2::zeros(),
+        };
+        Ok(Knot {
+            paddle: course.pose().paddle,
+            target: course.target_displacement(),
+            jacobian,
+            coefficients: course.coefficients().to_vec(),
+        })
+    }
+
+    /// Where within step `k`, which begins with a needle that pushes the skin, that gives way; none where a shorter step
+    /// cannot be taken.
+    fn jump(&self, begin: &Course<'_>, k: usize, paddle: Vector2<f64>) -> Option<Jump> {
+        let from = begin.pose().paddle;
+        let after = |share: f64| {
+            let time = self.interval * (k as f64 - 1.0 + share);
+            let pose = Pose { paddle: from + (paddle - from) * share, ..(self.way)(time) };
+            let mut course = begin.clone();
+            course.take_in(pose, self.interval * share).ok()?;
+            Some(course)
+        };
+        let [mut pushing, mut through] = [(0.0, begin.clone()), (1.0, after(1.0)?)];
+        for _ in 0..Jump::HALVINGS {
+            let share = 0.5 * (pushing.0 + through.0);
+            let course = after(share)?;
+            let end = if course.pushes_the_skin() { &mut pushing } else { &mut through };
+            *end = (share, course);
+        }
+        let between = [pushing.0, through.0];
+        let states = [self.knot(&mut pushing.1, 0.0).ok()?, self.knot(&mut through.1, 0.0).ok()?];
+        Some(Jump { knot: k - 1, between, states: Box::new(states) })
     }
 
     /// What is seen of the body step by step, on a way whose paddle is known.
