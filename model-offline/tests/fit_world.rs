@@ -11,7 +11,7 @@ use nalgebra::{Matrix2, Vector2};
 fn with(name: &str, amplitude: f64, share: f64) -> Scene {
     let mut scene = Scene::bundled(name).unwrap();
     let (amplitude, direction) = (amplitude * scene.needle.depth, scene.needle.orthogonal());
-    scene.motion.breathing = Some(Breathing { period: 4.0, amplitude, direction });
+    scene.motion.breathing = Some(Breathing { period: 4.0, amplitude, direction, ..Breathing::default() });
     scene.material = scene.material.clone().relaxing(Relaxation::new([(share, 2.0)]).unwrap());
     for own in scene.inclusions.iter_mut().filter_map(|inclusion| inclusion.material.as_mut()) {
         *own = own.clone().relaxing(Relaxation::new([(share, 2.0)]).unwrap());

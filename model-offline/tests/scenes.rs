@@ -224,3 +224,36 @@ fn placement_refuses_the_worlds() {
         assert!(!json.exists());
     }
 }
+
+#[test]
+fn scenes_say_what_is_wrong_with_a_motion() {
+    let text = model_offline::scene::BUNDLED[0].1;
+    let breathing =
+        |key: &str| format!("breathing = {{ period = 4.0, amplitude = 1.0, direction = [0.0, 1.0], {key} }}");
+    let surge = |key: &str| format!("surge = {{ at = 1.0, last = 0.5, amplitude = 1.0, {key} }}");
+    let read = |motion: &str| {
+        let text = text.replace("[[inclusion]]", &format!("[motion]\n{motion}\n[[inclusion]]"));
+        Scene::parse(&text, "moves.toml")
+    };
+    for (motion, says) in [
+        (breathing("period_variation = 0.7"), "breaths cannot vary by this part"),
+        (breathing("amplitude_variation = -0.1"), "breaths cannot vary by this part"),
+        (breathing("amplitude_variation = nan"), "breaths cannot vary by this part"),
+        (breathing("size_variation = 0.1"), "unknown field `size_variation`"),
+        ("breathing = { period = 0.0, amplitude = 1.0, direction = [0.0, 1.0] }".to_owned(), "period is 0"),
+        ("breathing = { period = 1.0, amplitude = 1.0, direction = [0.0, 0.0] }".to_owned(), "has no direction"),
+        (surge("direction = [inf, 0.0]"), "finite"),
+        (surge("amplitude_variation = 0.1"), "unknown field"),
+        ("recorded = []".to_owned(), "recorded is no motion"),
+        ("recorded = [[1.0, 0.0, 0.0], [1.0, 0.1, 0.0]]".to_owned(), "recorded is no motion"),
+    ] {
+        let error = read(&motion).expect_err(&motion);
+        assert!(error.to_string().contains(says), "{motion}: {error}");
+    }
+    let varies =
+        read(&breathing("period_variation = 0.1, amplitude_variation = 0.5")).unwrap().motion.breathing.unwrap();
+    assert_eq!([varies.period_variation, varies.amplitude_variation], [0.1, 0.5]);
+    // A scene whose breaths are alike is the same file as ever: tables and snapshots are known by its hash.
+    let alike = serde_json::json!(read(&breathing("period_variation = 0.0")).unwrap().motion);
+    assert_eq!(alike["breathing"].as_object().unwrap().len(), 3, "{alike}");
+}

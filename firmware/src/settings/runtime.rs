@@ -3,10 +3,10 @@
 use super::{Settings, SettingsError, check, check_periods};
 use crate::contract::{Faults, Table, TableBounds};
 use crate::detection::{
-    DEPTH_MARGIN, FOLLOWING_FRACTION, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN, RESOLUTION_PER_FOLLOWING_ERROR,
-    SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE, TICKS_TO_HOLD,
+    DEPTH_MARGIN, FOLLOWING_FRACTION, GATE_FLOOR, GATE_FLOOR_STATED, GATE_SIGMAS, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN,
+    RESOLUTION_PER_FOLLOWING_ERROR, SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE,
+    TICKS_TO_HOLD,
 };
-use crate::inputs::monitors::InnovationGate;
 use crate::law::{Direction, Feedback};
 use crate::limits::Limits;
 use crate::loop_stability;
@@ -140,7 +140,7 @@ impl<T: Scalar> Runtime<T> {
             needle_speed: table.validity.needle_speed.to_f64(),
             plausible_speed: NEEDLE_SPEED_MARGIN * table.validity.needle_speed.to_f64(),
             target_range,
-            target_jump: InnovationGate::floor(noise, target_range),
+            target_jump: unexplained_jump(noise, target_range),
             paddle_range: PADDLE_MARGIN * max_displacement,
             target_slope: bounds.target_slope,
             jacobian_norm: bounds.jacobian_norm,
@@ -152,6 +152,12 @@ impl<T: Scalar> Runtime<T> {
             off: Faults::NONE,
         })
     }
+}
+
+/// How far noise alone sets two samples of the target apart, length: 8σ√2 and a part of the target's range.
+fn unexplained_jump(target_noise: f64, target_range: f64) -> f64 {
+    let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * target_noise;
+    noise + target_range * if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR }
 }
 
 impl<T: Scalar> Runtime<T> {

@@ -336,6 +336,17 @@ impl PathBody {
         self.path.growth.at(self.farthest)
     }
 
+    /// Whether a body whose skin `holds` has the jump at the puncture still before it where this one has it behind, or the other
+    /// way round: targets are then apart by as much as they jump, whatever the rest is worth. On the jump itself nobody knows.
+    pub fn is_apart_from(&self, holds: bool) -> bool {
+        let between = self.path.between(self.time);
+        self.path.jump.as_ref().is_some_and(|jump| {
+            let [from, to] = jump.between.map(|share| jump.knot as f64 + share);
+            let place = between.knot as f64 + between.share;
+            place > from && place < to || holds != (place <= from)
+        })
+    }
+
     /// Coefficients of the path's nearest knot: what a picture shows.
     pub fn coefficients(&self) -> &[f64] {
         let Between { knot, share } = self.path.between(self.time);

@@ -57,7 +57,8 @@ impl Scene {
             Effect::Breathing if self.motion.breathing.is_none() => {
                 let amplitude = AMPLITUDE * self.needle.depth;
                 let direction = self.needle.orthogonal();
-                scene.motion.breathing = Some(Breathing { period: PERIOD, amplitude, direction });
+                scene.motion.breathing =
+                    Some(Breathing { period: PERIOD, amplitude, direction, ..Breathing::default() });
             }
             Effect::Shaft | Effect::Breathing => {}
         }

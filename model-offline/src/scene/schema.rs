@@ -227,6 +227,10 @@ pub struct BreathingSection {
     pub amplitude: Located<f64>,
     /// Where the body goes with the breath; normalised on reading.
     pub direction: Located<[f64; 2]>,
+    /// Each breath takes up to this part longer or shorter, 0 (the default) to 0.5.
+    pub period_variation: Option<Located<f64>>,
+    /// Each breath is up to this part larger or smaller, 0 (the default) to 0.5.
+    pub amplitude_variation: Option<Located<f64>>,
 }
 
 /// A cough, or a jerk: `amplitude · sin²(π (t − at) / last)` while it lasts.

@@ -1,6 +1,6 @@
 //! Targets that jump: a wrong association.
 
-use crate::detection::{GATE_FLOOR, GATE_FLOOR_STATED, GATE_MOTION, GATE_SIGMAS};
+use crate::detection::GATE_MOTION;
 use crate::inputs::ledger::Discard;
 use crate::inputs::sample::are_within;
 use crate::scalar::Scalar;
@@ -50,12 +50,6 @@ impl InnovationGate {
     /// Motion at the arrival of the accepted sample so many before the newest.
     fn at_arrival(&self, samples_ago: usize) -> Travel {
         self.at_arrival.get(self.newest.wrapping_add(samples_ago) % GATE_HISTORY).copied().unwrap_or_default()
-    }
-
-    /// What noise alone explains, length: 8σ√2 and a part of the target's range.
-    pub(crate) fn floor(target_noise: f64, target_range: f64) -> f64 {
-        let noise = GATE_SIGMAS * core::f64::consts::SQRT_2 * target_noise;
-        noise + target_range * if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR }
     }
 
     /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + ‖J‖·paddle travel) + floor, where the travel reaches back

@@ -48,14 +48,15 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
         "\nThe same where the needle waits for some breaths at the skin, the table knowing all but the breath: followed by the \
          observer, foretold by the harmonic predictor. From the needle's first motion on.\n"
     )?;
-    writeln!(text, "| needle | tissue | waits | sensor | no paddle | fixture | followed | foretold |")?;
-    writeln!(text, "|---|---|---|---|---|---|---|---|")?;
+    writeln!(text, "| needle | tissue | breaths | waits | sensor | no paddle | fixture | followed | foretold |")?;
+    writeln!(text, "|---|---|---|---|---|---|---|---|---|")?;
     for row in waiting {
         for sensor in &row.sensors {
             let [needle, tissue, _] = in_words(&row.effects);
             writeln!(
                 text,
-                "| {needle} | {tissue} | {} s | {} | {} | {} | {} | {} |",
+                "| {needle} | {tissue} | {} | {} s | {} | {} | {} | {} | {} |",
+                breaths(row.varies),
                 row.wait_s,
                 sensor.sensor,
                 errors(&row.none),
@@ -71,8 +72,8 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
     writeln!(
         text,
         "\n(−): a larger peak than without a paddle. ±: how far the simulated tissue, the neighbourhood of each insertion, was from \
-         the full model in half of its steps along the first seed's insertion, where that is more than a tenth of the peak; at \
-         most {} {length_unit}. Fixture: the best one of the simplest world.",
+         the full model in half of its steps along the first seed's insertion, where that is more than a tenth of the peak, but for \
+         the moment when the skin gives way; at most {} {length_unit}. Fixture: the best one of the simplest world.",
         length(found)
     )?;
     for row in rows.iter().filter(|row| row.no_table.is_some()) {
@@ -90,6 +91,14 @@ fn in_words(effects: &[Effect]) -> [&'static str; 3] {
         if has(Effect::Creep) { "creeping" } else { "elastic" },
         if has(Effect::Breathing) { "breathing" } else { "still" },
     ]
+}
+
+/// How much breaths differ.
+fn breaths([period, amplitude]: [f64; 2]) -> String {
+    if period == 0.0 && amplitude == 0.0 {
+        return "alike".to_owned();
+    }
+    format!("±{:.0} % long, ±{:.0} % large", 100.0 * period, 100.0 * amplitude)
 }
 
 fn errors(Errors { peak, rms }: &Errors) -> String {

@@ -228,6 +228,9 @@ fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fm
         }
         (None, Some(_), Some(error), _) => {
             write!(text, ", at most {error:.1e} from the full model on the same way")?;
+            if let Some(apart_s) = plant.puncture_apart_s {
+                write!(text, " (whose skin gives way up to {:.0} ms apart)", 1e3 * apart_s)?;
+            }
             Some(error)
         }
         (_, _, _, Some(error)) => {
@@ -314,7 +317,9 @@ mod tests {
             ", at most 2.0e-1 from the full model on the same way (40 % of the largest error)"
         );
         let small = PlantAccount { extrapolation_error: Some(0.04), ..path.clone() };
-        assert_eq!(said(small), ", at most 4.0e-2 from the full model on the same way");
+        assert_eq!(said(small.clone()), ", at most 4.0e-2 from the full model on the same way");
+        let apart = PlantAccount { puncture_apart_s: Some(0.025), ..small.clone() };
+        assert!(said(apart).ends_with("on the same way (whose skin gives way up to 25 ms apart)"));
         let unknown = PlantAccount { not_verified: Some("no way".to_owned()), extrapolation_error: None, ..path };
         let words = said(unknown);
         assert!(words.contains("NOT VERIFIED") && words.contains("no way") && words.contains("60 %"), "{words}");

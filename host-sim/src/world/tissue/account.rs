@@ -36,6 +36,10 @@ pub struct PlantAccount {
     /// Largest error of an extrapolated target displacement that solving found, the end of the run included, length.
     #[serde(default)]
     pub extrapolation_error: Option<f64>,
+    /// How long the skin had given way either here or in the full model and not yet in both, to half of the path's interval, s.
+    /// `extrapolation_error` leaves these moments out where they are less than a tenth of a second.
+    #[serde(default)]
+    pub puncture_apart_s: Option<f64>,
     /// Why the full model could not be taken the same way, where it could not: then nothing is known of how far off this was.
     #[serde(default)]
     pub not_verified: Option<String>,
@@ -58,6 +62,7 @@ impl Default for PlantAccount {
             path_knots: None,
             solves: None,
             extrapolation_error: None,
+            puncture_apart_s: None,
             not_verified: None,
             error_at_end: None,
         }

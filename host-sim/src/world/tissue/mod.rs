@@ -117,25 +117,46 @@ impl AlongInsertion {
         Self { body: body.afresh(), trajectory: trajectory.clone(), interval_s: *interval_s, paddle: Vec::new() }
     }
 
-    /// The full model on the same way: how far off its target displacement this was, moment by moment, and what the needle
-    /// met.
-    fn held_against_full(
-        &self,
-        model: &TissueModel,
-        paddle: Option<usize>,
-    ) -> Result<(Vec<f64>, Vec<NeedleMoment>), TrainingError> {
+    /// The full model on the same way.
+    fn held_against_full(&self, model: &TissueModel, paddle: Option<usize>) -> Result<HeldAgainst, TrainingError> {
         let way = |time: f64| model.pose_at(time, self.trajectory.at(time).depth);
         let full = along(model, paddle, &way, self.interval_s, &self.paddle)?;
         let mut body = self.body.afresh();
-        let held = full.into_iter().zip(&self.paddle).enumerate().map(|(k, (full, paddle))| {
+        let mut held = HeldAgainst { largest: 0.0, at_end: 0.0, apart_s: 0.0, needle: Vec::new() };
+        let mut beside = 0.0_f64;
+        for (k, (full, paddle)) in full.into_iter().zip(&self.paddle).enumerate() {
             let since_start_s = self.interval_s * k as f64;
             body.go_to(since_start_s, *paddle);
-            let error = (body.target_displacement() - full.target).norm();
-            (error, NeedleMoment { since_start_s, reading: full.needle })
-        });
-        Ok(held.unzip())
+            held.at_end = (body.target_displacement() - full.target).norm();
+            if body.is_apart_from(full.needle.cut_length.is_none()) {
+                held.apart_s += self.interval_s;
+                beside = beside.max(held.at_end);
+            } else {
+                held.largest = held.largest.max(held.at_end);
+            }
+            held.needle.push(NeedleMoment { since_start_s, reading: full.needle });
+        }
+        if held.apart_s > MOST_APART_S {
+            held.largest = held.largest.max(beside);
+        }
+        Ok(held)
     }
 }
+
+/// What became of holding a learnt insertion against the full model.
+struct HeldAgainst {
+    /// Largest distance between the targets, while the skin holds in both or in neither, length.
+    largest: f64,
+    /// The last one, length.
+    at_end: f64,
+    /// How long the skin held in one of them only, s.
+    apart_s: f64,
+    /// What the needle met.
+    needle: Vec<NeedleMoment>,
+}
+
+/// Where the skin gives way at moments further apart than this, s, they are not the same insertion any more.
+const MOST_APART_S: f64 = 0.1;
 
 impl<'m> TissuePlant<'m> {
     /// Tissue at rest; `paddle` is the place of the attached one in the scene's list.
@@ -354,11 +375,12 @@ impl<'m> TissuePlant<'m> {
             account.extrapolation_error = Some(body.account().largest_error);
         } else if let Kind::Path(taken) = &self.kind {
             match taken.held_against_full(self.model, self.paddle) {
-                Ok((errors, moments)) => {
-                    account.extrapolation_error = Some(errors.iter().copied().fold(0.0, f64::max));
-                    account.error_at_end = errors.last().copied();
+                Ok(HeldAgainst { largest, at_end, apart_s, needle }) => {
+                    account.extrapolation_error = Some(largest);
+                    account.error_at_end = Some(at_end);
+                    account.puncture_apart_s = (apart_s > 0.0).then_some(apart_s);
                     if self.model.scene().needle.shaft.is_some() {
-                        self.needle = moments;
+                        self.needle = needle;
                     }
                 }
                 Err(error) => account.not_verified = Some(error.to_string()),

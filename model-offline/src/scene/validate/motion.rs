@@ -13,6 +13,8 @@ impl Validator<'_> {
                 period: self.positive(&breathing.period, "period")?,
                 amplitude: self.positive(&breathing.amplitude, "amplitude")?,
                 direction: self.direction(&breathing.direction)?,
+                period_variation: self.variation(breathing.period_variation.as_ref())?,
+                amplitude_variation: self.variation(breathing.amplitude_variation.as_ref())?,
             })
         });
         let surge = section.surge.as_ref().map(|surge| {
@@ -28,6 +30,18 @@ impl Validator<'_> {
             surge: surge.transpose()?,
             recorded: section.recorded.as_ref().map_or(Ok(Vec::new()), |rows| self.recorded(rows))?,
         })
+    }
+
+    fn variation(&self, given: Option<&Located<f64>>) -> Checked<f64> {
+        let Some(variation) = given else { return Ok(0.0) };
+        if (0.0..=0.5).contains(variation.get()) {
+            return Ok(*variation.get());
+        }
+        Err(self.error(
+            variation.span(),
+            "breaths cannot vary by this part",
+            "give from 0 (all alike) to 0.5 (half as long or large)",
+        ))
     }
 
     fn direction(&self, direction: &Located<[f64; 2]>) -> Checked<Point2> {
