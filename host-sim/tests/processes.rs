@@ -72,6 +72,50 @@ fn the_same_seed_gives_the_same_bytes_and_replays() {
     assert_eq!(replayed.status.code(), Some(2), "cut off");
 }
 
+/// A recording that is damaged is refused, and says how its first part can be had; that part replays and is exported.
+#[test]
+fn a_damaged_recording_is_salvaged_up_to_the_damage() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("report");
+    succeeded(&run(&out, &["--mode", "lockstep"]));
+    let (recording, csv) = (out.join("homogeneous-dynamic.rec"), folder.path().join("ticks.csv"));
+    let whole = std::fs::read(&recording).unwrap();
+    let ticks = Recording::decode(&whole).unwrap().records.len();
+    let mut altered = whole.clone();
+    let place = altered.len() - 101 * 288 + 40;
+    altered[place] ^= 1;
+    let salvaged = |arguments: &[&str]| host_sim().args(arguments).arg(&recording).output().unwrap();
+    let csv_of = csv.to_str().unwrap();
+    for (bytes, kept, damage) in [
+        (&whole[..whole.len() - 1], ticks, "without an end mark"),
+        (&whole[..whole.len() - 50 * 288 - 7], ticks - 50, "without an end mark"),
+        (&altered[..], ticks - 100, "the chain breaks at record"),
+    ] {
+        std::fs::write(&recording, bytes).unwrap();
+        for command in [&["replay"][..], &["export", "--csv", csv_of]] {
+            let refused = salvaged(command);
+            let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+            assert_eq!(refused.status.code(), Some(2), "{said}");
+            assert!(said.contains("--salvage") && !csv.exists(), "{said}");
+        }
+        let replayed = salvaged(&["replay", "--salvage"]);
+        succeeded(&replayed);
+        let said = String::from_utf8_lossy(&replayed.stdout).into_owned();
+        assert!(said.contains(damage) && said.contains(&format!("{kept} of {kept} commands agree")), "{said}");
+        succeeded(&salvaged(&["export", "--salvage", "--csv", csv_of]));
+        assert_eq!(std::fs::read_to_string(&csv).unwrap().lines().count(), kept + 1);
+        std::fs::remove_file(&csv).unwrap();
+    }
+    // Without a single whole record there is nothing to salvage.
+    std::fs::write(&recording, &whole[..whole.len() - (ticks + 1) * 288]).unwrap();
+    assert_eq!(salvaged(&["replay", "--salvage"]).status.code(), Some(2));
+    // Salvage of a whole one is a replay like any other.
+    std::fs::write(&recording, &whole).unwrap();
+    let replayed = salvaged(&["replay", "--salvage"]);
+    succeeded(&replayed);
+    assert!(!String::from_utf8_lossy(&replayed.stdout).contains("damaged"));
+}
+
 #[test]
 fn both_modes_account_for_everything() {
     let folder = tempfile::tempdir().unwrap();

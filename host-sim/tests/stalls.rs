@@ -6,9 +6,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use host_sim::bench::rounds::MeasuredLoop;
-use host_sim::bench::timing::TimingResult;
+use host_sim::bench::timing::{BlockResult, TimingResult};
 use host_sim::report::directory::read_run;
-use host_sim::runtime::time::durations::LoopTiming;
+use host_sim::runtime::time::durations::{Distribution, LoopTiming};
 
 const STOP: Duration = Duration::from_secs(1);
 
@@ -134,6 +134,59 @@ fn timing_measures_in_run_and_says_where_not() {
         result.step.p9999_ns.is_some()
             || result.left_run.iter().any(|left| left.measurement == MeasuredLoop::BackToBack)
     );
+}
+
+/// As a bench script calls it: cyclictest's options, its histogram with every release, and an exit code.
+#[test]
+fn timing_fits_into_a_bench_script() {
+    let _alone = alone();
+    let folder = tempfile::tempdir().unwrap();
+    let (json, histogram) = (folder.path().join("timing.json"), folder.path().join("lateness.txt"));
+    let timing = |limit: &str| {
+        let mut command = host_sim();
+        command.args(["timing", "-i", "2000", "-D", "1", "-p", "0", "--max-lateness", limit, "--json"]).arg(&json);
+        command.arg("--histogram").arg(&histogram).output().unwrap()
+    };
+    let output = timing("0");
+    let said = String::from_utf8_lossy(&output.stderr).replace(['\n', '│'], " ");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("µs late") && said.contains("--max-lateness"), "{said}");
+    let result = read_timing(&json);
+    assert!((result.empty.rate_hz - 500.0).abs() < 1e-9);
+    let text = std::fs::read_to_string(&histogram).unwrap();
+    let rows = text.lines().filter(|line| !line.starts_with('#'));
+    let rows: Vec<Vec<u64>> = rows.map(|row| row.split('\t').map(|n| n.parse().unwrap()).collect()).collect();
+    let counted = |column: usize| rows.iter().map(|row| row[column]).sum::<u64>();
+    let due = [result.empty.release_lateness.count, result.ledger.due, result.exchange_ledger.due];
+    assert_eq!([1, 2, 3].map(counted), due, "{text}");
+    // A third of the time each.
+    assert!(due.iter().all(|due| *due >= 150), "{due:?}");
+
+    let (start, stolen_before_ms) = (Instant::now(), stolen_ms());
+    measured_or_stolen(&timing("60000000"), start, stolen_before_ms);
+}
+
+/// What is late outside of RUN, or in a loop that is not the controller's, is late.
+#[test]
+fn the_limit_of_lateness_holds_for_every_loop_and_mode() {
+    let late = |max_ns| LoopTiming {
+        release_lateness: Distribution { max_ns, ..Distribution::default() },
+        ..LoopTiming::default()
+    };
+    let outside = BlockResult { outside_run: vec![late(90_000)], ..BlockResult::default() };
+    let result = TimingResult {
+        empty: late(10_000),
+        controller: late(20_000),
+        exchange: late(30_000),
+        blocks: vec![BlockResult::default(), outside, BlockResult::default()],
+        ..TimingResult::default()
+    };
+    assert!(result.check_lateness(90.0).is_ok());
+    let refused = result.check_lateness(89.9).unwrap_err();
+    assert_eq!((refused.measured, refused.latest_ns), (MeasuredLoop::Controller, 90_000));
+    let still = TimingResult { blocks: Vec::new(), ..result };
+    assert_eq!(still.check_lateness(29.0).unwrap_err().measured, MeasuredLoop::Exchange);
+    assert!(still.check_lateness(30.0).is_ok());
 }
 
 #[test]

@@ -11,7 +11,7 @@ use model_offline::scene::{SceneError, TableScalar, UnknownLength};
 use model_offline::table::TableBuildError;
 
 use super::board::measure::MeasureError;
-use super::rounds::AllVoid;
+use super::rounds::{AllVoid, TooLate};
 use super::usage::UsageError;
 use crate::exchange::LinkError;
 use crate::exchange::board::BoardError;
@@ -137,6 +137,9 @@ pub enum SimError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Void(#[from] AllVoid),
+    /// A release was later than allowed.
+    #[error(transparent)]
+    TooLate(#[from] TooLate),
     /// The images on the board cannot be measured, or cost too much.
     #[error(transparent)]
     Measure(#[from] MeasureError),

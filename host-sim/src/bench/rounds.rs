@@ -73,6 +73,21 @@ pub struct AllVoid {
     pub faults: Faults,
 }
 
+/// A release came later than `timing` was told to allow.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a release of the measurement `{measured}` was {} µs late, {limit_us} µs are allowed (--max-lateness)",
+    (*latest_ns as f64 * 1e-3).ceil()
+)]
+pub struct TooLate {
+    /// The loop with the latest release.
+    pub measured: MeasuredLoop,
+    /// How late that was, ns.
+    pub latest_ns: u64,
+    /// What was allowed, µs.
+    pub limit_us: f64,
+}
+
 impl AllVoid {
     fn why(&self) -> String {
         let Self { rounds, left_run, faults, .. } = self;

@@ -6,7 +6,7 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
-use host_sim::record::recording::Recording;
+use host_sim::record::recording::{Recording, Salvaged};
 
 use model_offline::output::check_outputs;
 
@@ -21,6 +21,9 @@ pub(crate) struct ExportArgs {
     /// Write a table with a time column, for PlotJuggler and spreadsheets
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
+    /// Export the ticks before the damage of a recording that is damaged or cut off
+    #[arg(long)]
+    pub(crate) salvage: bool,
 }
 
 /// Writes the files that were asked for.
@@ -29,10 +32,11 @@ pub(crate) struct ExportArgs {
 /// [`SimError::Record`], [`SimError::File`].
 pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
     check_outputs(&[&args.recording], &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
-    let recording = Recording::read(&args.recording)?;
+    let Salvaged { recording, damage } =
+        if args.salvage { Recording::salvage(&args.recording)? } else { Recording::read(&args.recording)?.into() };
     let table = firmware::contract::decode::<f64, 2>(&recording.header.table)
         .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
-    let mut said = Vec::new();
+    let mut said: Vec<String> = damage.map(|damage| format!("damaged: {damage}")).into_iter().collect();
     if let Some(path) = &args.mcap {
         let bytes = mcap::encode(&recording, table.orthogonal.into(), mcap::NeedleForces::default())?;
         said.push(written(path, &bytes)?);

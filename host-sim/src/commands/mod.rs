@@ -79,7 +79,7 @@ pub(crate) enum Command {
     Rearm(RearmArgs),
     /// Checks the fixed-rate loop against an empty one
     #[command(
-        after_help = "Examples:\n  host-sim timing --rate 1000 --seconds 10 --out timing\n  host-sim timing --sweep --cpu 0"
+        after_help = "Examples:\n  host-sim timing --rate 1000 --seconds 10 --out timing\n  host-sim timing --sweep --cpu 0\n  host-sim timing -i 1000 -D 60 -p 80 --max-lateness 500 --histogram lateness.txt"
     )]
     Timing(TimingArgs),
     /// The other process of `timing`

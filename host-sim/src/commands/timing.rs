@@ -8,6 +8,7 @@ use host_sim::bench::timing::{TimingOptions, TimingResult, timing as measure};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
+use host_sim::report::cyclictest::{Column, histogram_file};
 use host_sim::report::terminal::timing_summary::timing_summary;
 use host_sim::report::timing_histograms;
 use host_sim::runtime::error::RuntimeError;
@@ -18,7 +19,9 @@ use host_sim::world::error::OptionRange;
 use model_offline::output::check_outputs;
 
 const RATE: OptionRange = OptionRange::new("--rate", 0.1, 1e5, " Hz");
+const INTERVAL: OptionRange = OptionRange::new("--interval", 10.0, 1e7, " µs");
 const SECONDS: OptionRange = OptionRange::new("--seconds", 0.01, 86_400.0, " s");
+const MAX_LATENESS: OptionRange = OptionRange::new("--max-lateness", 0.0, 6e7, " µs");
 
 /// Options of `timing`.
 #[derive(Args, Clone, Debug)]
@@ -26,18 +29,27 @@ pub(crate) struct TimingArgs {
     /// Rate of the loop, Hz
     #[arg(long, default_value_t = 1000.0, value_name = "HZ")]
     pub(crate) rate: f64,
+    /// Period of the loop in place of its rate, µs
+    #[arg(short, long, value_name = "US", conflicts_with = "rate")]
+    pub(crate) interval: Option<f64>,
     /// Duration of the periodic measurement, s
-    #[arg(long, default_value_t = 10.0, value_name = "S")]
+    #[arg(short = 'D', long, visible_alias = "duration", default_value_t = 10.0, value_name = "S")]
     pub(crate) seconds: f64,
     /// Processor of the loop; the controller process stays on the next one [default: left to the kernel]
-    #[arg(long, value_name = "N")]
+    #[arg(short = 'a', long, value_name = "N")]
     pub(crate) cpu: Option<usize>,
     /// Real-time priority to ask for, 1 to 99; 0: the ordinary policy
-    #[arg(long, default_value_t = FIFO_PRIORITY, value_name = "P", value_parser = clap::value_parser!(u8).range(0..=99))]
+    #[arg(short, long, default_value_t = FIFO_PRIORITY, value_name = "P", value_parser = clap::value_parser!(u8).range(0..=99))]
     pub(crate) priority: u8,
     /// Also find the highest rate at which no deadline is missed
     #[arg(long)]
     pub(crate) sweep: bool,
+    /// End with exit code 1 if any release of any loop is later than this, µs
+    #[arg(long, value_name = "US")]
+    pub(crate) max_lateness: Option<f64>,
+    /// Write the histogram of the release lateness here, in cyclictest's format
+    #[arg(long, visible_alias = "histfile", value_name = "FILE")]
+    pub(crate) histogram: Option<PathBuf>,
     /// Also write the result here, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
@@ -49,12 +61,14 @@ pub(crate) struct TimingArgs {
 /// Measures and prints.
 ///
 /// # Errors
-/// [`SimError`]; [`SimError::Void`] when nothing is left to compare, with everything written all the same.
+/// [`SimError`]; [`SimError::TooLate`] when a release was later than allowed and [`SimError::Void`] when nothing is left to
+/// compare, with everything written all the same.
 pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     signals::install();
     super::sweep();
-    RATE.check(args.rate)?;
+    let rate = rate(args)?;
     SECONDS.check(args.seconds)?;
+    args.max_lateness.map_or(Ok(()), |limit| MAX_LATENESS.check(limit))?;
     let processors = model_offline::parallel::available();
     if let Some(cpu) = args.cpu
         && cpu >= processors
@@ -66,9 +80,13 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     }
     let own = args.out.as_ref().map(|directory| directory.join("timing.json"));
     let picture = args.out.as_ref().map(|directory| directory.join("timing.svg"));
-    check_outputs(&[], &[("--out", own.as_deref()), ("--out", picture.as_deref()), ("--json", args.json.as_deref())])?;
+    let (json, histogram) = (args.json.as_deref(), args.histogram.as_deref());
+    check_outputs(
+        &[],
+        &[("--out", own.as_deref()), ("--out", picture.as_deref()), ("--json", json), ("--histogram", histogram)],
+    )?;
     let result = measure(&TimingOptions {
-        rate: args.rate,
+        rate,
         seconds: args.seconds,
         cpu: args.cpu,
         priority: args.priority,
@@ -77,7 +95,24 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
     })?;
     print!("{}", timing_summary(&result, args.priority));
     write(args, &result)?;
+    if let Some(limit_us) = args.max_lateness {
+        result.check_lateness(limit_us)?;
+    }
     Ok(result.check_rounds()?)
+}
+
+/// Rate that is asked for, Hz.
+fn rate(args: &TimingArgs) -> Result<f64, SimError> {
+    match args.interval {
+        Some(interval_us) => {
+            INTERVAL.check(interval_us)?;
+            Ok(1e6 / interval_us)
+        }
+        None => {
+            RATE.check(args.rate)?;
+            Ok(args.rate)
+        }
+    }
 }
 
 fn write(args: &TimingArgs, result: &TimingResult) -> Result<(), SimError> {
@@ -89,6 +124,10 @@ fn write(args: &TimingArgs, result: &TimingResult) -> Result<(), SimError> {
     }
     if let Some(path) = &args.json {
         write_json(path, result)?;
+    }
+    if let Some(path) = &args.histogram {
+        let loops = result.loops().map(|(measured, timings)| Column { name: measured.name(), timings });
+        write_bytes(path, histogram_file(&loops).as_bytes())?;
     }
     Ok(())
 }

@@ -81,6 +81,20 @@ pub enum RecordingError {
     },
 }
 
+impl RecordingError {
+    /// What to do.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::NotARecording => "name a .rec file that `run` or `controller --record` has written",
+            Self::Version { .. } => "use it with the program that has written it, or record again",
+            Self::Header => "nothing of it can be used: record again",
+            Self::Chain { .. } | Self::Unfinished { .. } | Self::Trailing { .. } | Self::Value { .. } => {
+                "replay or export the ticks before the damage with --salvage"
+            }
+        }
+    }
+}
+
 /// Why a recording cannot be used or replayed.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 #[non_exhaustive]
@@ -90,6 +104,7 @@ pub enum RecordError {
     File(#[from] FileError),
     /// It is not valid.
     #[error("the recording {} cannot be used", path.display())]
+    #[diagnostic(help("{}", source.help()))]
     Recording {
         /// File.
         path: PathBuf,

@@ -98,57 +98,102 @@ impl Recording {
         bytes
     }
 
+    /// Reads what is whole of a file that is damaged or cut off, and says what is wrong with the rest.
+    ///
+    /// # Errors
+    /// [`RecordError::File`]; [`RecordError::Recording`] where not a single record is whole.
+    pub fn salvage(path: &Path) -> Result<Salvaged, RecordError> {
+        let bytes = files::read_bytes(path)?;
+        let salvaged = Self::whole_records(&bytes).and_then(|salvaged| match salvaged.damage {
+            Some(damage) if salvaged.recording.records.is_empty() => Err(damage),
+            _ => Ok(salvaged),
+        });
+        salvaged.map_err(|source| RecordError::Recording { path: path.to_owned(), source })
+    }
+
     /// Reads a file and checks the whole chain.
     ///
     /// # Errors
     /// [`RecordingError`], the first check that fails.
     pub fn decode(bytes: &[u8]) -> Result<Self, RecordingError> {
-        match Self::whole_records(bytes)? {
-            (recording, true) => Ok(recording),
-            (recording, false) => Err(RecordingError::Unfinished { records: recording.records.len() }),
-        }
+        let Salvaged { recording, damage } = Self::whole_records(bytes)?;
+        damage.map_or(Ok(recording), Err)
     }
 
-    /// Reads what is whole of a file that may have been cut off, and whether its end mark is there.
+    /// Reads what is whole of a file that is still being written, or that was cut off.
     ///
     /// # Errors
     /// [`RecordingError`] for everything but a missing end.
-    pub fn whole_records(bytes: &[u8]) -> Result<(Self, bool), RecordingError> {
+    pub fn growing(bytes: &[u8]) -> Result<Self, RecordingError> {
+        let Salvaged { recording, damage } = Self::whole_records(bytes)?;
+        match damage {
+            None | Some(RecordingError::Unfinished { .. }) => Ok(recording),
+            Some(damage) => Err(damage),
+        }
+    }
+
+    /// Reads the records before the first check that fails.
+    ///
+    /// # Errors
+    /// [`RecordingError`] of the header: without it no record is worth anything.
+    pub fn whole_records(bytes: &[u8]) -> Result<Salvaged, RecordingError> {
         let mut reader = ByteReader(bytes);
         let header = decode_header(&mut reader)?;
         let covered = bytes.len() - reader.0.len();
-        let mut chain: [u8; 32] = Sha256::digest(&bytes[..covered]).into();
-        if reader.array::<HASH_BYTES>() != Some(chain) {
+        let chain: [u8; HASH_BYTES] = Sha256::digest(&bytes[..covered]).into();
+        if reader.array() != Some(chain) {
             return Err(RecordingError::Header);
         }
         let mut records = Vec::with_capacity(reader.0.len() / RECORD_BYTES);
-        loop {
-            let (Some(body), Some(written)) = (reader.array::<BODY_BYTES>(), reader.array::<HASH_BYTES>()) else {
-                return Ok((Self { header, records }, false));
-            };
-            chain = next_link(&chain, &body);
-            if written != chain {
-                return Err(RecordingError::Chain { record: records.len() });
-            }
-            let impossible = RecordingError::Value { record: records.len() };
-            let mut body = ByteReader(&body);
-            match body.u32() {
-                Some(TICK_MARK) => records.push(decode_record(&mut body).ok_or(impossible)?),
-                Some(END_MARK) => {
-                    let _ = body.u32();
-                    if body.u64() != Some(records.len() as u64) {
-                        return Err(impossible);
-                    }
-                    break;
-                }
-                _ => return Err(impossible),
-            }
-        }
-        if !reader.0.is_empty() {
-            return Err(RecordingError::Trailing { bytes: reader.0.len() });
-        }
-        Ok((Self { header, records }, true))
+        let damage = read_records(&mut reader, chain, &mut records).err();
+        Ok(Salvaged { recording: Self { header, records }, damage })
     }
+}
+
+/// What is whole of a recording.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Salvaged {
+    /// The ticks before the damage.
+    pub recording: Recording,
+    /// What is wrong after them; none: it is whole.
+    pub damage: Option<RecordingError>,
+}
+
+impl From<Recording> for Salvaged {
+    fn from(recording: Recording) -> Self {
+        Self { recording, damage: None }
+    }
+}
+
+/// Records up to the end mark, or up to the first that does not hold.
+fn read_records(
+    reader: &mut ByteReader<'_>,
+    mut chain: [u8; HASH_BYTES],
+    records: &mut Vec<Record>,
+) -> Result<(), RecordingError> {
+    loop {
+        let (Some(body), Some(written)) = (reader.array::<BODY_BYTES>(), reader.array::<HASH_BYTES>()) else {
+            return Err(RecordingError::Unfinished { records: records.len() });
+        };
+        chain = next_link(&chain, &body);
+        if written != chain {
+            return Err(RecordingError::Chain { record: records.len() });
+        }
+        let impossible = RecordingError::Value { record: records.len() };
+        let mut body = ByteReader(&body);
+        match body.u32() {
+            Some(TICK_MARK) => records.push(decode_record(&mut body).ok_or(impossible)?),
+            Some(END_MARK) => {
+                let _ = body.u32();
+                if body.u64() != Some(records.len() as u64) {
+                    return Err(impossible);
+                }
+                break;
+            }
+            _ => return Err(impossible),
+        }
+    }
+    if reader.0.is_empty() { Ok(()) } else { Err(RecordingError::Trailing { bytes: reader.0.len() }) }
 }
 
 /// A recording being written, record by record.

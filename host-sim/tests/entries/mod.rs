@@ -4,7 +4,7 @@
 use firmware::serial::{Frame, FrameReader, Reply, Request};
 use host_sim::exchange::bytes::{ByteReader, ByteWriter};
 use host_sim::record::export::{csv, mcap};
-use host_sim::record::recording::Recording;
+use host_sim::record::recording::{Recording, Salvaged};
 use host_sim::runtime::accounting::accounts::ControllerAccounts;
 use host_sim::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
 use model_offline::scene::Scene;
@@ -29,7 +29,7 @@ pub(crate) fn recording(bytes: &[u8]) {
     if let Ok(recording) = Recording::decode(bytes) {
         assert_eq!(recording.encode(), bytes, "what is read is what was written");
     }
-    if let Ok((recording, _)) = Recording::whole_records(bytes) {
+    if let Ok(Salvaged { recording, .. }) = Recording::whole_records(bytes) {
         let table = csv::recording(&recording, &nalgebra::Vector2::x(), "mm");
         let lines = table.iter().filter(|byte| **byte == b'\n').count();
         assert_eq!(lines, recording.records.len() + 1);

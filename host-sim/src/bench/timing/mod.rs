@@ -28,7 +28,7 @@ use self::partner::{Partner, Running};
 use self::peer::Transport;
 use super::error::SimError;
 use super::paper_table::paper_table;
-use super::rounds::{AllVoid, MeasuredLoop};
+use super::rounds::{AllVoid, MeasuredLoop, TooLate};
 use crate::record::error::FileError;
 use crate::runtime::accounting::ledger::TickResult;
 use crate::runtime::error::RuntimeError;
@@ -108,6 +108,37 @@ pub struct TimingResult {
 }
 
 impl TimingResult {
+    /// The loops on the machine's clock: everything that was measured of each, in every mode of its controller.
+    pub fn loops(&self) -> [(MeasuredLoop, Vec<&LoopTiming>); 3] {
+        let all = |place: usize, headline| {
+            let outside = self.blocks.get(place).into_iter().flat_map(|more| &more.outside_run);
+            std::iter::once(headline).chain(outside).collect()
+        };
+        [
+            (MeasuredLoop::Empty, all(0, &self.empty)),
+            (MeasuredLoop::Controller, all(1, &self.controller)),
+            (MeasuredLoop::Exchange, all(2, &self.exchange)),
+        ]
+    }
+
+    /// Refuses a measurement in which any release of any loop came later than this, µs: in void rounds, outside of RUN and
+    /// skipped ones too.
+    ///
+    /// # Errors
+    /// [`TooLate`] of the latest one.
+    pub fn check_lateness(&self, limit_us: f64) -> Result<(), TooLate> {
+        let of_loop = |(measured, timings): (MeasuredLoop, Vec<&LoopTiming>)| {
+            (measured, timings.iter().map(|timing| timing.release_lateness.max_ns).max().unwrap_or(0))
+        };
+        let latest = self.loops().map(of_loop).into_iter().max_by_key(|(_, latest_ns)| *latest_ns);
+        match latest {
+            Some((measured, latest_ns)) if latest_ns as f64 > 1e3 * limit_us => {
+                Err(TooLate { measured, latest_ns, limit_us })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Refuses a measurement of which a comparison has no round left: whatever else it shows, it is no check of the loop.
     ///
     /// # Errors

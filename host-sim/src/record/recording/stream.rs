@@ -151,8 +151,10 @@ mod tests {
         assert_eq!(bytes, Recording { header: header(), records }.encode(), "the same bytes as written at once");
         let cut = &bytes[..bytes.len() - 1000];
         assert!(matches!(Recording::decode(cut), Err(RecordingError::Unfinished { .. })));
-        let (kept, finished) = Recording::whole_records(cut).unwrap();
-        assert!(!finished && kept.records.len() > 490);
+        assert!(Recording::growing(cut).is_ok());
+        let salvaged = Recording::whole_records(cut).unwrap();
+        assert!(matches!(salvaged.damage, Some(RecordingError::Unfinished { records }) if records > 490));
+        assert!(salvaged.recording.records.len() > 490);
     }
 
     #[test]

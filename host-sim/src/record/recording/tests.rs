@@ -80,3 +80,29 @@ fn the_place_of_an_alteration_is_told() {
     bytes[third_from_the_end + 20] ^= 1;
     assert_eq!(Recording::decode(&bytes), Err(RecordingError::Chain { record: 2 }));
 }
+
+/// Whatever happens to a recording, what is salvaged is what was recorded up to the damage, and the damage is named.
+#[test]
+fn what_is_salvaged_was_recorded() {
+    let recording = recording(4);
+    let bytes = recording.encode();
+    let header = bytes.len() - 5 * RECORD_BYTES;
+    let salvaged = |bytes: &[u8]| Recording::whole_records(bytes).unwrap();
+    assert_eq!(salvaged(&bytes), Salvaged { recording: recording.clone(), damage: None });
+    for position in header..bytes.len() {
+        let before = (position - header) / RECORD_BYTES;
+        let mut altered = bytes.clone();
+        altered[position] ^= 0x10;
+        let found = salvaged(&altered);
+        assert_eq!(found.recording.records, recording.records[..before], "byte {position}");
+        assert_eq!(found.damage, Some(RecordingError::Chain { record: before }));
+        assert_eq!(Recording::growing(&altered), Err(RecordingError::Chain { record: before }));
+        let found = salvaged(&bytes[..position]);
+        assert_eq!(found.recording.records, recording.records[..before], "cut at {position}");
+        assert_eq!(found.damage, Some(RecordingError::Unfinished { records: before }));
+    }
+    let mut longer = bytes;
+    longer.push(0);
+    assert_eq!(salvaged(&longer), Salvaged { recording, damage: Some(RecordingError::Trailing { bytes: 1 }) });
+    assert_eq!(Recording::whole_records(&longer[..header - 1]), Err(RecordingError::Header));
+}

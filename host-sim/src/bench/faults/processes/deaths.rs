@@ -31,7 +31,7 @@ fn whole_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
 
 /// The whole records of a file that may have been cut off; they must replay bit by bit.
 fn cut_off_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
-    let (recording, _) = Recording::whole_records(&read_bytes(path)?)
+    let recording = Recording::growing(&read_bytes(path)?)
         .map_err(|source| RecordError::Recording { path: path.to_owned(), source })?;
     replay(&recording, path)?;
     Ok(recording.records)
@@ -116,8 +116,8 @@ fn kill_plant(stage: &Stage<'_>, phase: u64, evidence: &mut Evidence) -> Result<
 pub(super) fn reaches(record: &Path, mode: Mode, process: &mut Process) -> bool {
     wait_until(ms(5000), || {
         let bytes = std::fs::read(record).unwrap_or_default();
-        let found = Recording::whole_records(&bytes)
-            .is_ok_and(|(recording, _)| recording.records.iter().any(|r| r.tick.command.state == mode as u32));
+        let found = Recording::growing(&bytes)
+            .is_ok_and(|recording| recording.records.iter().any(|r| r.tick.command.state == mode as u32));
         found || process.wait(ms(0)).is_some()
     })
 }

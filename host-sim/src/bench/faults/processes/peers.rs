@@ -355,7 +355,7 @@ pub(crate) fn panic_in_step(stage: &Stage<'_>, evidence: &mut Evidence) -> Resul
             close(evidence, &json, &plant_json);
         }
         let bytes = std::fs::read(&record).unwrap_or_default();
-        let records = Recording::whole_records(&bytes).map(|(recording, _)| recording.records).unwrap_or_default();
+        let records = Recording::growing(&bytes).map(|recording| recording.records).unwrap_or_default();
         let place = records.iter().position(|record| record.tick.inputs.tick >= tick);
         let after = place.map_or(&[] as &[_], |place| &records[place..]);
         let before = place.and_then(|place| place.checked_sub(1)).map(|place| records[place].tick.command);

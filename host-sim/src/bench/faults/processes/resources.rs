@@ -92,9 +92,7 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
     evidence.require(kept.is_empty() && evidence.injected > 0, || format!("still there: {kept:?}"));
     let records = || {
         let bytes = std::fs::read(&record).unwrap_or_default();
-        crate::record::recording::Recording::whole_records(&bytes)
-            .map(|(recording, _)| recording.records)
-            .unwrap_or_default()
+        crate::record::recording::Recording::growing(&bytes).map(|recording| recording.records).unwrap_or_default()
     };
     let before = records().len();
     pause(ms(500));
