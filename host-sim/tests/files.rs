@@ -1,4 +1,4 @@
-//! Files for other tools, read back with readers that are not ours: `mcap`, `meshio` and `jsonschema` from PyPI. Where
+//! Files for other tools, read back with readers that are not ours: `mcap`, `vtk` and `jsonschema` from PyPI. Where
 //! they are not installed, that part says "skipped".
 
 use std::path::{Path, PathBuf};
@@ -49,13 +49,15 @@ fn check_exports(folder: &Path, report: &Path) -> usize {
 
 /// Every file of the series is there, and its time rises.
 fn check_series(report: &Path) {
-    let pvd = std::fs::read_to_string(report.join("inclusion-dynamic.pvd")).unwrap();
-    let pvd = roxmltree::Document::parse(&pvd).unwrap();
-    let sets: Vec<_> = pvd.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
-    assert_eq!(sets.len(), 21);
-    assert!(sets.iter().all(|set| report.join(set.attribute("file").unwrap()).is_file()));
-    let at = |set: &roxmltree::Node<'_, '_>| set.attribute("timestep").unwrap().parse::<f64>().unwrap();
-    assert!(sets.windows(2).all(|pair| at(&pair[0]) < at(&pair[1])));
+    for name in ["inclusion-dynamic.pvd", "inclusion-dynamic-parts.pvd"] {
+        let pvd = std::fs::read_to_string(report.join(name)).unwrap();
+        let pvd = roxmltree::Document::parse(&pvd).unwrap();
+        let sets: Vec<_> = pvd.descendants().filter(|node| node.has_tag_name("DataSet")).collect();
+        assert_eq!(sets.len(), 21);
+        assert!(sets.iter().all(|set| report.join(set.attribute("file").unwrap()).is_file()));
+        let at = |set: &roxmltree::Node<'_, '_>| set.attribute("timestep").unwrap().parse::<f64>().unwrap();
+        assert!(sets.windows(2).all(|pair| at(&pair[0]) < at(&pair[1])));
+    }
 }
 
 /// `mcap` reads every message, and its largest error is the result's; `rows` are those of the time series.
@@ -79,15 +81,23 @@ fn check_mcap(folder: &Path, report: &Path, rows: usize) {
     assert!((worst.parse::<f64>().unwrap() - ours).abs() <= 1e-12, "{said} {ours}");
 }
 
-/// `meshio` reads the last body, in which the tissue at the needle is as deep as the needle.
+/// `vtk` reads the last body and what is beside it: tensors as such, the tissue at the needle as deep as the needle, and a
+/// picture's script that Python understands.
 fn check_vtu(report: &Path) {
-    let program = "import meshio, numpy as np\n\
-         m = meshio.read('inclusion-dynamic-020.vtu')\n\
-         u = m.point_data['displacement']\n\
-         assert np.isfinite(u).all() and np.concatenate(m.cell_data['det_f']).min() > 0\n\
-         under = (np.abs(m.points[:, 1] - 1) < 1e-9) & (np.abs(m.points[:, 0] - 0.5) < 0.06)\n\
-         print(len(m.points), float(u[under, 1].mean()))\n";
-    let Some(said) = python("meshio", report, program) else { return };
+    let program = "import ast, vtk\nfrom vtk.util.numpy_support import vtk_to_numpy as numpy\n\
+         ast.parse(open('inclusion-dynamic.py').read())\n\
+         def read(name):\n\
+         \x20   r = vtk.vtkXMLUnstructuredGridReader(); r.SetFileName(name); r.Update(); return r.GetOutput()\n\
+         m = read('inclusion-dynamic-020.vtu')\n\
+         x, u = numpy(m.GetPoints().GetData()), numpy(m.GetPointData().GetArray('displacement'))\n\
+         assert numpy(m.GetCellData().GetArray('det_f')).min() > 0\n\
+         assert numpy(m.GetCellData().GetArray('cauchy_stress')).shape == (m.GetNumberOfCells(), 9)\n\
+         under = (abs(x[:, 1] - 1) < 1e-9) & (abs(x[:, 0] - 0.5) < 0.06)\n\
+         parts = read('inclusion-dynamic-020-parts.vtu')\n\
+         part = numpy(parts.GetCellData().GetArray('part')).tolist()\n\
+         assert sorted(set(part)) == [1, 2, 3, 4] and part.count(4) == 5, part\n\
+         print(len(x), float(u[under, 1].mean()))\n";
+    let Some(said) = python("vtk", report, program) else { return };
     let (points, deepest) = said.trim().split_once(' ').unwrap();
     assert!(points.parse::<usize>().unwrap() > 100);
     // Held values are met at nodes; corners of cells lie between them, where a meshfree field overshoots a little.

@@ -7,12 +7,13 @@ use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
 use model_offline::output;
-use model_offline::output::check_outputs;
+use model_offline::output::vtu::{self, Shown};
+use model_offline::output::{body, check_outputs};
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `solve`.
 #[derive(Debug, clap::Args)]
@@ -41,7 +42,8 @@ pub(super) struct SolveArgs {
     /// Write the result as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Write displacement, strain, stress and det F for ParaView.
+    /// Write displacement, strain and stress for ParaView; beside it needle, target and paddles (-parts.vtu) and a script that
+    /// shows all of it (.py).
     #[arg(long, value_name = "FILE")]
     vtu: Option<PathBuf>,
     /// Draw the deformed body.
@@ -83,7 +85,10 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
             "raise depth in [needle]: nodes are placed along its shaft",
         ));
     }
-    let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref()), ("--svg", args.svg.as_deref())];
+    let beside = args.vtu.as_deref().map(beside);
+    let [parts, script] = [0, 1].map(|i| ("--vtu", beside.as_ref().map(|files| files[i].as_path())));
+    let [json, vtu, svg] = [&args.json, &args.vtu, &args.svg].map(Option::as_deref);
+    let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg), parts, script];
     check_outputs(&[&args.scene.scene], &outputs)?;
     solve(&scene, displacement, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
 }
@@ -258,13 +263,28 @@ fn write(
         document["strain_energy"] = needle.energy().stored.into();
     }
     write_json(args.json.as_deref(), &document)?;
+    let within = matches!(solved, Solved::Within(..));
+    let state = body::State { coefficients: solved.coefficients(), depth: args.depth, within };
     if let Some(path) = &args.vtu {
-        output::write_whole(path, output::vtu::vtu(model, solved.coefficients()).as_bytes())?;
+        write_for_paraview(model, state, path)?;
     }
     if let Some(path) = &args.svg {
-        let within = matches!(solved, Solved::Within(..));
-        let state = output::body::State { coefficients: solved.coefficients(), depth: args.depth, within };
-        output::write_whole(path, output::body::svg(model, state).as_bytes())?;
+        output::write_whole(path, body::svg(model, state).as_bytes())?;
     }
     Ok(())
+}
+
+/// Files beside the body's: needle, target and paddles, and the script that shows all of it.
+fn beside(vtu: &Path) -> [PathBuf; 2] {
+    let stem = vtu.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    [vtu.with_file_name(format!("{stem}-parts.vtu")), vtu.with_file_name(format!("{stem}.py"))]
+}
+
+fn write_for_paraview(model: &TissueModel, state: body::State<'_>, file: &Path) -> Result<(), CliError> {
+    let [parts, script] = beside(file);
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let shown = Shown { body: &name(file), parts: &name(&parts), stress: vtu::has_stress(model) };
+    output::write_whole(file, vtu::vtu(model, state.coefficients).as_bytes())?;
+    output::write_whole(&parts, vtu::parts(model, state).as_bytes())?;
+    Ok(output::write_whole(&script, vtu::script(model.scene(), shown).as_bytes())?)
 }

@@ -134,6 +134,11 @@ impl Law {
         Ok(law)
     }
 
+    /// Whether it says what happens outside of the plane, too.
+    pub fn holds_in_space(&self) -> bool {
+        !matches!(self.form, Form::FungGeneral(_))
+    }
+
     /// Fung's law in isotropic form (the paper's equation 6, its Table I summed over a symmetric strain):
     /// `W = ½ [λ (tr E)² + 2μ E:E] + (c/2) (exp[λc (tr E)² + 2μc E:E] − 1)`.
     ///

@@ -1,0 +1,132 @@
+use super::*;
+use crate::material::Law;
+use crate::output::body::State;
+use crate::scene::Scene;
+use nalgebra::Matrix2;
+use roxmltree::Document;
+
+/// A bundled scene of linear tissue with this rule, and what it says of a uniform displacement gradient.
+fn uniform(name: &str, integration: Integration, gradient: Matrix2<f64>) -> (TissueModel, Vec<f64>) {
+    let mut scene = Scene::bundled(name).unwrap().without_inclusions();
+    scene.material = Law::linear(383.0, 318.5).unwrap();
+    scene.discretization.method.integration = integration;
+    scene.discretization.method.support = integration.default_support();
+    let model = TissueModel::new(&scene).unwrap();
+    // Linear completeness: coefficients that are a linear field's nodal values give that field.
+    let coefficients = model.positions().iter().flat_map(|x| <[f64; 2]>::from(gradient * x)).collect();
+    (model, coefficients)
+}
+
+fn numbers(document: &Document<'_>, name: &str) -> Vec<f64> {
+    let array = document.descendants().find(|node| node.attribute("Name") == Some(name)).expect(name);
+    array.text().unwrap().split_whitespace().map(|word| word.parse().unwrap()).collect()
+}
+
+/// Uniaxial strain and simple shear of linear tissue: stress in closed form, out of the plane too.
+#[test]
+fn stress_of_a_uniform_strain_is_that_of_hookes_law() {
+    let (lambda, mu, e) = (383.0, 318.5, 1e-6);
+    for integration in [Integration::Scni, Integration::FemT3, Integration::FemT6] {
+        let (model, stretched) = uniform("paper", integration, Matrix2::new(e, 0.0, 0.0, 0.0));
+        let text = vtu(&model, &stretched);
+        let document = Document::parse(&text).unwrap();
+        let near = |found: f64, expected: f64| (found - expected).abs() < 1e-4 * mu * e;
+        let axial = (lambda + 2.0 * mu) * e;
+        let expected = [axial, 0.0, 0.0, 0.0, lambda * e, 0.0, 0.0, 0.0, lambda * e];
+        let tensors = numbers(&document, "cauchy_stress");
+        assert_eq!(tensors.len(), 9 * model.cells().len());
+        for tensor in tensors.chunks(9) {
+            assert!(tensor.iter().zip(expected).all(|(a, b)| near(*a, b)), "{integration}: {tensor:?}");
+        }
+        for principal in numbers(&document, "principal_stress").chunks(3) {
+            assert!(principal.iter().zip([axial, lambda * e, lambda * e]).all(|(a, b)| near(*a, b)), "{principal:?}");
+        }
+        assert!(numbers(&document, "von_mises_stress").iter().all(|v| near(*v, 2.0 * mu * e)));
+        assert!(numbers(&document, "det_f").iter().all(|j| (j - 1.0 - e).abs() < 1e-9));
+        assert!(numbers(&document, "principal_strain").chunks(3).all(|p| (p[0] - e).abs() < 1e-4 * e));
+        let moved = numbers(&document, "displacement");
+        let points = numbers(&document, "Points");
+        assert!(moved.chunks(3).zip(points.chunks(3)).all(|(u, x)| (u[0] - e * x[0]).abs() < 1e-9 * e && u[1] == 0.0));
+
+        let (model, sheared) = uniform("paper", integration, Matrix2::new(0.0, e, 0.0, 0.0));
+        let text = vtu(&model, &sheared);
+        let document = Document::parse(&text).unwrap();
+        assert!(numbers(&document, "von_mises_stress").iter().all(|v| near(*v, 3.0_f64.sqrt() * mu * e)));
+    }
+}
+
+/// Elements share the model's nodes; nodal cells are a net without seams: corners − edges + cells = 1 (Euler).
+#[test]
+fn cells_are_connected() {
+    for name in ["paper", "breast"] {
+        for (integration, shape) in [(Integration::FemT3, 5.0), (Integration::FemT6, 22.0)] {
+            let (model, u) = uniform(name, integration, Matrix2::zeros());
+            let text = vtu(&model, &u);
+            let document = Document::parse(&text).unwrap();
+            assert_eq!(numbers(&document, "Points").len(), 3 * model.nodes(), "{name} {integration}");
+            assert!(numbers(&document, "types").iter().all(|t| *t == shape));
+        }
+        let (model, u) = uniform(name, Integration::Scni, Matrix2::zeros());
+        let text = vtu(&model, &u);
+        let document = Document::parse(&text).unwrap();
+        let corners = numbers(&document, "connectivity");
+        let ends = numbers(&document, "offsets");
+        let mut edges = std::collections::HashSet::new();
+        let mut start = 0;
+        for end in ends.iter().map(|end| *end as usize) {
+            let cell = &corners[start..end];
+            for (i, a) in cell.iter().enumerate() {
+                let b = cell[(i + 1) % cell.len()];
+                edges.insert((a.min(b) as u64, a.max(b) as u64));
+            }
+            start = end;
+        }
+        let points = numbers(&document, "Points").len() / 3;
+        assert_eq!(points + ends.len(), edges.len() + 1, "{name}: {points} corners, {} cells", ends.len());
+    }
+}
+
+#[test]
+fn regions_and_materials_are_numbered_and_unknown_stress_is_left_out() {
+    let model = TissueModel::new(&Scene::bundled("breast").unwrap()).unwrap();
+    let text = vtu(&model, &vec![0.0; 2 * model.nodes()]);
+    let document = Document::parse(&text).unwrap();
+    let regions = numbers(&document, "region");
+    for (cell, region) in model.cells().iter().zip(&regions) {
+        let inside = model.scene().inclusions.iter().position(|i| i.outline.contains(cell.centroid()));
+        assert_eq!(*region, inside.map_or(0.0, |i| i as f64 + 1.0));
+    }
+    assert!(regions.contains(&1.0));
+    assert!(text.contains("Name=\"displacement [mm]\"") && text.contains("Name=\"von_mises_stress [kPa]\""));
+    let relaxing = TissueModel::new(&Scene::bundled("breast-world").unwrap()).unwrap();
+    let text = vtu(&relaxing, &vec![0.0; 2 * relaxing.nodes()]);
+    assert!(!has_stress(&relaxing) && !text.contains("stress"), "its past is not in the displacement");
+}
+
+/// Needle, target and paddles are where the scene has them and go where the tissue does; names are escaped.
+#[test]
+fn parts_and_script_show_the_scene() {
+    let mut scene = Scene::bundled("paper").unwrap();
+    scene.length_unit = "\"<m>&".to_owned();
+    let model = TissueModel::new(&scene).unwrap();
+    let gradient = Matrix2::new(0.01, 0.02, -0.03, 0.005);
+    let coefficients: Vec<f64> = model.positions().iter().flat_map(|x| <[f64; 2]>::from(gradient * x)).collect();
+    let text = parts(&model, State { coefficients: &coefficients, depth: 0.1, within: false });
+    let document = Document::parse(&text).unwrap();
+    let part = numbers(&document, "part");
+    assert_eq!(part.iter().filter(|p| **p == 4.0).count(), scene.paddles.len());
+    assert_eq!(
+        numbers(&document, "paddle").iter().sum::<f64>(),
+        scene.paddles.iter().map(|p| f64::from(p.index)).sum::<f64>()
+    );
+    let (points, moved) = (numbers(&document, "Points"), numbers(&document, "displacement [\"<m>&]"));
+    for (x, u) in points.chunks(3).zip(moved.chunks(3)) {
+        let expected = gradient * Point2::new(x[0], x[1]);
+        assert!((u[0] - expected.x).abs() < 1e-8 && (u[1] - expected.y).abs() < 1e-8, "{x:?} {u:?}");
+    }
+    let target: [f64; 2] = scene.target.into();
+    assert!(points.chunks(3).any(|x| [x[0], x[1]] == target));
+    let shown = Shown { body: "a \"b\".vtu", parts: "p.vtu", stress: true };
+    let script = script(&scene, shown);
+    assert!(script.contains(r#"deformed("a \"b\".vtu")"#) && script.contains(r#"displacement [\"<m>&]"#), "{script}");
+}
