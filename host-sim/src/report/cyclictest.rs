@@ -52,16 +52,14 @@ pub fn histogram_file(loops: &[Column<'_>]) -> String {
         let row: String = of_loops.iter().map(|count| format!("\t{count:06}")).collect();
         text.push_str(&format!("{bin_us:06}{row}\n"));
     }
-    let lines: [(&str, &dyn Fn(&Column<'_>) -> u64); 4] = [
-        ("Total", &|column| column.count()),
-        ("Min Latencies", &|column| column.min_us()),
-        ("Avg Latencies", &|column| column.mean_us()),
-        ("Max Latencies", &|column| column.max_us()),
-    ];
-    for (name, what) in lines {
-        let row: String = loops.iter().map(|column| format!(" {:05}", what(column))).collect();
+    let mut line = |name: &str, of: fn(&Column<'_>) -> u64| {
+        let row: String = loops.iter().map(|column| format!(" {:05}", of(column))).collect();
         text.push_str(&format!("# {name}:{row}\n"));
-    }
+    };
+    line("Total", |column| column.count());
+    line("Min Latencies", |column| column.min_us());
+    line("Avg Latencies", |column| column.mean_us());
+    line("Max Latencies", |column| column.max_us());
     text
 }
 

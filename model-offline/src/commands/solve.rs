@@ -8,7 +8,7 @@ use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
 use model_offline::output;
 use model_offline::output::vtu::{self, Shown};
-use model_offline::output::{body, check_outputs};
+use model_offline::output::{State, body, check_outputs};
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
@@ -264,7 +264,7 @@ fn write(
     }
     write_json(args.json.as_deref(), &document)?;
     let within = matches!(solved, Solved::Within(..));
-    let state = body::State { coefficients: solved.coefficients(), depth: args.depth, within };
+    let state = State { coefficients: solved.coefficients(), depth: args.depth, within };
     if let Some(path) = &args.vtu {
         write_for_paraview(model, state, path)?;
     }
@@ -280,7 +280,7 @@ fn beside(vtu: &Path) -> [PathBuf; 2] {
     [vtu.with_file_name(format!("{stem}-parts.vtu")), vtu.with_file_name(format!("{stem}.py"))]
 }
 
-fn write_for_paraview(model: &TissueModel, state: body::State<'_>, file: &Path) -> Result<(), CliError> {
+fn write_for_paraview(model: &TissueModel, state: State<'_>, file: &Path) -> Result<(), CliError> {
     let [parts, script] = beside(file);
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let shown = Shown { body: &name(file), parts: &name(&parts), stress: vtu::has_stress(model) };

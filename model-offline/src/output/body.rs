@@ -3,7 +3,7 @@
 use super::chart::number::plain;
 use super::chart::style::band;
 use super::chart::{Drawing, Marker, Plane, Px, colour_bar, heading, sheet};
-use super::vtu::cell_gradients;
+use super::state::{State, cell_gradients};
 use crate::geometry::Point2;
 use crate::material::green_lagrange;
 use crate::model::TissueModel;
@@ -11,17 +11,6 @@ use crate::model::TissueModel;
 /// Width of the picture, and room around the body as a part of its size.
 const WIDTH: f64 = 640.0;
 const MARGIN: f64 = 0.06;
-
-/// A state of a body and its needle.
-#[derive(Debug, Clone, Copy)]
-pub struct State<'a> {
-    /// Nodal coefficients, two numbers per node.
-    pub coefficients: &'a [f64],
-    /// Needle depth, length.
-    pub depth: f64,
-    /// Whether the needle is in the tissue, and not pushing it.
-    pub within: bool,
-}
 
 /// A picture of a body, self-contained.
 pub fn svg(model: &TissueModel, state: State<'_>) -> String {

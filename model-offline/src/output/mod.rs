@@ -4,11 +4,13 @@ pub mod body;
 pub mod chart;
 pub mod csv;
 mod preflight;
+mod state;
 pub mod table_text;
 pub mod terminal;
 pub mod vtu;
 
 pub use preflight::{OutputRefused, RefusalReason, check_outputs};
+pub use state::State;
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use model_offline::model::TissueModel;
-use model_offline::output::body::State;
+use model_offline::output::State;
 use model_offline::output::vtu::{Shown, has_stress, parts, script, vtu};
 
 use crate::record::files::Artifact;

@@ -12,8 +12,8 @@ use self::grid::{Array, Grid, Shape};
 use crate::discretization::Integration;
 use crate::geometry::Point2;
 use crate::material::{Law, Material as _, Matrix, determinant, green_lagrange};
-use crate::mechanics::assembly::displacement_gradient;
 use crate::model::TissueModel;
+use crate::output::state::cell_gradients;
 
 /// The body as a VTU file, cells connected: nodal cells as polygons, elements as triangles, quadratic ones as such.
 ///
@@ -112,17 +112,6 @@ fn von_mises(stress: &Matrix<3>) -> f64 {
 /// A name with its unit.
 fn in_unit(name: &str, unit: &str) -> String {
     if unit == "1" || unit.is_empty() { name.to_owned() } else { format!("{name} [{unit}]") }
-}
-
-/// Displacement gradient of every cell: the average over its integration points.
-pub(crate) fn cell_gradients(model: &TissueModel, coefficients: &[f64]) -> Vec<Matrix<2>> {
-    let mut sums = vec![(Matrix::<2>::zeros(), 0.0); model.cells().len()];
-    for (q, point) in model.rule().points().enumerate() {
-        let (sum, weight) = &mut sums[point.cell as usize];
-        *sum += displacement_gradient(model.rule(), q, coefficients) * point.weight;
-        *weight += point.weight;
-    }
-    sums.into_iter().map(|(sum, weight)| sum / weight).collect()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use super::grid::{Array, Grid, Shape};
 use super::in_unit;
 use crate::geometry::Point2;
 use crate::model::TissueModel;
-use crate::output::body::State;
+use crate::output::state::State;
 
 /// A part's number in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,6 @@
 use super::*;
 use crate::material::Law;
-use crate::output::body::State;
+use crate::output::state::State;
 use crate::scene::Scene;
 use nalgebra::Matrix2;
 use roxmltree::Document;
