@@ -5,10 +5,10 @@ mod commands;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let cli = commands::parse();
+    let command = commands::parse();
     // Two processes share one terminal: whose error is it?
-    let is_controller = matches!(cli.command, Some(commands::Command::Controller(_)));
-    match commands::execute(cli) {
+    let is_controller = matches!(command, commands::Command::Controller(_));
+    match commands::execute(command) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let code = error.exit_code();

@@ -20,6 +20,7 @@ mod worlds;
 
 use std::path::{Path, PathBuf};
 
+use clap::error::ContextKind;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use host_sim::SimError;
 use host_sim::record::error::FileError;
@@ -45,15 +46,12 @@ use self::worlds::{WorldsArgs, worlds};
 
 /// Simulates needle insertions with a paddle that holds the target still. Without a command: `run` on the paper's scene
 #[derive(Debug, Parser)]
-#[command(version, about, args_conflicts_with_subcommands = true)]
+#[command(version)]
 #[command(after_help = "Example: host-sim run --tissue inclusion --seed 7 --out my-report")]
 pub(crate) struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub(crate) command: Option<Command>,
-    /// Options of `run`.
-    #[command(flatten)]
-    pub(crate) run: RunArgs,
+    command: Command,
 }
 
 /// What to do.
@@ -143,8 +141,7 @@ pub(crate) enum Command {
 ///
 /// # Errors
 /// [`SimError`], with its exit code.
-pub(crate) fn execute(cli: Cli) -> Result<(), SimError> {
-    let command = cli.command.unwrap_or_else(|| Command::Run(Box::new(cli.run)));
+pub(crate) fn execute(command: Command) -> Result<(), SimError> {
     match command {
         Command::Run(args) => run(&args),
         Command::Controller(args) => controller(&args),
@@ -203,20 +200,35 @@ fn man(directory: &Path) -> Result<(), SimError> {
 const ELSEWHERE: [&str; 10] =
     ["place", "solve", "table", "inspect", "new", "fit", "compare", "materials", "pareto", "sweep"];
 
-/// Reads the command line; ends the process with help, or with what is wrong and what was meant.
-pub(crate) fn parse() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
-        let wrong = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
-        // `run` is also what happens without a command: a wrong word is then an argument that is not expected.
-        let word = wrong.or_else(|| error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string));
-        let _ = error.print();
-        if let Some(word) = word {
-            if ELSEWHERE.contains(&word.as_str()) {
-                eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
-            } else {
-                terminal::suggest(&error, &word, &Cli::command());
-            }
+/// Reads the command line; ends the process with help, or with what is wrong and what was meant. Without a word it is `run`.
+pub(crate) fn parse() -> Command {
+    let mut words: Vec<_> = std::env::args_os().collect();
+    if words.len() < 2 {
+        words.push("run".into());
+    }
+    Cli::try_parse_from(words).map_or_else(|error| refuse(&error), |cli| cli.command)
+}
+
+fn refuse(error: &clap::Error) -> ! {
+    let context = |kind| error.get(kind).map(ToString::to_string);
+    let _ = error.print();
+    if let Some(word) = context(ContextKind::InvalidSubcommand) {
+        if ELSEWHERE.contains(&word.as_str()) {
+            eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
+        } else {
+            terminal::suggest(error, &word, &Cli::command());
         }
-        std::process::exit(error.exit_code());
-    })
+    } else if let Some(option) = context(ContextKind::InvalidArg)
+        && std::env::args().nth(1).is_some_and(|first| first.starts_with(&option))
+        && is_option_of_run(&option)
+    {
+        eprintln!("\n  tip: `{option}` is an option of run: host-sim run {option}");
+    }
+    std::process::exit(error.exit_code());
+}
+
+fn is_option_of_run(option: &str) -> bool {
+    let name = option.trim_start_matches('-');
+    let cli = Cli::command();
+    cli.find_subcommand("run").is_some_and(|run| run.get_arguments().any(|arg| arg.get_long() == Some(name)))
 }
