@@ -31,9 +31,35 @@ pub fn length(value: f64) -> String {
     format!("{value:.*}", decimals(value, 4))
 }
 
+/// Four digits, without zeros at the end.
+pub fn short(value: f64) -> String {
+    without_zeros(format!("{value:.*}", decimals(value, 0)))
+}
+
+/// A coordinate of a body of this size, to a ten-thousandth of it, without zeros at the end: far from the origin four
+/// digits would all be the same.
+pub fn coordinate(value: f64, size: f64) -> String {
+    without_zeros(format!("{:.*}", decimals(0.1 * size, 0), value))
+}
+
+fn without_zeros(text: String) -> String {
+    let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn short_numbers_have_no_zeros_at_the_end_and_coordinates_as_many_digits_as_the_body_asks() {
+        let shown = [(12.0, "12"), (0.30000000000000004, "0.3"), (1234567.0, "1234567"), (-0.0, "0"), (2.5e-4, "0.00025")];
+        assert_eq!(shown.map(|(value, _)| short(value)), shown.map(|(_, text)| text));
+        assert_eq!(short(f64::INFINITY), "inf");
+        assert_eq!(coordinate(1_000_012.3456, 50.0), "1000012.346");
+        assert_eq!(coordinate(-1e-12, 1.0), "0");
+        assert_eq!(coordinate(100.0, 4000.0), "100");
+    }
 
     #[test]
     fn small_numbers_keep_their_digits_and_large_ones_their_decimals() {

@@ -1,8 +1,10 @@
 //! The command line of `model-offline`: one file per command.
 
+mod check;
 mod common;
 mod compare;
 mod completions;
+mod draw;
 mod error;
 mod fit;
 mod inspect;
@@ -36,6 +38,12 @@ enum Command {
     /// Full placement study: every paddle, static and dynamic.
     #[command(after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json")]
     Place(place::PlaceArgs),
+    /// A scene's numbers, and what of it is seldom meant, without solving.
+    #[command(after_help = "Example:\n  model-offline check breast --json check.json")]
+    Check(check::CheckArgs),
+    /// Draws a scene: body, needle, target, paddles and inclusions, named and to scale.
+    #[command(after_help = "Example:\n  model-offline draw breast -o breast.svg")]
+    Draw(draw::DrawArgs),
     /// One equilibrium: needle at a depth, one paddle displaced.
     #[command(
         after_help = "Example:\n  model-offline solve paper --paddle 3 --depth 0.1 --vtu body.vtu --svg body.svg"
@@ -95,6 +103,8 @@ enum Command {
 pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
     match cli.command {
         Command::Place(args) => place::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Draw(args) => draw::run(&args),
         Command::Solve(args) => solve::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Stability(args) => stability::run(&args),

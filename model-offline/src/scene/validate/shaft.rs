@@ -1,7 +1,8 @@
 //! The rules of a needle that slips.
 
+use super::boundary::Boundary;
 use super::{Checked, Validator};
-use crate::geometry::{Location, Polygon};
+use crate::geometry::Location;
 use crate::scene::schema::{InclusionSection, Located};
 use crate::scene::{Mechanics, Needle, Resistance, Shaft};
 
@@ -22,7 +23,8 @@ impl ResistanceKeys<'_> {
 
 impl Validator<'_> {
     /// The shaft, where the needle is one.
-    pub(super) fn shaft(&self, needle: &Needle, outline: &Polygon, tolerance: f64) -> Checked<Option<Shaft>> {
+    pub(super) fn shaft(&self, needle: &Needle, boundary: &Boundary<'_>) -> Checked<Option<Shaft>> {
+        let Boundary { outline, tolerance, .. } = *boundary;
         let section = &self.file.needle;
         let keys = ResistanceKeys {
             cutting_force: &section.cutting_force,
@@ -45,7 +47,7 @@ impl Validator<'_> {
         let entry = match &section.entry {
             None => needle.entry(),
             Some(entry) => {
-                let point = self.point(entry.get(), entry.span(), "entry")?;
+                let point = boundary.snapped(self.point(entry.get(), entry.span(), "entry")?);
                 if outline.locate(point, tolerance) == Location::Outside {
                     return Err(self.error(
                         entry.span(),
