@@ -1,5 +1,6 @@
 //! `model-offline draw`: a scene as a picture.
 
+use super::check::warned;
 use super::common::SceneArgs;
 use super::error::CliError;
 use model_offline::output;
@@ -29,5 +30,7 @@ pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
     }
     let scene = args.scene.read_any()?;
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
-    Ok(output::write_whole(&args.output, scene_picture::svg(&scene).as_bytes())?)
+    output::write_whole(&args.output, scene_picture::svg(&scene).as_bytes())?;
+    eprint!("{}", warned(&scene.told_warnings()));
+    Ok(())
 }
