@@ -36,6 +36,16 @@ pub fn short(value: f64) -> String {
     without_zeros(format!("{value:.*}", decimals(value, 0)))
 }
 
+/// Four digits with their unit; the label `1` means that there is none.
+pub fn in_unit(value: f64, unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { short(value) } else { format!("{} {unit}", short(value)) }
+}
+
+/// The same for an area, by the unit of length.
+pub fn area(value: f64, unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { short(value) } else { format!("{} {unit}²", short(value)) }
+}
+
 /// A coordinate of a body of this size, to a ten-thousandth of it, without zeros at the end: far from the origin four
 /// digits would all be the same.
 pub fn coordinate(value: f64, size: f64) -> String {
@@ -53,10 +63,12 @@ mod tests {
 
     #[test]
     fn short_numbers_have_no_zeros_at_the_end_and_coordinates_as_many_digits_as_the_body_asks() {
-        let shown = [(12.0, "12"), (0.30000000000000004, "0.3"), (1234567.0, "1234567"), (-0.0, "0"), (2.5e-4, "0.00025")];
+        let shown =
+            [(12.0, "12"), (0.30000000000000004, "0.3"), (1234567.0, "1234567"), (-0.0, "0"), (2.5e-4, "0.00025")];
         assert_eq!(shown.map(|(value, _)| short(value)), shown.map(|(_, text)| text));
         assert_eq!(short(f64::INFINITY), "inf");
-        assert_eq!(coordinate(1_000_012.3456, 50.0), "1000012.346");
+        assert_eq!([in_unit(12.0, "mm"), in_unit(12.0, "1"), area(0.5, "in")], ["12 mm", "12", "0.5 in²"]);
+        assert_eq!(coordinate(1_000_012.345_6, 50.0), "1000012.346");
         assert_eq!(coordinate(-1e-12, 1.0), "0");
         assert_eq!(coordinate(100.0, 4000.0), "100");
     }

@@ -26,10 +26,10 @@ fn whole() -> f64 {
     1.0
 }
 
-/// Points, or a part of an edge of the outline. Points that are meant to lie on the boundary and miss it by less than a
-/// thousandth of the body's size (the diagonal of its bounding box) are put onto it.
+/// Points, or a part of an edge of the outline. Points that must lie on the boundary and miss it by less than a thousandth of
+/// the body's size (the diagonal of its bounding box) are put onto it; so is a needle contact that is outside by as much.
 #[derive(Debug, Clone, PartialEq, JsonSchema)]
-#[schemars(untagged)]
+#[schemars(untagged, rename = "OnBoundary_{T}")]
 pub enum OnBoundary<T> {
     /// By its points.
     Points(T),

@@ -156,7 +156,12 @@ impl Scene {
                 off_needle,
                 from_boundary: self.outline.distance_to_boundary(self.target),
             },
-            inclusions: self.inclusions.iter().zip(1..).map(|(one, number)| self.inclusion_facts(one, number)).collect(),
+            inclusions: self
+                .inclusions
+                .iter()
+                .zip(1..)
+                .map(|(one, number)| self.inclusion_facts(one, number))
+                .collect(),
             paddles: (0..self.paddles.len()).map(|i| self.paddle_facts(i)).collect(),
             spacing,
             nodes: spacing.and_then(|spacing| self.nodes_at(spacing)),

@@ -44,6 +44,9 @@ pub const BUNDLED: [(&str, &str); 7] = [
     ("tethered", include_str!("../../scenes/tethered.toml")),
 ];
 
+/// Letters in which a name may differ from the one that it was meant for.
+const LETTERS: usize = 2;
+
 /// A validated scene.
 ///
 /// # Example
@@ -196,6 +199,14 @@ impl Scene {
         if path.is_file() { None } else { BUNDLED.iter().find(|(name, _)| Path::new(name) == path) }
     }
 
+    /// The bundled scene that a name was meant for: a letter or two differ, or it has a folder or an ending too many.
+    fn nearly_bundled(path: &Path) -> Option<&'static str> {
+        let word = path.file_stem()?.to_str()?.to_lowercase();
+        let distance = |name: &str| strsim::osa_distance(&word, name);
+        let (distance, name) = BUNDLED.iter().map(|(name, _)| (distance(name), *name)).min_by_key(|near| near.0)?;
+        (distance <= LETTERS && 3 * distance <= word.chars().count()).then_some(name)
+    }
+
     /// The text of a scene file, or of a bundled scene, not yet parsed.
     ///
     /// # Errors
@@ -207,10 +218,11 @@ impl Scene {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| {
             let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
+            let meant = Self::nearly_bundled(path).map_or_else(String::new, |name| format!("did you mean `{name}`? "));
             error::Source { file: &file, text: "" }.error(
                 0..0,
                 format!("cannot read the scene: {error}"),
-                format!("give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
+                format!("{meant}give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
             )
         })?;
         String::from_utf8(bytes).map_err(|error| {

@@ -1,8 +1,8 @@
 //! What must lie on the boundary: points put onto it where they nearly are, edges and fractions, and how far off what is off.
 
 use super::{Checked, Validator};
-use crate::geometry::{Nearest, Point2, Polygon, nearest_on_loop};
-use crate::number::{coordinate, short};
+use crate::geometry::{Location, Nearest, Point2, Polygon, nearest_on_loop};
+use crate::number::{coordinate, in_unit, short};
 use crate::scene::boundary::{EdgePart, OnBoundary};
 use crate::scene::schema::Located;
 use std::ops::Range;
@@ -21,13 +21,15 @@ pub(super) struct Boundary<'a> {
     pub(super) tolerance: f64,
     /// Distance within which points are put onto the boundary, length units.
     snap: f64,
+    /// Label of the length unit.
+    unit: &'a str,
 }
 
 impl<'a> Boundary<'a> {
-    pub(super) fn new(outline: &'a Polygon, vertices: &[[f64; 2]]) -> Self {
+    pub(super) fn new(outline: &'a Polygon, vertices: &[[f64; 2]], unit: &'a str) -> Self {
         let size = outline.size();
         let vertices = vertices.iter().map(|v| Point2::from(*v)).collect();
-        Self { outline, vertices, tolerance: TOUCHING * size, snap: SNAP * size }
+        Self { outline, vertices, tolerance: TOUCHING * size, snap: SNAP * size, unit }
     }
 
     /// The point, or where it is on the boundary if it is meant to lie there: at a corner that is near enough, else at the
@@ -51,6 +53,20 @@ impl<'a> Boundary<'a> {
             .max_by(|a, b| a.1.distance.total_cmp(&b.1.distance))
     }
 
+    /// Whether a point is in the body or on its boundary.
+    pub(super) fn holds(&self, p: Point2) -> bool {
+        self.outline.locate(p, self.tolerance) != Location::Outside
+    }
+
+    /// How far off the boundary a point is, and where it would be on it.
+    pub(super) fn off(&self, p: Point2) -> String {
+        nearest_on_loop(&self.vertices, p).map_or_else(String::new, |nearest| self.told(p, nearest))
+    }
+
+    fn long(&self, length: f64) -> String {
+        in_unit(length, self.unit)
+    }
+
     fn point(&self, p: Point2) -> String {
         let size = self.outline.size();
         format!("({}, {})", coordinate(p.x, size), coordinate(p.y, size))
@@ -59,19 +75,39 @@ impl<'a> Boundary<'a> {
     /// How far off something is, and where it would be on the boundary.
     fn told(&self, p: Point2, nearest: Nearest) -> String {
         format!(
-            "{} is {} off the outline; the nearest point on it is {}, on edge {} at {:.4} of its length (less than {} off, it \
-             would have been put there)",
+            "{} is {} off the outline; the nearest point on it is {}, on edge {} at {} of its length",
             self.point(p),
-            short(nearest.distance),
+            self.long(nearest.distance),
             self.point(nearest.point),
             nearest.edge,
-            nearest.fraction,
-            short(self.snap),
+            short(nearest.fraction),
         )
     }
 }
 
 impl Validator<'_> {
+    /// The contact, which may also be inside: its points are put onto the boundary where one of them is outside, which nobody
+    /// means. Those of a contact that is inside stay where they are, however near the boundary is.
+    pub(super) fn contact(&self, boundary: &Boundary<'_>) -> Checked<Vec<Point2>> {
+        let located = &self.file.needle.contact;
+        let what = "needle contact";
+        if let OnBoundary::Points(points) = located.get() {
+            let path = self.polyline(points, located.span(), what)?;
+            if path.iter().all(|p| boundary.holds(*p)) {
+                return Ok(path);
+            }
+        }
+        let path = self.points_on(located, boundary, what)?;
+        match path.iter().find(|p| !boundary.holds(**p)) {
+            None => Ok(path),
+            Some(p) => Err(self.error(
+                located.span(),
+                format!("the needle contact reaches outside the outline: {}", boundary.off(*p)),
+                "the contact is tissue that moves with the needle: put it on the boundary or inside",
+            )),
+        }
+    }
+
     /// The points of something on the boundary, by points or by an edge; points near the boundary are put onto it.
     pub(super) fn points_on<T: serde::de::DeserializeOwned + AsRef<[[f64; 2]]>>(
         &self,
@@ -94,7 +130,10 @@ impl Validator<'_> {
                             boundary.point(path[i + 1]),
                             boundary.point(snapped[i])
                         ),
-                        format!("points less than {} off a corner or an edge are put onto it", short(boundary.snap)),
+                        format!(
+                            "points less than {} off a corner or an edge are put onto it",
+                            boundary.long(boundary.snap)
+                        ),
                     )),
                 }
             }
@@ -131,19 +170,30 @@ impl Validator<'_> {
     }
 
     /// Refuses a polyline that leaves the boundary: by how much, and where it would be on it.
-    pub(super) fn stays_on(&self, path: &[Point2], span: Range<usize>, boundary: &Boundary<'_>, what: &str) -> Checked<()> {
+    pub(super) fn stays_on(
+        &self,
+        path: &[Point2],
+        span: Range<usize>,
+        boundary: &Boundary<'_>,
+        what: &str,
+    ) -> Checked<()> {
         match boundary.farthest_off(path) {
             None => Ok(()),
             Some((p, nearest)) => {
-                let given = path.contains(&p);
+                let given = path.iter().any(|own| (own - p).norm() <= boundary.tolerance);
                 let place = if given { "" } else { "between its points, " };
                 Err(self.error(
                     span,
                     format!("{what}: {place}{}", boundary.told(p, nearest)),
                     if given {
-                        "move the point there, or give an edge and fractions of it: { edge = 0, from = 0.2, to = 0.4 }"
+                        format!(
+                            "move the point there (less than {} off, it would have been put there), or give an edge of the \
+                             outline and fractions of it: {{ edge = {}, from = 0.2, to = 0.4 }}",
+                            boundary.long(boundary.snap),
+                            nearest.edge
+                        )
                     } else {
-                        "a piece must lie on an edge of the outline: list the outline's vertices along it"
+                        "every piece must lie on an edge of the outline: list the outline's vertices along it".to_owned()
                     },
                 ))
             }

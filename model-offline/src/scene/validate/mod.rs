@@ -11,7 +11,7 @@ use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
 use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene, Shaft};
 use crate::discretization::{Discretization, Method, Resolution};
-use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
+use crate::geometry::{Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
 use std::ops::Range;
 
@@ -61,7 +61,7 @@ impl Validator<'_> {
             ));
         }
         let outline = self.polygon(&file.domain.outline, "outline")?;
-        let boundary = Boundary::new(&outline, file.domain.outline.get());
+        let boundary = Boundary::new(&outline, file.domain.outline.get(), &file.scene.units.length);
         let immobile = self.immobile(&boundary)?;
         let mut needle = self.needle(&boundary, &immobile)?;
         needle.shaft = self.shaft(&needle, &boundary)?;
@@ -193,7 +193,12 @@ impl Validator<'_> {
             .iter()
             .map(|located| {
                 let path = self.points_on(located, boundary, "immobile path")?;
-                self.stays_on(&path, located.span(), boundary, "this immobile path leaves the boundary of the outline")?;
+                self.stays_on(
+                    &path,
+                    located.span(),
+                    boundary,
+                    "this immobile path leaves the boundary of the outline",
+                )?;
                 Ok(path)
             })
             .collect()
@@ -202,15 +207,7 @@ impl Validator<'_> {
     fn needle(&self, boundary: &Boundary<'_>, immobile: &[Vec<Point2>]) -> Checked<Needle> {
         let Boundary { outline, tolerance, .. } = *boundary;
         let section = &self.file.needle;
-        let contact = self.points_on(&section.contact, boundary, "needle contact")?;
-        let inside = |p: &Point2| outline.locate(*p, tolerance) != Location::Outside;
-        if !contact.iter().all(inside) {
-            return Err(self.error(
-                section.contact.span(),
-                "the needle contact reaches outside the outline",
-                "the contact is tissue that moves with the needle: put it on the boundary or inside",
-            ));
-        }
+        let contact = self.contact(boundary)?;
         if contact.windows(2).any(|s| polyline_near(immobile, s, tolerance)) {
             return Err(self.error(
                 section.contact.span(),
@@ -251,10 +248,12 @@ impl Validator<'_> {
     }
 
     fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {
-        let Surroundings { boundary: &Boundary { outline, tolerance, .. }, immobile, needle } = *around;
+        let Surroundings { boundary, immobile, needle } = *around;
+        let tolerance = boundary.tolerance;
         let span = self.file.target.position.span();
-        if outline.locate(target, tolerance) == Location::Outside {
-            return Err(self.error(span, "the target is outside the outline", "move the target into the body"));
+        if !boundary.holds(target) {
+            let message = format!("the target is outside the outline: {}", boundary.off(target));
+            return Err(self.error(span, message, "move the target into the body"));
         }
         if immobile.iter().any(|path| distance_to_polyline(target, path) <= tolerance) {
             return Err(self.error(

@@ -158,17 +158,24 @@ impl Rules<'_> {
 
     fn friction(&self) -> Vec<SceneWarning> {
         let of_needle = self.scene.needle.shaft.map(|shaft| (None, shaft.resistance));
-        let of_inclusions =
-            self.scene.inclusions.iter().enumerate().filter_map(|(i, inclusion)| Some((Some(i + 1), inclusion.resistance?)));
-        let only_sticks = |r: &Resistance| r.static_friction > 0.0 && r.kinetic_friction == 0.0 && r.viscous_friction == 0.0;
+        let of_inclusions = self
+            .scene
+            .inclusions
+            .iter()
+            .enumerate()
+            .filter_map(|(i, inclusion)| Some((Some(i + 1), inclusion.resistance?)));
+        let only_sticks =
+            |r: &Resistance| r.static_friction > 0.0 && r.kinetic_friction == 0.0 && r.viscous_friction == 0.0;
         // What inclusions take from the needle is told of once.
-        let of_inclusions = of_inclusions.filter(|(_, own)| of_needle.is_none_or(|(_, needles)| !only_sticks(&needles) || needles != *own));
+        let of_inclusions = of_inclusions
+            .filter(|(_, own)| of_needle.is_none_or(|(_, needles)| !only_sticks(&needles) || needles != *own));
         of_needle
             .into_iter()
             .chain(of_inclusions)
             .filter(|(_, resistance)| only_sticks(resistance))
-            .map(|(inclusion, resistance)| {
-                SceneWarning::FrictionOnlySticks { inclusion, static_friction: resistance.static_friction }
+            .map(|(inclusion, resistance)| SceneWarning::FrictionOnlySticks {
+                inclusion,
+                static_friction: resistance.static_friction,
             })
             .collect()
     }

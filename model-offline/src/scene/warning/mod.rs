@@ -2,7 +2,7 @@
 
 mod find;
 
-use crate::number::short;
+use crate::number::{self, in_unit, short};
 use std::fmt;
 
 /// Something in a valid scene that is seldom meant. Lengths are in the scene's unit; inclusions are counted from 1 in the
@@ -125,7 +125,7 @@ pub enum SceneWarning {
 impl SceneWarning {
     /// What is unusual, with lengths in this unit (`1`: none).
     pub fn message(&self, unit: &str) -> String {
-        let long = |value: f64| if unit == "1" || unit.is_empty() { short(value) } else { format!("{} {unit}", short(value)) };
+        let long = |value: f64| in_unit(value, unit);
         match *self {
             Self::NeedlePointsOut { degrees } => {
                 format!("the needle points out of the body: {degrees:.0}° from straight in")
@@ -172,14 +172,12 @@ impl SceneWarning {
             Self::InclusionPartlyOutside { inclusion, outside } => {
                 format!("inclusion {inclusion} is partly outside the body: {} of its area", percent(outside))
             }
-            Self::InclusionNarrow { inclusion, width, spacing } => format!(
-                "inclusion {inclusion} is narrower than the node spacing: {} of {}",
-                long(width),
-                long(spacing)
-            ),
+            Self::InclusionNarrow { inclusion, width, spacing } => {
+                format!("inclusion {inclusion} is narrower than the node spacing: {} of {}", long(width), long(spacing))
+            }
             Self::InclusionsOverlap { first, second, area, share } => format!(
                 "inclusions {first} and {second} overlap: an area of {}, {} of the smaller one, has the stiffness of both",
-                short(area),
+                number::area(area, unit),
                 percent(share)
             ),
             Self::PaddleShort { index, length, spacing } => {
@@ -208,8 +206,12 @@ impl SceneWarning {
             Self::FrictionOnlySticks { .. } => "give kinetic_friction too",
             Self::TargetNearBoundary { .. } => "take a smaller spacing, or move the target inwards",
             Self::InclusionPartlyOutside { .. } => "the part outside does nothing: move it, or cut it off",
-            Self::InclusionNarrow { .. } => "take a smaller spacing, or a tolerance: nodes so far apart hardly know of it",
-            Self::InclusionsOverlap { .. } => "move one; where one is meant to be inside the other, put all of it there",
+            Self::InclusionNarrow { .. } => {
+                "take a smaller spacing, or a tolerance: nodes so far apart hardly know of it"
+            }
+            Self::InclusionsOverlap { .. } => {
+                "move one; where one is meant to be inside the other, put all of it there"
+            }
             Self::PaddleInTheWay { .. } => "move the paddle, or the needle",
         }
     }
