@@ -200,8 +200,8 @@ fn man(directory: &Path) -> Result<(), SimError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 10] =
-    ["place", "solve", "table", "inspect", "new", "fit", "compare", "materials", "pareto", "sweep"];
+const ELSEWHERE: [&str; 12] =
+    ["place", "check", "draw", "solve", "table", "inspect", "new", "fit", "compare", "materials", "pareto", "sweep"];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
 pub(crate) fn parse() -> Cli {

@@ -3,7 +3,7 @@
 use super::common::{DiscretizationArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
-use model_offline::number::{coordinate, short};
+use model_offline::number::{area, coordinate, in_unit, short};
 use model_offline::output::check_outputs;
 use model_offline::scene::{MaterialFacts, Scene, SceneFacts};
 use serde_json::json;
@@ -79,7 +79,7 @@ struct Told<'a> {
 
 impl Told<'_> {
     fn long(&self, length: f64) -> String {
-        in_unit(short(length), &self.facts.units.length)
+        in_unit(length, &self.facts.units.length)
     }
 
     fn point(&self, p: [f64; 2]) -> String {
@@ -94,13 +94,13 @@ impl Told<'_> {
             short(body.high[0] - body.low[0]),
             self.long(body.high[1] - body.low[1]),
             self.point(body.low),
-            short(body.area),
+            area(body.area, &self.facts.units.length),
             body.vertices
         )
     }
 
     fn material(&self, material: &MaterialFacts) -> String {
-        format!("shear modulus {} at rest", in_unit(short(material.shear_modulus), &self.facts.units.stress))
+        format!("shear modulus {} at rest", in_unit(material.shear_modulus, &self.facts.units.stress))
     }
 
     fn immobile(&self) -> String {
@@ -127,19 +127,20 @@ impl Told<'_> {
             "{}, {} from the entry: {} along the needle's line, {} off it; {} from the boundary",
             self.point(target.position),
             self.long(target.from_entry),
-            short(target.along_needle),
-            short(target.off_needle),
+            self.long(target.along_needle),
+            self.long(target.off_needle),
             self.long(target.from_boundary)
         )
     }
 
     fn inclusion(&self, place: usize) -> String {
         let inclusion = &self.facts.inclusions[place];
-        let own = inclusion.material.as_ref().map_or(String::new(), |own| format!("own material, {}, ", self.material(own)));
+        let own =
+            inclusion.material.as_ref().map_or(String::new(), |own| format!("own material, {}, ", self.material(own)));
         format!(
             "{own}stiffness times {}; area {} around {}, {} wide",
             short(inclusion.stiffness),
-            short(inclusion.area),
+            area(inclusion.area, &self.facts.units.length),
             self.point(inclusion.centroid),
             self.long(inclusion.width)
         )
@@ -163,8 +164,4 @@ impl Told<'_> {
             (_, None) => format!("as many as its tolerance or level takes; {integration}"),
         }
     }
-}
-
-fn in_unit(number: String, unit: &str) -> String {
-    if unit == "1" || unit.is_empty() { number } else { format!("{number} {unit}") }
 }
