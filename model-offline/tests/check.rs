@@ -324,6 +324,25 @@ fn the_paper_by_edges_is_the_paper() {
     assert_eq!(Scene::parse(&edges, "edges").unwrap().paddles[4].segment, [[0.0, 0.5], [0.0, 0.6]].map(Point2::from));
 }
 
+/// Nothing of a bundled scene is put anywhere else: recordings and tables know it by its hash.
+#[test]
+fn bundled_scenes_have_the_points_of_their_files() {
+    for (name, text) in BUNDLED {
+        let scene = Scene::bundled(name).unwrap();
+        let file: toml::Table = text.parse().unwrap();
+        let path = |value: &toml::Value| -> Vec<Point2> {
+            let points: Vec<[f64; 2]> = value.clone().try_into().unwrap();
+            points.into_iter().map(Point2::from).collect()
+        };
+        let immobile: Vec<_> = file["immobile"]["paths"].as_array().unwrap().iter().map(path).collect();
+        assert_eq!(scene.immobile, immobile, "{name}");
+        assert_eq!(scene.needle.contact, path(&file["needle"]["contact"]), "{name}");
+        for (paddle, section) in scene.paddles.iter().zip(file["paddle"].as_array().unwrap()) {
+            assert_eq!(paddle.segment.to_vec(), path(&section["segment"]), "{name}");
+        }
+    }
+}
+
 /// A point this far off an edge, outside or inside, at this part of it.
 fn beside(outline: &[[f64; 2]], edge: usize, part: f64, off: f64) -> [f64; 2] {
     let [a, b] = [outline[edge], outline[(edge + 1) % outline.len()]];

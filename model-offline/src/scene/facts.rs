@@ -8,8 +8,10 @@ use crate::geometry::{Point2, distance_to_polyline, distance_to_segment, shared_
 use crate::material::{Law, Material};
 use serde::Serialize;
 
-/// Nodes are counted where there are about so many, at most: that takes no time.
+/// Nodes are counted where there are about so many, at most, and so many times the corners of the outlines that they are
+/// fitted to: that takes no time.
 const COUNTED: f64 = 20_000.0;
+const FITTED: f64 = 2e7;
 
 /// The numbers of a scene; lengths in its unit.
 #[derive(Debug, Clone, Serialize)]
@@ -207,7 +209,10 @@ impl Scene {
 
     /// Nodes at a spacing, where they are few enough to be counted at once.
     fn nodes_at(&self, spacing: f64) -> Option<usize> {
-        let few = self.outline.area() / (spacing * spacing) <= COUNTED;
+        let outlines = self.inclusions.iter().map(|inclusion| &inclusion.outline).chain([&self.outline]);
+        let corners: usize = outlines.map(|outline| outline.vertices().len()).sum();
+        let nodes = self.outline.area() / (spacing * spacing);
+        let few = nodes <= COUNTED && nodes * corners as f64 <= FITTED;
         match self.discretization.method.integration {
             // Nodes on the edges are the triangulation's.
             Integration::FemT6 => None,
