@@ -6,6 +6,9 @@ const DIGITS: i32 = 4;
 const MOST: i32 = 12;
 /// Numbers this much smaller than the largest of their column are zero but for rounding.
 const ROUNDING: f64 = 1e-9;
+/// Below and from here on short numbers have a power of ten.
+const SMALL: f64 = 1e-5;
+const LARGE: f64 = 1e12;
 
 /// Decimals that show four digits of a number of this size, and no fewer than `least`: a scene in metres needs more of
 /// them than one in millimetres.
@@ -31,9 +34,57 @@ pub fn length(value: f64) -> String {
     format!("{value:.*}", decimals(value, 4))
 }
 
+/// Four digits, without zeros at the end; with a power of ten where the zeros before them would have to be counted.
+pub fn short(value: f64) -> String {
+    if (f64::MIN_POSITIVE..SMALL).contains(&value.abs()) || (LARGE..f64::INFINITY).contains(&value.abs()) {
+        let text = format!("{value:.*e}", DIGITS as usize - 1);
+        let (digits, power) = text.split_once('e').unwrap_or((&text, "0"));
+        return format!("{}e{power}", without_zeros(digits.to_owned()));
+    }
+    without_zeros(format!("{value:.*}", decimals(value, 0)))
+}
+
+/// Four digits with their unit; the label `1` means that there is none.
+pub fn in_unit(value: f64, unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { short(value) } else { format!("{} {unit}", short(value)) }
+}
+
+/// The same for an area, by the unit of length.
+pub fn area(value: f64, unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { short(value) } else { format!("{} {unit}²", short(value)) }
+}
+
+/// A coordinate of a body of this size, to a ten-thousandth of it, without zeros at the end: far from the origin four
+/// digits would all be the same.
+pub fn coordinate(value: f64, size: f64) -> String {
+    if size < SMALL && value.abs() < SMALL {
+        return short(value);
+    }
+    without_zeros(format!("{:.*}", decimals(0.1 * size, 0), value))
+}
+
+fn without_zeros(text: String) -> String {
+    let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    if short == "-0" { "0".to_owned() } else { short.to_owned() }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn short_numbers_have_no_zeros_at_the_end_and_coordinates_as_many_digits_as_the_body_asks() {
+        let shown =
+            [(12.0, "12"), (0.30000000000000004, "0.3"), (1234567.0, "1234567"), (-0.0, "0"), (2.5e-4, "0.00025")];
+        assert_eq!(shown.map(|(value, _)| short(value)), shown.map(|(_, text)| text));
+        assert_eq!([short(5e-9), short(-1.23456e-20), short(3e15)], ["5e-9", "-1.235e-20", "3e15"]);
+        assert_eq!([short(f64::INFINITY), short(f64::NAN)], ["inf", "NaN"]);
+        assert_eq!([in_unit(12.0, "mm"), in_unit(12.0, "1"), area(0.5, "in")], ["12 mm", "12", "0.5 in²"]);
+        assert_eq!(coordinate(1_000_012.345_6, 50.0), "1000012.346");
+        assert_eq!(coordinate(-1e-12, 1.0), "0");
+        assert_eq!(coordinate(100.0, 4000.0), "100");
+        assert_eq!(coordinate(2.1e-7, 1e-7), "2.1e-7");
+    }
 
     #[test]
     fn small_numbers_keep_their_digits_and_large_ones_their_decimals() {

@@ -21,7 +21,7 @@ mod worlds;
 use std::path::{Path, PathBuf};
 
 use clap::error::ContextKind;
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use host_sim::SimError;
 use host_sim::record::error::FileError;
 use host_sim::runtime::signals;
@@ -197,8 +197,8 @@ fn man(directory: &Path) -> Result<(), SimError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 10] =
-    ["place", "solve", "table", "inspect", "new", "fit", "compare", "materials", "pareto", "sweep"];
+const ELSEWHERE: [&str; 12] =
+    ["place", "check", "draw", "solve", "table", "inspect", "new", "fit", "compare", "materials", "pareto", "sweep"];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant. Without a word it is `run`.
 pub(crate) fn parse() -> Command {
@@ -206,7 +206,10 @@ pub(crate) fn parse() -> Command {
     if words.len() < 2 {
         words.push("run".into());
     }
-    Cli::try_parse_from(words).map_or_else(|error| refuse(&error), |cli| cli.command)
+    let mut command = terminal::accepting_negative_numbers(Cli::command());
+    let matches = command.try_get_matches_from_mut(words);
+    let cli = matches.and_then(|matches| Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command)));
+    cli.map_or_else(|error| refuse(&error), |cli| cli.command)
 }
 
 fn refuse(error: &clap::Error) -> ! {

@@ -106,7 +106,8 @@ impl From<FitError> for CliError {
 
 impl From<LimitError> for CliError {
     fn from(error: LimitError) -> Self {
-        Self::usage(error.to_string(), error.help())
+        // Scenes are checked when they are read: it is the option of that name.
+        Self::usage(format!("--{error}"), error.help())
     }
 }
 

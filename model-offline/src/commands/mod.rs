@@ -1,8 +1,10 @@
 //! The command line of `model-offline`: one file per command.
 
+mod check;
 mod common;
 mod compare;
 mod completions;
+mod draw;
 mod error;
 mod fit;
 mod inspect;
@@ -19,7 +21,7 @@ mod stability;
 mod sweep;
 mod table;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use error::CliError;
 use model_offline::output::terminal;
 
@@ -36,6 +38,12 @@ enum Command {
     /// Full placement study: every paddle, static and dynamic.
     #[command(after_help = "Example:\n  model-offline place model-offline/scenes/paper.toml --json place.json")]
     Place(place::PlaceArgs),
+    /// A scene's numbers, and what of it is seldom meant, without solving.
+    #[command(after_help = "Example:\n  model-offline check breast --json check.json")]
+    Check(check::CheckArgs),
+    /// Draws a scene: body, needle, target, paddles and inclusions, named and to scale.
+    #[command(after_help = "Example:\n  model-offline draw breast -o breast.svg")]
+    Draw(draw::DrawArgs),
     /// One equilibrium: needle at a depth, one paddle displaced.
     #[command(
         after_help = "Example:\n  model-offline solve paper --paddle 3 --depth 0.1 --vtu body.vtu --svg body.svg"
@@ -95,6 +103,8 @@ enum Command {
 pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
     match cli.command {
         Command::Place(args) => place::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::Draw(args) => draw::run(&args),
         Command::Solve(args) => solve::run(&args),
         Command::Table(args) => table::run(&args),
         Command::Stability(args) => stability::run(&args),
@@ -130,9 +140,16 @@ const ELSEWHERE: [&str; 12] = [
 /// Options of the discretization that studies do not take.
 const VARIED: [&str; 4] = ["--integration", "--support", "--basis", "--tolerance"];
 
+/// The command line of these words.
+fn parsed(words: impl IntoIterator<Item = impl Into<std::ffi::OsString> + Clone>) -> Result<Cli, clap::Error> {
+    let mut command = terminal::accepting_negative_numbers(Cli::command());
+    let matches = command.try_get_matches_from_mut(words)?;
+    Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant.
 pub(crate) fn parse() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
+    parsed(std::env::args_os()).unwrap_or_else(|error| {
         let word = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
         let argument = error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string);
         let _ = error.print();
@@ -148,4 +165,59 @@ pub(crate) fn parse() -> Cli {
         }
         std::process::exit(error.exit_code());
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    /// How each command that takes numbers is called with everything that it needs; outputs are in `OUT`.
+    const CALLS: [(&str, &str); 10] = [
+        ("place", "paper"),
+        ("check", "paper"),
+        ("solve", "paper --paddle 3 --depth 0.01"),
+        ("table", "paper -o OUT/a.table"),
+        ("stability", "paper --out OUT/stability"),
+        ("pareto", "paper --out OUT/pareto"),
+        ("sweep", "paper --out OUT/sweep"),
+        ("fit", "paper --tolerance 0.1 -o OUT/a.toml"),
+        ("compare", "paper"),
+        ("new", "-o OUT/a.toml"),
+    ];
+
+    /// What a negative number after an option is answered with, and whether that is exit code 2.
+    fn answer(command: &str, option: &str, out: &Path) -> (String, bool) {
+        let (_, call) = CALLS.iter().find(|(name, _)| *name == command).unwrap_or_else(|| panic!("call `{command}`"));
+        let call = call.replace("OUT", out.to_str().unwrap());
+        let mut words: Vec<&str> = ["model-offline", command].into_iter().chain(call.split_whitespace()).collect();
+        if let Some(at) = words.iter().position(|word| *word == option) {
+            words.drain(at..at + 2);
+        }
+        words.extend([option, "-0.5"]);
+        match parsed(&words) {
+            Err(error) => (error.to_string(), error.exit_code() == 2),
+            Ok(cli) => match run(cli) {
+                Ok(()) => ("nothing".to_owned(), false),
+                Err(error) => (error.to_string(), error.exit_code() == 2),
+            },
+        }
+    }
+
+    #[test]
+    fn a_negative_number_is_refused_by_the_option_that_it_is_given_to() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut tried = 0;
+        for command in Cli::command().get_subcommands() {
+            for option in command.get_arguments().filter(|option| terminal::takes_numbers(option)) {
+                let name = format!("--{}", option.get_long().unwrap());
+                let (said, is_usage) = answer(command.get_name(), &name, folder.path());
+                let told = is_usage && said.contains(&name) && !said.contains("unexpected argument");
+                assert!(told, "{} {name} -0.5: {said}", command.get_name());
+                tried += 1;
+            }
+        }
+        assert!(tried > 30, "only {tried}: are numbers known by their types?");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "something was written");
+    }
 }

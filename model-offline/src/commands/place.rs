@@ -105,6 +105,7 @@ fn document(
         "paddles": paddles,
         "no_paddle": no_paddle,
         "optimum": study.placement.optimum,
+        "warnings": scene.told_warnings(),
         "table_failure": table.and_then(|table| table.as_ref().err()).map(ToString::to_string),
     })
 }

@@ -1,5 +1,6 @@
 //! A placement study as text: a row per paddle and one without, with the error of every number beside it.
 
+use super::check::warned;
 use model_offline::model::ModelError;
 use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};
@@ -96,6 +97,7 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
         }
         None => {}
     }
+    out.push_str(&warned(&study.model.scene().told_warnings()));
     out
 }
 

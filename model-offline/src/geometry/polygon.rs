@@ -134,7 +134,11 @@ impl Polygon {
 
     /// Whether the whole segment lies on the boundary (it may run over several collinear edges).
     pub fn segment_on_boundary(&self, a: Point2, b: Point2, tolerance: f64) -> bool {
-        let on = |p| self.distance_to_boundary(p) <= tolerance;
+        self.boundary_stations(a, b).iter().all(|p| self.distance_to_boundary(*p) <= tolerance)
+    }
+
+    /// The points of a segment where it must be on the boundary to lie on it as a whole.
+    pub fn boundary_stations(&self, a: Point2, b: Point2) -> Vec<Point2> {
         // The distance to a simple polygon along a segment is piecewise smooth with breaks only where the
         // foot changes edge; those breaks lie at projections of vertices, so testing between them suffices.
         let direction = b - a;
@@ -147,7 +151,7 @@ impl Polygon {
             .collect();
         stations.extend([0.0, 1.0]);
         stations.sort_by(f64::total_cmp);
-        stations.windows(2).all(|s| [s[0], 0.5 * (s[0] + s[1]), s[1]].iter().all(|&t| on(a + direction * t)))
+        stations.windows(2).flat_map(|s| [s[0], 0.5 * (s[0] + s[1]), s[1]]).map(|t| a + direction * t).collect()
     }
 }
 

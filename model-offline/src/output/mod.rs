@@ -4,6 +4,7 @@ pub mod body;
 pub mod chart;
 pub mod csv;
 mod preflight;
+pub mod scene_picture;
 mod state;
 pub mod table_text;
 pub mod terminal;

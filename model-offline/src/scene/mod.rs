@@ -1,7 +1,9 @@
 //! Scenes: the file format, its validation, and what other tools draw.
 
+pub mod boundary;
 mod effect;
 mod error;
+mod facts;
 pub mod import;
 pub mod limits;
 mod motion;
@@ -11,15 +13,18 @@ mod shaft;
 pub mod starter;
 mod tissue;
 mod validate;
+mod warning;
 
 pub use effect::Effect;
 pub use error::{NoSuchPaddle, SceneError};
+pub use facts::{BodyFacts, InclusionFacts, MaterialFacts, NeedleFacts, PaddleFacts, SceneFacts, TargetFacts};
 pub use limits::LimitError;
 pub use motion::{Breathing, Motion, Surge};
 pub use schema::{FitSection, PlantModel, TableScalar};
 pub use sensor::{IDEAL_NOISE_PER_DEPTH, Outages, Sensor, SensorPreset, UnknownLength};
 pub use shaft::{Mechanics, Resistance, Shaft};
 pub use tissue::TissueVariant;
+pub use warning::SceneWarning;
 
 use crate::discretization::{Discretization, Features};
 use crate::geometry::{Point2, Polygon};
@@ -38,6 +43,9 @@ pub const BUNDLED: [(&str, &str); 7] = [
     ("prostate-world", include_str!("../../scenes/prostate-world.toml")),
     ("tethered", include_str!("../../scenes/tethered.toml")),
 ];
+
+/// Letters in which a name may differ from the one that it was meant for.
+const LETTERS: usize = 2;
 
 /// A validated scene.
 ///
@@ -123,6 +131,11 @@ impl Needle {
         self.shaft.map_or_else(|| middle(&self.contact), |shaft| shaft.entry)
     }
 
+    /// Length of the contact.
+    pub fn contact_length(&self) -> f64 {
+        polyline_length(&self.contact)
+    }
+
     /// Unit vector orthogonal to the axis: the axis turned by 90°, signed so that its larger component is positive.
     pub fn orthogonal(&self) -> Point2 {
         let turned = Point2::new(-self.axis.y, self.axis.x);
@@ -132,10 +145,13 @@ impl Needle {
     }
 }
 
+fn polyline_length(path: &[Point2]) -> f64 {
+    path.windows(2).map(|s| (s[1] - s[0]).norm()).sum()
+}
+
 /// The point half way along a polyline.
 fn middle(path: &[Point2]) -> Point2 {
-    let length: f64 = path.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
-    let mut left = 0.5 * length;
+    let mut left = 0.5 * polyline_length(path);
     for s in path.windows(2) {
         let piece = (s[1] - s[0]).norm();
         if left <= piece {
@@ -183,6 +199,14 @@ impl Scene {
         if path.is_file() { None } else { BUNDLED.iter().find(|(name, _)| Path::new(name) == path) }
     }
 
+    /// The bundled scene that a name was meant for: a letter or two differ, or it has a folder or an ending too many.
+    fn nearly_bundled(path: &Path) -> Option<&'static str> {
+        let word = path.file_stem()?.to_str()?.to_lowercase();
+        let distance = |name: &str| strsim::osa_distance(&word, name);
+        let (distance, name) = BUNDLED.iter().map(|(name, _)| (distance(name), *name)).min_by_key(|near| near.0)?;
+        (distance <= LETTERS && 3 * distance <= word.chars().count()).then_some(name)
+    }
+
     /// The text of a scene file, or of a bundled scene, not yet parsed.
     ///
     /// # Errors
@@ -194,10 +218,11 @@ impl Scene {
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| {
             let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
+            let meant = Self::nearly_bundled(path).map_or_else(String::new, |name| format!("did you mean `{name}`? "));
             error::Source { file: &file, text: "" }.error(
                 0..0,
                 format!("cannot read the scene: {error}"),
-                format!("give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
+                format!("{meant}give the path of a scene file, or one of the bundled scenes: {}", known.join(", ")),
             )
         })?;
         String::from_utf8(bytes).map_err(|error| {
@@ -254,6 +279,12 @@ impl Scene {
     #[must_use]
     pub fn with_discretization(&self, discretization: Discretization) -> Self {
         Self { discretization, ..self.clone() }
+    }
+
+    /// How far along the needle the target lies from its entry, and how far off its line.
+    pub fn target_from_needle(&self) -> (f64, f64) {
+        let way = self.target - self.needle.entry();
+        (way.dot(&self.needle.axis), way.dot(&self.needle.orthogonal()).abs())
     }
 
     /// The regions of the inclusions.

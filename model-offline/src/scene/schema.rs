@@ -1,6 +1,7 @@
 //! The scene file as it is written: the public contract, field for field. Validation turns it into a
 //! [`Scene`](super::Scene).
 
+use super::boundary::{BoundaryPath, BoundarySegment};
 use super::effect::Effect;
 use super::sensor::SensorPreset;
 use super::shaft::Mechanics;
@@ -41,6 +42,10 @@ impl<T: serde::de::DeserializeOwned> Located<T> {
 impl<T: serde::de::DeserializeOwned + JsonSchema> JsonSchema for Located<T> {
     fn schema_name() -> Cow<'static, str> {
         T::schema_name()
+    }
+    // What tells types of one name apart.
+    fn schema_id() -> Cow<'static, str> {
+        T::schema_id()
     }
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         T::json_schema(generator)
@@ -161,16 +166,16 @@ fn unit_stiffness() -> Located<f64> {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImmobileSection {
-    /// Polylines on the boundary.
-    pub paths: Vec<Located<Vec<[f64; 2]>>>,
+    /// Polylines on the boundary, or edges of the outline.
+    pub paths: Vec<Located<BoundaryPath>>,
 }
 
 /// The needle.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NeedleSection {
-    /// Polyline of tissue that moves with the needle, on the boundary or inside.
-    pub contact: Located<Vec<[f64; 2]>>,
+    /// Polyline of tissue that moves with the needle, on the boundary or inside, or a part of an edge of the outline.
+    pub contact: Located<BoundaryPath>,
     /// Direction of insertion; normalised on reading.
     pub axis: Located<[f64; 2]>,
     /// How far the needle goes, length units.
@@ -265,8 +270,8 @@ pub struct TargetSection {
 pub struct PaddleSection {
     /// Its name in tables and reports.
     pub index: u32,
-    /// The two ends, both on the boundary.
-    pub segment: Located<[[f64; 2]; 2]>,
+    /// The two ends, both on the boundary, or a part of an edge of the outline.
+    pub segment: Located<BoundarySegment>,
 }
 
 /// Limits of the paddle's actuator.

@@ -105,6 +105,8 @@ impl Layout {
             out,
             "# A scene for model-offline and host-sim. All numbers are in consistent units of your choice; presets\n\
              # of materials and sensors go by the labels. `model-offline schema` describes every key.\n\
+             #   model-offline check FILE                  its numbers, and what is seldom meant\n\
+             #   model-offline draw FILE -o scene.svg      a picture of it\n\
              #   model-offline place FILE                  which paddle position is best\n\
              #   host-sim run --scene FILE                 simulate the insertion and write a report\n\n\
              [scene]\nname = {name:?}\ndimension = 2                       # plane strain\n\
@@ -127,7 +129,8 @@ impl Layout {
         }
         let _ = write!(
             out,
-            "\n[immobile]                          # what bone or a table holds: polylines on the outline\npaths = [{}]\n\n\
+            "\n[immobile]                          # what bone or a table holds: polylines on the outline, or edges of it,\n\
+             # {{ edge = 0, from = 0.2, to = 0.4 }}: from vertex 0 to vertex 1, from a fifth of it to two fifths\npaths = [{}]\n\n\
              [needle]\ncontact = {}     # tissue that moves with the needle\n\
              axis = {}                  # direction of insertion\n\
              depth = {}                         # how far the contact is pushed\nincrements = 10\n\n\

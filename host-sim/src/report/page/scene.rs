@@ -16,47 +16,16 @@ use crate::bench::strategy::Strategy;
 const SCENE_WIDTH: f64 = 420.0;
 const BODY_WIDTH: f64 = 300.0;
 
-/// Short strokes on the outer side of the immobile boundary.
-fn hatch(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, part: &[[f64; 2]]) {
-    drawing.polyline("immobile", &view.path(part));
-    for edge in part.windows(2) {
-        let [dx, dy] = [edge[1][0] - edge[0][0], edge[1][1] - edge[0][1]];
-        let length = dx.hypot(dy);
-        let [tx, ty] = [dx / length, dy / length];
-        let step = 0.03 * view.extent;
-        let probe = along(along(edge[0], [tx, ty], 0.5 * length), [ty, -tx], 0.01 * view.extent);
-        let outward = if inside(&geometry.outline, probe) { [-ty, tx] } else { [ty, -tx] };
-        let strokes = (length / step).clamp(0.0, 500.0) as u32;
-        for i in 0..=strokes {
-            let root = along(edge[0], [tx, ty], f64::from(i) * length / f64::from(strokes.max(1)));
-            let tip = along(along(root, outward, 0.8 * step), [tx, ty], -0.6 * step);
-            drawing.line("hatch", view.at(root), view.at(tip));
-        }
-    }
+/// The immobile boundary, its outer side with strokes.
+fn held(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, part: &[[f64; 2]]) {
+    let outline = view.path(&geometry.outline);
+    drawing.held(&view.path(part), view.length(0.03 * view.extent), |point| inside(&outline, point));
 }
 
-/// The needle's axis with a point at its contact.
+/// The needle at this depth.
 fn needle(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, depth: f64) {
     let [from, to] = view.needle(geometry, depth);
-    let way = [to[0] - from[0], to[1] - from[1]];
-    let length = way[0].hypot(way[1]);
-    let [tx, ty] = [way[0] / length, way[1] / length];
-    let root = along(to, [tx, ty], -11.0);
-    drawing.open_group("shaft");
-    drawing.line("needle", from, root);
-    drawing.polygon("arrow", &[to, along(root, [ty, -tx], 5.5), along(root, [-ty, tx], 5.5)]);
-    drawing.close_group();
-}
-
-/// Ring and cross, with a rim that separates it from any ground.
-fn target(drawing: &mut Drawing, [x, y]: Px) {
-    drawing.open_group("aim");
-    for class in ["under", "target"] {
-        drawing.circle(class, [x, y], 6.0);
-        drawing.line(class, [x - 10.0, y], [x + 10.0, y]);
-        drawing.line(class, [x, y - 10.0], [x, y + 10.0]);
-    }
-    drawing.close_group();
+    drawing.needle(from, to);
 }
 
 /// A number beside a paddle, outside of the body.
@@ -79,7 +48,7 @@ pub(super) fn at_rest(run: &RunResult) -> Drawing {
         drawing.polygon("inclusion", &view.path(inclusion));
     }
     geometry.nodes.iter().for_each(|node| drawing.circle("node", view.at(*node), 1.7));
-    geometry.immobile.iter().for_each(|part| hatch(&mut drawing, &view, geometry, part));
+    geometry.immobile.iter().for_each(|part| held(&mut drawing, &view, geometry, part));
     drawing.polyline("contact", &view.path(&geometry.needle_contact));
     needle(&mut drawing, &view, geometry, 0.0);
     let dynamic: BTreeSet<u32> = run.placements.iter().filter_map(|placement| placement.best_dynamic).collect();
@@ -94,7 +63,7 @@ pub(super) fn at_rest(run: &RunResult) -> Drawing {
         let at = view.at(beside(geometry, view.extent, &paddle.segment));
         drawing.text("title halo", [at[0], at[1] + 4.5], Anchor::Middle, &number);
     }
-    target(&mut drawing, view.at(geometry.target));
+    drawing.target(view.at(geometry.target));
     words(&mut drawing, &view, geometry);
     drawing
 }
@@ -179,7 +148,7 @@ impl Surface {
         drawing.polygon("rest", &view.path(&geometry.outline));
         let edge: Vec<Px> = self.boundary.iter().filter_map(|i| nodes.get(*i)).map(|node| node.0).collect();
         drawing.polygon("edge", &edge);
-        geometry.immobile.iter().for_each(|part| hatch(&mut drawing, view, geometry, part));
+        geometry.immobile.iter().for_each(|part| held(&mut drawing, view, geometry, part));
         needle(&mut drawing, view, geometry, run.settings.depth);
         let end = strategy.series.last();
         let moved = end.map_or([0.0; 2], |point| point.paddle);
@@ -198,7 +167,7 @@ impl Surface {
                 point.orthogonal_error,
             )
         });
-        target(&mut drawing, view.at(at));
+        drawing.target(view.at(at));
         drawing
     }
 

@@ -1,8 +1,8 @@
 //! Panels as shapes: heading, axes, marks, legend, from top to bottom.
 
-use super::drawing::{Anchor, Drawing, MARKER, Px, TEXT, TITLE, text_width, wrap};
+use super::drawing::{Anchor, Drawing, MARKER, TEXT, TITLE, text_width, wrap};
 use super::legend::{Key, Legend};
-use super::notes::{self, Box2};
+use super::notes::{self, Box2, Name};
 use super::number::number;
 use super::panel::{Bars, Dash, Panel, Place, ReferenceLine, Series};
 use super::plot_area::PlotArea;
@@ -14,12 +14,12 @@ const PLOT: f64 = 196.0;
 const BAND: f64 = 18.0;
 /// Heights of a line of the title and of other text, px.
 const TITLE_LINE: f64 = 17.0;
-const LINE: f64 = 15.0;
+pub(super) const LINE: f64 = 15.0;
 /// Room right of the axes for half a tick label, and left of them for the widest, at least, px.
-const RIGHT: f64 = 16.0;
+pub(super) const RIGHT: f64 = 16.0;
 const LEFT: f64 = 30.0;
 /// From the axis to its tick labels, px.
-const TICK: f64 = 7.0;
+pub(super) const TICK: f64 = 7.0;
 
 impl Panel {
     /// The panel with its legend below, this wide in px.
@@ -155,7 +155,8 @@ pub(super) fn draw(panel: &Panel, layout: &Layout, head: f64, legend: &Legend) -
     drawing
 }
 
-fn axes(drawing: &mut Drawing, frame: &PlotArea) {
+/// The axes of a rectangle: lines, ticks with their labels, and lines across it.
+pub(super) fn axes(drawing: &mut Drawing, frame: &PlotArea) {
     let [left, top] = frame.corner;
     let (right, bottom) = (frame.right(), frame.bottom());
     let mut free = f64::NEG_INFINITY;
@@ -175,12 +176,17 @@ fn axes(drawing: &mut Drawing, frame: &PlotArea) {
             drawing.text("tick", [x, bottom + 17.0 + LINE * i as f64], Anchor::Middle, line);
         }
     }
+    let mut free = f64::INFINITY;
     for (value, label) in &frame.y.ticks {
         let [_, y] = frame.clamped((frame.x.range[0], *value));
         if frame.y.grid {
             drawing.line("grid", [left, y], [right, y]);
         }
         drawing.line("axis", [left - 4.0, y], [left, y]);
+        if frame.y.grid && y + 0.5 * TEXT > free {
+            continue;
+        }
+        free = y - 0.5 * TEXT;
         // Beside the band's name there is no room for a tick's.
         if frame.band == 0.0 || y > top + 6.0 {
             drawing.text("tick", [left - TICK, y + 4.0], Anchor::End, label);
@@ -225,8 +231,11 @@ fn marks(drawing: &mut Drawing, panel: &Panel, frame: &PlotArea) {
     for series in &panel.series {
         draw_series(drawing, series, frame, &mut taken);
     }
-    let placed: Vec<(Px, &str)> =
-        panel.notes.iter().filter_map(|note| Some((frame.place(note.at)?, note.text.as_str()))).collect();
+    let placed: Vec<Name<'_>> = panel
+        .notes
+        .iter()
+        .filter_map(|note| Some(Name { at: frame.place(note.at)?, text: &note.text, towards: None }))
+        .collect();
     let within = Box2 { low: frame.corner, high: [frame.right(), bottom] };
     notes::draw(drawing, &placed, taken, within);
     if panel.cursor {

@@ -11,7 +11,7 @@ const ROW: f64 = 18.0;
 
 /// How an entry looks.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Key {
+pub enum Key {
     /// A line of this class, a marker of that one over it.
     Series(Option<String>, Option<(Marker, String)>),
     /// A filled box.
@@ -29,11 +29,11 @@ struct Placed<'a> {
 
 /// Entries in the order in which they are shown.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Legend(Vec<(Key, String)>);
+pub struct Legend(Vec<(Key, String)>);
 
 impl Legend {
     /// An entry, unless the same is there; an empty name has none.
-    pub(super) fn add(&mut self, key: Key, name: &str) {
+    pub fn add(&mut self, key: Key, name: &str) {
         if !name.is_empty() && !self.0.iter().any(|entry| (&entry.0, entry.1.as_str()) == (&key, name)) {
             self.0.push((key, name.to_owned()));
         }
@@ -78,6 +78,13 @@ impl Legend {
 
     pub(super) fn height(&self, width: f64) -> f64 {
         self.rows(width).1
+    }
+
+    /// It alone, this wide, px.
+    pub fn drawing(&self, width: f64) -> Drawing {
+        let mut drawing = Drawing::new([width, self.height(width)], "");
+        self.draw(&mut drawing, [0.0, 0.0], width);
+        drawing
     }
 
     /// Draws it with its upper left corner here.

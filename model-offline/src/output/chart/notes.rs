@@ -72,13 +72,32 @@ fn leader(at: Px, place: &Box2, distance: f64) -> Option<[Px; 2]> {
     (distance > LEADER).then(|| [at, [0, 1].map(|k| at[k].clamp(place.low[k], place.high[k]))])
 }
 
+/// The directions in the order in which they are tried: those that a name is meant to lie in first.
+fn directions(towards: Option<Px>) -> [Px; 12] {
+    let mut directions = DIRECTIONS;
+    if let Some(towards) = towards {
+        let along = |[x, y]: Px| (x * towards[0] + y * towards[1]) / x.hypot(y);
+        directions.sort_by(|a, b| along(*b).total_cmp(&along(*a)));
+    }
+    directions
+}
+
+/// A name, its point, and where from it the name is meant to lie, y down.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Name<'a> {
+    pub(super) at: Px,
+    pub(super) text: &'a str,
+    pub(super) towards: Option<Px>,
+}
+
 /// Draws each text in the first place that is free; those that find none are left out, and counted.
-pub(super) fn draw(drawing: &mut Drawing, notes: &[(Px, &str)], mut taken: Vec<Box2>, within: Box2) -> usize {
+pub(super) fn draw(drawing: &mut Drawing, notes: &[Name<'_>], mut taken: Vec<Box2>, within: Box2) -> usize {
     let mut left_out = 0;
     let mut texts: Vec<Box2> = Vec::new();
-    for (at, text) in notes {
+    for Name { at, text, towards } in notes {
         let own = Box2::around(*at, MARKER);
-        let places = DISTANCES.iter().flat_map(|distance| DIRECTIONS.iter().map(move |way| (*distance, *way)));
+        let directions = directions(*towards);
+        let places = DISTANCES.iter().flat_map(|distance| directions.iter().map(move |way| (*distance, *way)));
         let places = places.map(|(distance, way)| (text_box(*at, text, distance, way), distance));
         let clear = |place: &Box2| place.within(&within) && !place.meets(&own) && !taken.iter().any(|t| t.meets(place));
         // A leader may cross lines and markers, but no text.
@@ -101,16 +120,66 @@ pub(super) fn draw(drawing: &mut Drawing, notes: &[(Px, &str)], mut taken: Vec<B
     left_out
 }
 
+/// Names in a drawing that is no chart, and what they must not lie on.
+#[derive(Clone, Debug, Default)]
+pub struct Names {
+    taken: Vec<Box2>,
+    names: Vec<(Px, String, Option<Px>)>,
+}
+
+impl Names {
+    /// Keeps clear of a line.
+    pub fn avoid(&mut self, line: &[Px]) {
+        self.taken.extend(along(line));
+    }
+
+    /// Keeps clear of a square around a point, by half its side.
+    pub fn avoid_around(&mut self, at: Px, half: f64) {
+        self.taken.push(Box2::around(at, half));
+    }
+
+    /// A name for what is at a point; on this side of it, if there is room.
+    pub fn add(&mut self, at: Px, text: impl Into<String>, towards: Option<Px>) {
+        self.names.push((at, text.into(), towards));
+    }
+
+    /// Draws them within a rectangle, by its upper left corner and size, in the order in which they were added. Those that
+    /// find no room are left out, and counted.
+    pub fn draw(self, drawing: &mut Drawing, corner: Px, size: Px) -> usize {
+        let within = Box2 { low: corner, high: [corner[0] + size[0], corner[1] + size[1]] };
+        let names: Vec<Name<'_>> =
+            self.names.iter().map(|(at, text, towards)| Name { at: *at, text, towards: *towards }).collect();
+        draw(drawing, &names, self.taken, within)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_name_lies_on_the_side_that_it_is_meant_for() {
+        for (towards, expected) in [([0.0, -1.0], [0, -1]), ([1.0, 0.1], [1, 0]), ([0.6, 0.7], [1, 1])] {
+            let mut names = Names::default();
+            names.add([50.0, 50.0], "7", Some(towards));
+            let mut drawing = Drawing::new([100.0, 100.0], "");
+            assert_eq!(names.draw(&mut drawing, [0.0, 0.0], [100.0, 100.0]), 0);
+            let file = drawing.file();
+            let document = roxmltree::Document::parse(&file).unwrap();
+            let text = document.descendants().find(|node| node.has_tag_name("text")).unwrap();
+            let [x, y] = ["x", "y"].map(|name| text.attribute(name).unwrap().parse::<f64>().unwrap());
+            // The middle of the text, from its point.
+            let side = [x + 0.5 * text_width("7", TEXT) - 50.0, y + 2.0 - 0.5 * TEXT - 50.0];
+            assert_eq!(side.map(|v| if v.abs() < 1.0 { 0 } else { v.signum() as i32 }), expected, "{side:?}");
+        }
+    }
 
     #[test]
     fn texts_meet_neither_each_other_nor_what_is_drawn() {
         let within = Box2 { low: [0.0, 0.0], high: [400.0, 300.0] };
         let points: Vec<Px> = (0..8).map(|i| [100.0 + 12.0 * f64::from(i), 60.0 + 14.0 * f64::from(i)]).collect();
         let taken: Vec<Box2> = points.iter().map(|p| Box2::around(*p, MARKER)).chain(along(&points)).collect();
-        let notes: Vec<(Px, &str)> = points.iter().map(|p| (*p, "fem-t6, 925")).collect();
+        let notes: Vec<Name<'_>> = points.iter().map(|p| Name { at: *p, text: "fem-t6, 925", towards: None }).collect();
         let mut drawing = Drawing::new([400.0, 300.0], "");
         assert_eq!(draw(&mut drawing, &notes, taken.clone(), within), 0);
         let file = drawing.file();

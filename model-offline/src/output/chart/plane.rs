@@ -20,6 +20,11 @@ impl Plane {
         Self { scale, low, size: size.map(|side| side * scale) }
     }
 
+    /// Lower left and upper right corner of the rectangle.
+    pub fn corners(&self) -> [[f64; 2]; 2] {
+        [self.low, [0, 1].map(|k| self.low[k] + self.size[k] / self.scale)]
+    }
+
     /// A length, px.
     pub fn length(&self, length: f64) -> f64 {
         length * self.scale

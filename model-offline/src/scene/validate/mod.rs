@@ -1,15 +1,17 @@
 //! From the file's text to a [`Scene`]: every rule a scene must obey, each with its own message.
 
+mod boundary;
 mod motion;
 mod sensor;
 mod shaft;
 
+use self::boundary::Boundary;
 use super::error::{SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
 use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene, Shaft};
 use crate::discretization::{Discretization, Method, Resolution};
-use crate::geometry::{Location, Point2, Polygon, distance_to_polyline, distance_to_segment};
+use crate::geometry::{Point2, Polygon, distance_to_polyline, distance_to_segment};
 use crate::material::{Law, MaterialSection};
 use std::ops::Range;
 
@@ -38,11 +40,9 @@ pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
 
 /// What targets and paddles must keep clear of.
 struct Surroundings<'a> {
-    outline: &'a Polygon,
+    boundary: &'a Boundary<'a>,
     immobile: &'a [Vec<Point2>],
     needle: &'a Needle,
-    /// Distance within which points touch, length units.
-    tolerance: f64,
 }
 
 struct Validator<'a> {
@@ -61,12 +61,12 @@ impl Validator<'_> {
             ));
         }
         let outline = self.polygon(&file.domain.outline, "outline")?;
-        let tolerance = 1e-9 * outline.size();
-        let immobile = self.immobile(&outline, tolerance)?;
-        let mut needle = self.needle(&outline, &immobile, tolerance)?;
-        needle.shaft = self.shaft(&needle, &outline, tolerance)?;
+        let boundary = Boundary::new(&outline, file.domain.outline.get(), &file.scene.units.length);
+        let immobile = self.immobile(&boundary)?;
+        let mut needle = self.needle(&boundary, &immobile)?;
+        needle.shaft = self.shaft(&needle, &boundary)?;
         let target = self.point(file.target.position.get(), file.target.position.span(), "target")?;
-        let around = Surroundings { outline: &outline, immobile: &immobile, needle: &needle, tolerance };
+        let around = Surroundings { boundary: &boundary, immobile: &immobile, needle: &needle };
         self.target(target, &around)?;
         let paddles = self.paddles(&around)?;
         let inclusions = file
@@ -127,12 +127,11 @@ impl Validator<'_> {
         }
     }
 
-    fn path(&self, points: &Located<Vec<[f64; 2]>>, what: &str) -> Checked<Vec<Point2>> {
-        let path: Vec<Point2> =
-            points.get().iter().map(|p| self.point(p, points.span(), what)).collect::<Checked<_>>()?;
+    fn polyline(&self, points: &[[f64; 2]], span: Range<usize>, what: &str) -> Checked<Vec<Point2>> {
+        let path: Vec<Point2> = points.iter().map(|p| self.point(p, span.clone(), what)).collect::<Checked<_>>()?;
         if path.len() < 2 || path.windows(2).any(|s| s[0] == s[1]) {
             return Err(self.error(
-                points.span(),
+                span,
                 format!("{what}: needs at least two points, no two successive ones equal"),
                 "give the points of a polyline: [[x, y], [x, y], ...]",
             ));
@@ -181,7 +180,7 @@ impl Validator<'_> {
         }
     }
 
-    fn immobile(&self, outline: &Polygon, tolerance: f64) -> Checked<Vec<Vec<Point2>>> {
+    fn immobile(&self, boundary: &Boundary<'_>) -> Checked<Vec<Vec<Point2>>> {
         let paths = &self.file.immobile.paths;
         if paths.is_empty() {
             return Err(self.error(
@@ -193,31 +192,22 @@ impl Validator<'_> {
         paths
             .iter()
             .map(|located| {
-                let path = self.path(located, "immobile path")?;
-                if path.windows(2).all(|s| outline.segment_on_boundary(s[0], s[1], tolerance)) {
-                    Ok(path)
-                } else {
-                    Err(self.error(
-                        located.span(),
-                        "this immobile path leaves the boundary of the outline",
-                        "list the outline's vertices along the immobile part, so that every piece lies on an edge",
-                    ))
-                }
+                let path = self.points_on(located, boundary, "immobile path")?;
+                self.stays_on(
+                    &path,
+                    located.span(),
+                    boundary,
+                    "this immobile path leaves the boundary of the outline",
+                )?;
+                Ok(path)
             })
             .collect()
     }
 
-    fn needle(&self, outline: &Polygon, immobile: &[Vec<Point2>], tolerance: f64) -> Checked<Needle> {
+    fn needle(&self, boundary: &Boundary<'_>, immobile: &[Vec<Point2>]) -> Checked<Needle> {
+        let Boundary { outline, tolerance, .. } = *boundary;
         let section = &self.file.needle;
-        let contact = self.path(&section.contact, "needle contact")?;
-        let inside = |p: &Point2| outline.locate(*p, tolerance) != Location::Outside;
-        if !contact.iter().all(inside) {
-            return Err(self.error(
-                section.contact.span(),
-                "the needle contact reaches outside the outline",
-                "the contact is tissue that moves with the needle: put it on the boundary or inside",
-            ));
-        }
+        let contact = self.contact(boundary)?;
         if contact.windows(2).any(|s| polyline_near(immobile, s, tolerance)) {
             return Err(self.error(
                 section.contact.span(),
@@ -258,10 +248,12 @@ impl Validator<'_> {
     }
 
     fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {
-        let Surroundings { outline, immobile, needle, tolerance } = *around;
+        let Surroundings { boundary, immobile, needle } = *around;
+        let tolerance = boundary.tolerance;
         let span = self.file.target.position.span();
-        if outline.locate(target, tolerance) == Location::Outside {
-            return Err(self.error(span, "the target is outside the outline", "move the target into the body"));
+        if !boundary.holds(target) {
+            let message = format!("the target is outside the outline: {}", boundary.off(target));
+            return Err(self.error(span, message, "move the target into the body"));
         }
         if immobile.iter().any(|path| distance_to_polyline(target, path) <= tolerance) {
             return Err(self.error(
@@ -281,7 +273,8 @@ impl Validator<'_> {
     }
 
     fn paddles(&self, around: &Surroundings<'_>) -> Checked<Vec<PaddlePosition>> {
-        let Surroundings { outline, immobile, needle, tolerance } = *around;
+        let Surroundings { boundary, immobile, needle } = *around;
+        let tolerance = boundary.tolerance;
         if self.file.paddle.is_empty() {
             return Err(self.error(
                 self.file.domain.outline.span(),
@@ -293,22 +286,16 @@ impl Validator<'_> {
         for located in &self.file.paddle {
             let section = located.get();
             let span = section.segment.span();
-            let [a, b] = section.segment.get();
-            let segment = [self.point(a, span.clone(), "paddle")?, self.point(b, span.clone(), "paddle")?];
             let name = format!("paddle {}", section.index);
             if paddles.iter().any(|p| p.index == section.index) {
                 return Err(self.error(located.span(), format!("{name} is given twice"), "number the paddles"));
             }
+            let ends = self.points_on(&section.segment, boundary, &name)?;
+            let segment = [ends[0], ends[1]];
             if (segment[1] - segment[0]).norm() <= tolerance {
                 return Err(self.error(span, format!("{name} has no length"), "give two different end points"));
             }
-            if !outline.segment_on_boundary(segment[0], segment[1], tolerance) {
-                return Err(self.error(
-                    span,
-                    format!("{name} is off the boundary"),
-                    "both ends and everything between must lie on an edge of the outline",
-                ));
-            }
+            self.stays_on(&segment, span.clone(), boundary, &format!("{name} is off the boundary"))?;
             if polyline_near(immobile, &segment, tolerance) {
                 return Err(self.error(
                     span,

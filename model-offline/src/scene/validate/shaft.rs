@@ -1,7 +1,7 @@
 //! The rules of a needle that slips.
 
+use super::boundary::Boundary;
 use super::{Checked, Validator};
-use crate::geometry::{Location, Polygon};
 use crate::scene::schema::{InclusionSection, Located};
 use crate::scene::{Mechanics, Needle, Resistance, Shaft};
 
@@ -22,7 +22,7 @@ impl ResistanceKeys<'_> {
 
 impl Validator<'_> {
     /// The shaft, where the needle is one.
-    pub(super) fn shaft(&self, needle: &Needle, outline: &Polygon, tolerance: f64) -> Checked<Option<Shaft>> {
+    pub(super) fn shaft(&self, needle: &Needle, boundary: &Boundary<'_>) -> Checked<Option<Shaft>> {
         let section = &self.file.needle;
         let keys = ResistanceKeys {
             cutting_force: &section.cutting_force,
@@ -46,10 +46,11 @@ impl Validator<'_> {
             None => needle.entry(),
             Some(entry) => {
                 let point = self.point(entry.get(), entry.span(), "entry")?;
-                if outline.locate(point, tolerance) == Location::Outside {
+                let point = if boundary.holds(point) { point } else { boundary.snapped(point) };
+                if !boundary.holds(point) {
                     return Err(self.error(
                         entry.span(),
-                        "the needle enters outside the outline",
+                        format!("the needle enters outside the outline: {}", boundary.off(point)),
                         "put the entry on the boundary, or inside where the needle is in already",
                     ));
                 }
@@ -57,7 +58,7 @@ impl Validator<'_> {
             }
         };
         let tip = entry + needle.axis * needle.depth;
-        let inside = |share: f64| outline.locate(entry + (tip - entry) * share, tolerance) != Location::Outside;
+        let inside = |share: f64| boundary.holds(entry + (tip - entry) * share);
         if !(1..=64).all(|k| inside(f64::from(k) / 64.0)) {
             return Err(self.error(
                 section.depth.span(),

@@ -1,0 +1,167 @@
+//! `model-offline check`: a scene's numbers, and what of it is seldom meant, without solving.
+
+use super::common::{DiscretizationArgs, SceneArgs};
+use super::error::CliError;
+use super::json::write_json;
+use model_offline::number::{area, coordinate, in_unit, short};
+use model_offline::output::check_outputs;
+use model_offline::scene::{MaterialFacts, Scene, SceneFacts};
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+/// Options of `check`.
+#[derive(Debug, clap::Args)]
+pub(super) struct CheckArgs {
+    #[command(flatten)]
+    scene: SceneArgs,
+    /// Write numbers and warnings as JSON.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    #[command(flatten)]
+    discretization: DiscretizationArgs,
+}
+
+pub(super) fn run(args: &CheckArgs) -> Result<(), CliError> {
+    let scene = args.discretization.over(args.scene.read_any()?)?;
+    check_outputs(&[&args.scene.scene], &[("--json", args.json.as_deref())])?;
+    let (facts, warnings) = (scene.facts(), scene.told_warnings());
+    let mut document = json!(facts);
+    document["integration"] = json!(scene.discretization.method.integration);
+    document["effects"] = json!(scene.effects());
+    document["warnings"] = json!(warnings);
+    write_json(args.json.as_deref(), &document)?;
+    print!("{}", text(&scene, &facts, &warnings));
+    Ok(())
+}
+
+fn text(scene: &Scene, facts: &SceneFacts, warnings: &[String]) -> String {
+    let told = Told { facts };
+    let mut out = format!("{} · {} tissue · a valid scene\n\n", facts.scene, facts.tissue);
+    let mut row = |name: &str, what: String| {
+        let _ = writeln!(out, "{name:<13}{what}");
+    };
+    row("body", told.body());
+    row("material", told.material(&facts.material));
+    row("immobile", told.immobile());
+    row("needle", told.needle());
+    row("target", told.target());
+    for (i, inclusion) in facts.inclusions.iter().enumerate() {
+        row(&format!("inclusion {}", inclusion.number), told.inclusion(i));
+    }
+    for (i, paddle) in facts.paddles.iter().enumerate() {
+        row(&format!("paddle {}", paddle.index), told.paddle(i));
+    }
+    row("nodes", told.nodes(scene));
+    if !scene.effects().is_empty() {
+        row("effects", scene.effects().join(", "));
+    }
+    out.push('\n');
+    out.push_str(&warned(warnings));
+    if warnings.is_empty() {
+        out.push_str("no warnings\n");
+    }
+    out
+}
+
+/// Warnings, a line each.
+pub(super) fn warned(warnings: &[String]) -> String {
+    warnings.iter().fold(String::new(), |mut out, warning| {
+        let _ = writeln!(out, "warning: {warning}");
+        out
+    })
+}
+
+/// The facts in words.
+struct Told<'a> {
+    facts: &'a SceneFacts,
+}
+
+impl Told<'_> {
+    fn long(&self, length: f64) -> String {
+        in_unit(length, &self.facts.units.length)
+    }
+
+    fn point(&self, p: [f64; 2]) -> String {
+        let [x, y] = p.map(|v| coordinate(v, self.facts.body.size));
+        format!("({x}, {y})")
+    }
+
+    fn body(&self) -> String {
+        let body = &self.facts.body;
+        format!(
+            "{} by {}, from {}; area {}; {} corners",
+            short(body.high[0] - body.low[0]),
+            self.long(body.high[1] - body.low[1]),
+            self.point(body.low),
+            area(body.area, &self.facts.units.length),
+            body.vertices
+        )
+    }
+
+    fn material(&self, material: &MaterialFacts) -> String {
+        format!("shear modulus {} at rest", in_unit(material.shear_modulus, &self.facts.units.stress))
+    }
+
+    fn immobile(&self) -> String {
+        let body = &self.facts.body;
+        let share = 100.0 * body.immobile_length / body.perimeter;
+        format!("{} of {} of boundary ({share:.0} %)", self.long(body.immobile_length), self.long(body.perimeter))
+    }
+
+    fn needle(&self) -> String {
+        let needle = &self.facts.needle;
+        let [x, y] = needle.axis.map(|v| format!("{v:.4}"));
+        format!(
+            "{}, enters at {} in direction ({x}, {y}); depth {}, contact {} long",
+            needle.mechanics,
+            self.point(needle.entry),
+            self.long(needle.depth),
+            self.long(needle.contact_length)
+        )
+    }
+
+    fn target(&self) -> String {
+        let target = &self.facts.target;
+        format!(
+            "{}, {} from the entry: {} along the needle's line, {} off it; {} from the boundary",
+            self.point(target.position),
+            self.long(target.from_entry),
+            self.long(target.along_needle),
+            self.long(target.off_needle),
+            self.long(target.from_boundary)
+        )
+    }
+
+    fn inclusion(&self, place: usize) -> String {
+        let inclusion = &self.facts.inclusions[place];
+        let own =
+            inclusion.material.as_ref().map_or(String::new(), |own| format!("own material, {}, ", self.material(own)));
+        format!(
+            "{own}stiffness times {}; area {} around {}, {} wide",
+            short(inclusion.stiffness),
+            area(inclusion.area, &self.facts.units.length),
+            self.point(inclusion.centroid),
+            self.long(inclusion.width)
+        )
+    }
+
+    fn paddle(&self, place: usize) -> String {
+        let paddle = &self.facts.paddles[place];
+        format!(
+            "{} long; {} from the needle contact, {} from the immobile part",
+            self.long(paddle.length),
+            self.long(paddle.from_contact),
+            self.long(paddle.from_immobile)
+        )
+    }
+
+    fn nodes(&self, scene: &Scene) -> String {
+        let integration = scene.discretization.method.integration;
+        match (self.facts.nodes, self.facts.spacing) {
+            (Some(nodes), Some(spacing)) => format!("{nodes}, {} apart; {integration}", self.long(spacing)),
+            (None, Some(spacing)) => format!("{} apart; {integration}", self.long(spacing)),
+            (_, None) => format!("as many as its tolerance or level takes; {integration}"),
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! What is allowed in a scene and seldom meant: each with its numbers, and what to do.
+
+mod find;
+
+use crate::number::{self, in_unit, short};
+use std::fmt;
+
+/// Something in a valid scene that is seldom meant. Lengths are in the scene's unit; inclusions are counted from 1 in the
+/// order of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SceneWarning {
+    /// The needle goes away from the body at its entry.
+    NeedlePointsOut {
+        /// Angle between the axis and the inner normal of the boundary, degrees.
+        degrees: f64,
+    },
+    /// The needle goes along the surface.
+    NeedleAlongSurface {
+        /// Angle between the axis and the boundary, degrees.
+        degrees: f64,
+    },
+    /// The needle's line goes elsewhere than to the target.
+    NeedleMissesTarget {
+        /// Smallest distance of the line from the target.
+        miss: f64,
+        /// Angle between the axis and the way from the entry to the target, degrees.
+        degrees: f64,
+    },
+    /// The needle comes near the target and goes past it.
+    NeedlePassesBeside {
+        /// Smallest distance of the line from the target.
+        miss: f64,
+        /// Depth of the needle.
+        depth: f64,
+        /// Depth at which the line is nearest to the target.
+        nearest_at: f64,
+    },
+    /// The needle goes deeper than the target lies.
+    DeeperThanTarget {
+        /// Depth of the needle.
+        depth: f64,
+        /// Depth at which the line is nearest to the target.
+        nearest_at: f64,
+    },
+    /// The needle comes out on the other side.
+    NeedleLeavesBody {
+        /// Depth of the needle.
+        depth: f64,
+        /// Depth at which it comes out.
+        at: f64,
+    },
+    /// The needle comes to the immobile part.
+    NeedleMeetsImmobile {
+        /// Depth of the needle.
+        depth: f64,
+        /// Distance of its way from the immobile part.
+        distance: f64,
+    },
+    /// The needle's contact is shorter than the nodes are apart.
+    ContactShort {
+        /// Length of the contact.
+        length: f64,
+        /// Node spacing.
+        spacing: f64,
+    },
+    /// Tissue sticks to the shaft, and what slides is not held at all.
+    FrictionOnlySticks {
+        /// Whose friction it is: an inclusion's, or the needle's.
+        inclusion: Option<usize>,
+        /// Static friction, force per length.
+        static_friction: f64,
+    },
+    /// The target is next to the boundary.
+    TargetNearBoundary {
+        /// Its distance from the boundary.
+        distance: f64,
+        /// Node spacing.
+        spacing: f64,
+    },
+    /// An inclusion reaches out of the body.
+    InclusionPartlyOutside {
+        /// Which.
+        inclusion: usize,
+        /// Part of its area that is outside, 0 to 1.
+        outside: f64,
+    },
+    /// An inclusion is narrower than the nodes are apart.
+    InclusionNarrow {
+        /// Which.
+        inclusion: usize,
+        /// Its smallest width.
+        width: f64,
+        /// Node spacing.
+        spacing: f64,
+    },
+    /// Two inclusions cover a part of each other, or are the same twice.
+    InclusionsOverlap {
+        /// Which, the one that the file has first.
+        first: usize,
+        /// The other.
+        second: usize,
+        /// Area that both cover, length unit squared.
+        area: f64,
+        /// Part of the smaller one's area that is, 0 to 1.
+        share: f64,
+    },
+    /// A paddle is shorter than the nodes are apart.
+    PaddleShort {
+        /// Its index.
+        index: u32,
+        /// Its length.
+        length: f64,
+        /// Node spacing.
+        spacing: f64,
+    },
+    /// The needle's way leads through a paddle.
+    PaddleInTheWay {
+        /// Its index.
+        index: u32,
+        /// At which depth; negative: outside the body, on the way in.
+        at: f64,
+    },
+}
+
+impl SceneWarning {
+    /// What is unusual, with lengths in this unit (`1`: none).
+    pub fn message(&self, unit: &str) -> String {
+        let long = |value: f64| in_unit(value, unit);
+        match *self {
+            Self::NeedlePointsOut { degrees } => {
+                format!("the needle points out of the body: {degrees:.0}° from straight in")
+            }
+            Self::NeedleAlongSurface { degrees } => {
+                format!("the needle goes along the surface: {degrees:.1}° between its axis and the boundary")
+            }
+            Self::NeedleMissesTarget { miss, degrees } => format!(
+                "the needle does not go towards the target: its line misses it by {}, {degrees:.0}° off the way there",
+                long(miss)
+            ),
+            Self::NeedlePassesBeside { miss, depth, nearest_at } => format!(
+                "the needle goes beside the target: at depth {} it is nearest, {} off, and it goes to {}",
+                long(nearest_at),
+                long(miss),
+                long(depth)
+            ),
+            Self::DeeperThanTarget { depth, nearest_at } => format!(
+                "the needle goes deeper than the target: depth {}, the target lies at {}",
+                long(depth),
+                long(nearest_at)
+            ),
+            Self::NeedleLeavesBody { depth, at } => {
+                format!("the needle leaves the body at depth {}, and its depth is {}", long(at), long(depth))
+            }
+            Self::NeedleMeetsImmobile { depth, distance } => format!(
+                "the needle ends at the immobile part: at depth {} its way comes within {} of it",
+                long(depth),
+                long(distance)
+            ),
+            Self::ContactShort { length, spacing } => {
+                format!("the needle contact is shorter than the node spacing: {} of {}", long(length), long(spacing))
+            }
+            Self::FrictionOnlySticks { inclusion, static_friction } => format!(
+                "the friction of {} only sticks: static_friction is {} and what slides is not held at all",
+                inclusion.map_or("the needle".to_owned(), |number| format!("inclusion {number}")),
+                short(static_friction)
+            ),
+            Self::TargetNearBoundary { distance, spacing } => format!(
+                "the target is nearer to the boundary than the nodes are to each other: {} of {}",
+                long(distance),
+                long(spacing)
+            ),
+            Self::InclusionPartlyOutside { inclusion, outside } => {
+                format!("inclusion {inclusion} is partly outside the body: {} of its area", percent(outside))
+            }
+            Self::InclusionNarrow { inclusion, width, spacing } => {
+                format!("inclusion {inclusion} is narrower than the node spacing: {} of {}", long(width), long(spacing))
+            }
+            Self::InclusionsOverlap { first, second, area, share } => format!(
+                "inclusions {first} and {second} overlap: an area of {}, {} of the smaller one, has the stiffness of both",
+                number::area(area, unit),
+                percent(share)
+            ),
+            Self::PaddleShort { index, length, spacing } => {
+                format!("paddle {index} is shorter than the node spacing: {} of {}", long(length), long(spacing))
+            }
+            Self::PaddleInTheWay { index, at } if at < 0.0 => {
+                format!("paddle {index} is in the needle's way, {} before its entry", long(-at))
+            }
+            Self::PaddleInTheWay { index, at } => {
+                format!("paddle {index} is in the needle's way, at depth {}", long(at))
+            }
+        }
+    }
+
+    /// What to do.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::NeedlePointsOut { .. } => "turn the axis round, or move the contact to the other side",
+            Self::NeedleAlongSurface { .. } => "turn the axis inwards",
+            Self::NeedleMissesTarget { .. } => "turn the axis, or move the contact; nothing to do where it is meant so",
+            Self::NeedlePassesBeside { .. } => "turn the axis, or insert less deep; nothing to do where it is meant so",
+            Self::DeeperThanTarget { .. } => "insert less deep; nothing to do where it is meant so",
+            Self::NeedleLeavesBody { .. } => "insert less deep, or check the units of the depth",
+            Self::NeedleMeetsImmobile { .. } => "insert less deep, or turn the axis: what cannot move stops a needle",
+            Self::ContactShort { .. } | Self::PaddleShort { .. } => "lengthen it, or take a smaller spacing",
+            Self::FrictionOnlySticks { .. } => "give kinetic_friction too",
+            Self::TargetNearBoundary { .. } => "take a smaller spacing, or move the target inwards",
+            Self::InclusionPartlyOutside { .. } => "the part outside does nothing: move it, or cut it off",
+            Self::InclusionNarrow { .. } => {
+                "take a smaller spacing, or a tolerance: nodes so far apart hardly know of it"
+            }
+            Self::InclusionsOverlap { .. } => {
+                "move one; where one is meant to be inside the other, put all of it there"
+            }
+            Self::PaddleInTheWay { .. } => "move the paddle, or the needle",
+        }
+    }
+
+    /// What is unusual and what to do, in one line.
+    pub fn told(&self, unit: &str) -> String {
+        format!("{}; {}", self.message(unit), self.help())
+    }
+}
+
+impl fmt::Display for SceneWarning {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(&self.told("1"))
+    }
+}
+
+/// A part of something, never 0 and never all of it.
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        percent if percent < 0.1 => "less than 0.1 %".to_owned(),
+        percent => format!("{} %", short((10.0 * percent).round() / 10.0)),
+    }
+}
