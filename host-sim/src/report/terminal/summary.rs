@@ -157,7 +157,7 @@ fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::
         let left: Vec<String> = left.collect();
         writeln!(
             text,
-            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it; no controller could leave less than {:.digits$}",
+            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it; no controller could leave less on average than {:.digits$}",
             case.tissue,
             left.join(", "),
             causes.without_all.peak,
