@@ -109,6 +109,7 @@ fn new_scenes_can_be_placed_at_once() {
             command.arg(input);
         }
         command.args(["--force", "-o"]).arg(&scene).assert().success();
+        assert_eq!(Scene::read(&scene).unwrap().told_warnings(), [""; 0], "good as it is");
         model_offline().arg("place").arg(&scene).assert().success();
         model_offline().args(["new", "-o"]).arg(&scene).assert().code(2);
     };
