@@ -92,7 +92,7 @@ impl Layout {
             contact,
             axis,
             depth: rounded(0.05 * size),
-            target: innermost(outline, &contact, axis),
+            target: innermost(outline, &contact),
             paddles: others,
             spacing: rounded(size / 25.0),
         }
@@ -164,8 +164,8 @@ impl Layout {
     }
 }
 
-/// The point of a grid that is farthest from the boundary and from the needle's contact, nearer to the needle's line.
-fn innermost(outline: &Polygon, contact: &[Point2; 2], axis: Point2) -> Point2 {
+/// The point of a grid that is farthest from the boundary and from the needle's contact.
+fn innermost(outline: &Polygon, contact: &[Point2]) -> Point2 {
     let (low, high) = outline.bounds();
     let steps = 40;
     let grid = (0..=steps * steps).map(|n| {
@@ -176,12 +176,8 @@ fn innermost(outline: &Polygon, contact: &[Point2; 2], axis: Point2) -> Point2 {
         if outline.contains(*p) { outline.distance_to_boundary(*p).min(distance_to_polyline(*p, contact)) } else { 0.0 }
     };
     let best = grid.max_by(|a, b| room(a).total_cmp(&room(b))).unwrap_or(low);
-    // Off the middle: on a line of symmetry a target does not move sideways, and there would be nothing to see. The needle is
-    // meant for it, so towards the needle's line where that is farther off.
-    let across = Point2::new(-axis.y, axis.x);
-    let (step, off_line) = (0.35 * room(&best), (best - 0.5 * (contact[0] + contact[1])).dot(&across));
-    let sign = if off_line.abs() > 1.5 * step { -off_line.signum() } else { 1.0 };
-    let aside = best + across * (sign * step);
+    // Off the middle: on a line of symmetry a target does not move sideways, and there would be nothing to see.
+    let aside = best + Point2::new(0.35, 0.0) * room(&best);
     Point2::new(rounded3(aside.x, high.x - low.x), rounded3(aside.y, high.y - low.y))
 }
 
