@@ -18,11 +18,69 @@ const SVG: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" width="120mm" heigh
 <rect x="30" y="20" width="10" height="10" rx="2"/><circle cx="60" cy="30" r="6"/><ellipse cx="20" cy="30" rx="4" ry="2"/>
 <polygon points="5,5 9,5 9,9"/></svg>"#;
 
+/// A drawing with every role.
+const SVG_ROLES: &str = include_str!("../../model-offline/pictures/drawing.svg");
+
 const GMSH_2: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0.5 0.5 0\n$EndNodes\n\
 $Elements\n4\n1 2 2 1 1 1 2 5\n2 2 2 1 1 2 3 5\n3 2 2 1 1 3 4 5\n4 2 2 1 1 4 1 5\n$EndElements\n";
 
 const GMSH_4: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 1 0\n1 0 0 0 1 1 0 0 0\n$EndEntities\n$Nodes\n1 4 1 4\n\
 2 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n$EndNodes\n$Elements\n1 2 1 2\n2 1 2 2\n1 1 2 3\n2 1 3 4\n$EndElements\n";
+
+const GMSH_NAMES: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n5\n2 1 \"body-liver\"\n1 2 \"fixed\"\n1 3 \"paddle-1\"\n\
+1 4 \"needle\"\n0 5 \"target\"\n$EndPhysicalNames\n$Nodes\n5\n1 0 0 0\n2 80 0 0\n3 80 50 0\n4 0 50 0\n5 30 20 0\n$EndNodes\n\
+$Elements\n8\n1 2 2 1 1 1 2 5\n2 2 2 1 1 2 3 5\n3 2 2 1 1 3 4 5\n4 2 2 1 1 4 1 5\n5 1 2 2 1 1 2\n6 1 2 3 1 2 3\n7 1 2 4 1 3 4\n\
+8 15 2 5 1 5\n$EndElements\n";
+
+/// Two triangles in a binary file of version 2.2 or 4.1.
+fn binary_mesh(version: &str) -> Vec<u8> {
+    let mut mesh = format!("$MeshFormat\n{version} 1 8\n").into_bytes();
+    let int = |mesh: &mut Vec<u8>, numbers: &[i32]| numbers.iter().for_each(|n| mesh.extend(n.to_le_bytes()));
+    let size = |mesh: &mut Vec<u8>, numbers: &[u64]| numbers.iter().for_each(|n| mesh.extend(n.to_le_bytes()));
+    let point = |mesh: &mut Vec<u8>, x: [f64; 2]| [x[0], x[1], 0.0].iter().for_each(|x| mesh.extend(x.to_le_bytes()));
+    let corners = [[0.0, 0.0], [8.0, 0.0], [8.0, 5.0], [0.0, 5.0]];
+    int(&mut mesh, &[1]);
+    mesh.extend(b"\n$EndMeshFormat\n");
+    if version == "2.2" {
+        mesh.extend(b"$PhysicalNames\n1\n2 7 \"body\"\n$EndPhysicalNames\n$Nodes\n4\n");
+        for (tag, x) in (1..).zip(corners) {
+            int(&mut mesh, &[tag]);
+            point(&mut mesh, x);
+        }
+        mesh.extend(b"\n$EndNodes\n$Elements\n2\n");
+        int(&mut mesh, &[2, 2, 2, 1, 7, 7, 1, 2, 3, 2, 7, 7, 1, 3, 4]);
+    } else {
+        mesh.extend(b"$Entities\n");
+        size(&mut mesh, &[0, 0, 1, 0]);
+        int(&mut mesh, &[1]);
+        (0..2).for_each(|_| point(&mut mesh, [8.0, 5.0]));
+        size(&mut mesh, &[0, 0]);
+        mesh.extend(b"\n$EndEntities\n$Nodes\n");
+        size(&mut mesh, &[1, 4, 1, 4]);
+        int(&mut mesh, &[2, 1, 0]);
+        size(&mut mesh, &[4, 1, 2, 3, 4]);
+        corners.iter().for_each(|x| point(&mut mesh, *x));
+        mesh.extend(b"\n$EndNodes\n$Elements\n");
+        size(&mut mesh, &[1, 2, 1, 2]);
+        int(&mut mesh, &[2, 1, 2]);
+        size(&mut mesh, &[2, 1, 1, 2, 3, 2, 1, 3, 4]);
+    }
+    mesh.extend(b"\n$EndElements\n");
+    mesh
+}
+
+/// What the damages begin with is read: else they would only try the first lines.
+#[test]
+fn fuzz_begins_with_drawings_and_meshes_that_are_read() {
+    use model_offline::scene::import::{ImportOptions, gmsh, svg};
+    let options = ImportOptions::default();
+    for drawing in seeds("svg") {
+        assert!(svg::read(std::str::from_utf8(&drawing).unwrap(), &options).is_ok());
+    }
+    for mesh in seeds("gmsh") {
+        gmsh::read(&mesh, &options).unwrap_or_else(|error| panic!("{error}: {}", String::from_utf8_lossy(&mesh)));
+    }
+}
 
 fn tick(tick: u64) -> ControllerTick {
     let inputs =
@@ -66,8 +124,11 @@ fn seeds(entry: &str) -> Vec<Vec<u8>> {
         "accounts" => vec![some_accounts()],
         "serial" => vec![some_frames()],
         "scene" => model_offline::scene::BUNDLED.iter().map(|(_, scene)| scene.as_bytes().to_vec()).collect(),
-        "svg" => text(&[SVG]),
-        "gmsh" => text(&[GMSH_2, GMSH_4]),
+        "svg" => text(&[SVG, SVG_ROLES]),
+        "gmsh" => {
+            let ascii: Vec<Vec<u8>> = text(&[GMSH_2, GMSH_4, GMSH_NAMES]);
+            [ascii, vec![binary_mesh("2.2"), binary_mesh("4.1")]].concat()
+        }
         entry => panic!("give good bytes for `{entry}`"),
     }
 }

@@ -193,3 +193,22 @@ fn what_a_study_varies_itself_is_refused_with_the_reason() {
     }
     assert!(!Path::new("unused").exists());
 }
+
+/// A depth that was computed from the scene's, and is one rounding deeper, is that depth; what is deeper is refused.
+#[test]
+fn a_shaft_goes_as_deep_as_the_scene_says_and_no_deeper() {
+    let folder = tempfile::tempdir().unwrap();
+    let solve = |depth: &str| {
+        let out = folder.path().join(format!("{depth}.json"));
+        let mut command = model_offline();
+        command.args(["solve", "breast-world", "--depth", depth, "--json"]).arg(&out);
+        (command.assert(), out)
+    };
+    let [(exact, whole), (rounded, deeper)] = ["12", "12.000000000000002"].map(solve);
+    exact.success();
+    rounded.success();
+    assert_eq!(json(&whole)["target_displacement"], json(&deeper)["target_displacement"]);
+    let (refused, none) = solve("12.001");
+    let stderr = String::from_utf8(refused.failure().code(2).get_output().stderr.clone()).unwrap();
+    assert!(stderr.contains("the needle of this scene goes to 12") && !none.exists(), "{stderr}");
+}

@@ -121,6 +121,90 @@ fn new_scenes_can_be_placed_at_once() {
     model_offline().args(["new", "--svg", "absent.svg"]).assert().code(2);
 }
 
+/// A drawing with every role: its numbers to the drawing's rounding, a summary of everything, and a placement.
+#[test]
+fn a_drawing_with_all_roles_is_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let drawing = folder.path().join("all.svg");
+    let path = folder.path().join("all.toml");
+    // A page to scale, 1 unit is 1 mm, for a scene in cm; y points down on it.
+    let text = r##"<svg xmlns="http://www.w3.org/2000/svg" width="200mm" height="100mm" viewBox="0 0 200 100">
+<rect id="body" x="20" y="30" width="120" height="60"/>
+<circle id="inclusion-1" cx="100" cy="60" r="10"/>
+<line id="needle" x1="60" y1="10" x2="60" y2="70"/>
+<circle id="target" cx="80" cy="64" r="2"/>
+<g id="fixed"><line x1="20" y1="90" x2="140" y2="90"/></g>
+<line id="paddle-1" x1="20" y1="40" x2="20" y2="60"/>
+<line id="paddle-7" x1="140.5" y1="50" x2="140.5" y2="70"/>
+<rect id="page" width="200" height="100"/>
+<text id="title">all</text>
+</svg>"##;
+    std::fs::write(&drawing, text).unwrap();
+    let new = |extra: &[&str]| model_offline().args(["new", "--svg"]).arg(&drawing).args(extra).assert();
+    let made = new(&["--length", "cm", "-o", path.to_str().unwrap()]).success();
+    let said = String::from_utf8(made.get_output().stdout.clone()).unwrap();
+    for line in [
+        "scale: 0.1 cm per unit of the drawing (200mm × 100mm)",
+        "taken: body ← <rect> `body` (line 2)",
+        "taken: inclusion ← <circle> `inclusion-1` (line 3)",
+        "taken: needle ← <line> `needle` (line 4)",
+        "taken: target ← <circle> `target` (line 5)",
+        "taken: fixed ← <line> (line 6)",
+        "taken: paddle 1 ← <line> `paddle-1` (line 7)",
+        "taken: paddle 7 ← <line> `paddle-7` (line 8)",
+        "left out: <rect> `page` (line 9): inclusions are those with names",
+        "left out: <text> `title` (line 10): text is no shape",
+    ] {
+        assert!(said.lines().any(|said| said.starts_with(line)), "{line}\n{said}");
+    }
+    assert!(!said.contains("suggested"), "{said}");
+    let scene = Scene::read(&path).unwrap();
+    let near = |a: nalgebra::Vector2<f64>, b: [f64; 2]| (a - nalgebra::Vector2::from(b)).norm() < 1e-4;
+    let corners = [[0.0, 0.0], [12.0, 0.0], [12.0, 6.0], [0.0, 6.0]];
+    assert!(corners.iter().all(|c| scene.outline.vertices().iter().any(|v| near(*v, *c))), "{:?}", scene.outline);
+    let circle = std::f64::consts::PI;
+    assert!((scene.inclusions[0].outline.area() / circle - 1.0).abs() < 0.02);
+    assert!((scene.inclusions[0].outline.centroid() - nalgebra::Vector2::new(8.0, 3.0)).norm() < 0.01);
+    assert!(near(scene.needle.entry(), [4.0, 6.0]) && near(scene.needle.axis, [0.0, -1.0]));
+    assert!((scene.target - nalgebra::Vector2::new(6.0, 2.6)).norm() < 5e-3, "{:?}", scene.target);
+    assert!(near(scene.immobile[0][0], [0.0, 0.0]) && near(scene.immobile[0][1], [12.0, 0.0]), "{:?}", scene.immobile);
+    let ends = |i: usize| scene.paddles[i].segment;
+    assert_eq!((scene.paddles[0].index, scene.paddles[1].index), (1, 7));
+    assert!(near(ends(0)[0], [0.0, 5.0]) && near(ends(0)[1], [0.0, 3.0]), "{:?}", ends(0));
+    assert!(near(ends(1)[0], [12.0, 4.0]) && near(ends(1)[1], [12.0, 2.0]), "{:?}", ends(1));
+    model_offline().arg("place").arg(&path).args(["--spacing", "1.0"]).assert().success();
+    // Where the scene itself goes to standard output, the summary does not.
+    let printed = new(&["--length", "cm"]).success();
+    assert_eq!(printed.get_output().stdout, std::fs::read(&path).unwrap());
+    assert!(String::from_utf8_lossy(&printed.get_output().stderr).contains("taken: paddle 7"));
+    // Roles that contradict each other: whose, and what to do.
+    std::fs::write(&drawing, text.replace(r#"x1="20" y1="40" x2="20" y2="60""#, r#"x1="40" y1="90" x2="60" y2="90""#))
+        .unwrap();
+    let refused = new(&[]).code(2);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(said.contains("paddle 1 is on the immobile part") && said.contains("paddle-1"), "{said}");
+}
+
+/// The drawing of the guide: every role is taken, and nothing is suggested.
+#[test]
+fn the_drawing_of_the_guide_is_a_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("drawn.toml");
+    let drawing = Path::new(env!("CARGO_MANIFEST_DIR")).join("pictures/drawing.svg");
+    let made = model_offline().args(["new", "--svg"]).arg(&drawing).arg("-o").arg(&path).assert().success();
+    let said = String::from_utf8(made.get_output().stdout.clone()).unwrap();
+    assert_eq!(said.lines().filter(|line| line.starts_with("taken: ")).count(), 9, "{said}");
+    assert_eq!(said.lines().filter(|line| line.starts_with("left out: ")).count(), 2, "{said}");
+    assert!(!said.contains("suggested"), "{said}");
+    let scene = Scene::read(&path).unwrap();
+    let (low, high) = scene.outline.bounds();
+    assert!((high - low - nalgebra::Vector2::new(120.0, 70.0)).norm() < 0.1);
+    assert_eq!((scene.paddles.len(), scene.inclusions.len(), scene.immobile.len()), (4, 1, 1));
+    // The ellipse's middle, 72 to the right of the body's left and 38 above its lowest line.
+    assert!((scene.target - nalgebra::Vector2::new(72.0, 38.0)).norm() < 0.05, "{:?}", scene.target);
+    assert_eq!(scene.warnings().len(), 0);
+}
+
 /// What sees the target: presets, numbers of the scene's own, and what is refused.
 #[test]
 fn scenes_say_what_sees_the_target() {

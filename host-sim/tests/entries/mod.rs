@@ -8,7 +8,8 @@ use host_sim::record::recording::{Recording, Salvaged};
 use host_sim::runtime::accounting::accounts::ControllerAccounts;
 use host_sim::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
 use model_offline::scene::Scene;
-use model_offline::scene::import::{Imported, gmsh, svg};
+use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
+use model_offline::scene::starter::{self, StarterNames};
 
 /// An entry: its name and what is done with the bytes.
 pub(crate) type Entry = (&'static str, fn(&[u8]));
@@ -76,24 +77,30 @@ pub(crate) fn scene(bytes: &[u8]) {
 }
 
 fn is_plausible(imported: &Imported) {
-    for outline in std::iter::once(&imported.outline).chain(&imported.inclusions) {
+    for outline in std::iter::once(&imported.outline).chain(imported.inclusions.iter().map(|region| &region.outline)) {
         assert!(outline.vertices().len() > 2);
         assert!(outline.vertices().iter().all(|point| point.iter().all(|x| x.is_finite())));
     }
 }
 
-/// A drawing.
+/// A drawing: what is read is finite, and the scene of it is valid or refused by a type.
 pub(crate) fn svg_drawing(bytes: &[u8]) {
     let Ok(text) = std::str::from_utf8(bytes) else { return };
-    for size in [None, Some(120.0)] {
-        svg::read(text, size).iter().for_each(is_plausible);
-    }
+    imported(|options| svg::read(text, options));
 }
 
 /// A mesh.
 pub(crate) fn gmsh_mesh(bytes: &[u8]) {
-    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    imported(|options| gmsh::read(bytes, options));
+}
+
+fn imported(read: impl Fn(&ImportOptions<'_>) -> Result<Imported, ImportError>) {
+    let names = StarterNames { name: "generated".into(), length: "mm".into(), stress: "kPa".into() };
     for size in [None, Some(120.0)] {
-        gmsh::read(text, size).iter().for_each(is_plausible);
+        if let Ok(mut imported) = read(&ImportOptions { size, ..ImportOptions::default() }) {
+            is_plausible(&imported);
+            let _ = starter::imported(&names, &mut imported);
+            let _ = imported.summary.to_string();
+        }
     }
 }

@@ -3,8 +3,8 @@
 use super::error::CliError;
 use model_offline::output;
 use model_offline::scene::Scene;
-use model_offline::scene::import::{Imported, gmsh, svg};
-use model_offline::scene::starter::{StarterNames, starter};
+use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
+use model_offline::scene::starter::{self, StarterNames, starter};
 use std::path::{Path, PathBuf};
 
 /// Options of `new`.
@@ -13,13 +13,16 @@ pub(super) struct NewArgs {
     /// Where to write the scene [default: standard output].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Take the outline from the paths of an SVG drawing: the largest is the body, others inside are inclusions.
+    /// Take body, inclusions, needle, target, paddles and what is fixed from the shapes of an SVG drawing, by their
+    /// names. Without names the largest closed shape is the body, others inside are inclusions.
     #[arg(long, value_name = "FILE", conflicts_with = "msh")]
     svg: Option<PathBuf>,
-    /// Take the outline from a Gmsh mesh (ASCII, version 2.2 or 4.1): its boundary is the body.
+    /// Take the same from a Gmsh mesh (version 2.2 or 4.1, ASCII or binary), by its physical groups: its boundary is
+    /// the body.
     #[arg(long, value_name = "FILE")]
     msh: Option<PathBuf>,
-    /// Length of the body's longer side, in the scene's unit [default: as in the file].
+    /// Length of the body's longer side, in the scene's unit [default: as in the file; drawings with a width in mm,
+    /// cm, in, pt, pc, Q or px are to scale].
     #[arg(long, value_name = "LENGTH")]
     size: Option<f64>,
     /// Name of the scene [default: that of the file it comes from].
@@ -46,20 +49,21 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
             return Err(usage("--size belongs to --svg or --msh".into(), "the starter block has its own size"));
         }
     }
-    let imported = match (&args.svg, &args.msh) {
-        (Some(file), _) => Some(import(file, |text| svg::read(text, args.size))?),
-        (None, Some(file)) => Some(import(file, |text| gmsh::read(text, args.size))?),
-        (None, None) => None,
-    };
     let stem = |path: &PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let source = args.output.as_ref().or(args.svg.as_ref()).or(args.msh.as_ref());
     let name = args.name.clone().or_else(|| source.and_then(stem)).unwrap_or_else(|| "my-scene".to_owned());
     let names = StarterNames { name, length: args.length.clone(), stress: args.stress.clone() };
-    let text = starter(&names, imported.as_ref());
+    let (text, summary) = match args.svg.as_ref().or(args.msh.as_ref()) {
+        Some(file) => import(file, args, &names)?,
+        None => (starter(&names, None), String::new()),
+    };
     // A suggestion that validation refuses would only be found out by the next command.
     Scene::parse(&text, "<new scene>")?;
     match &args.output {
-        None => print!("{text}"),
+        None => {
+            print!("{text}");
+            eprint!("{summary}");
+        }
         Some(path) if path.exists() && !args.force => {
             return Err(usage(format!("{} is there already", path.display()), "name another file, or add --force"));
         }
@@ -67,20 +71,41 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
             let inputs: Vec<&Path> = args.svg.iter().chain(&args.msh).map(PathBuf::as_path).collect();
             output::check_outputs(&inputs, &[("--output", Some(path))])?;
             output::write_whole(path, text.as_bytes())?;
-            println!("{}\nnext: model-offline place {0}", path.display());
+            println!("{summary}{}\nnext: model-offline place {0}", path.display());
         }
     }
     Ok(())
 }
 
-fn import(
-    file: &Path,
-    read: impl Fn(&str) -> Result<Imported, model_offline::scene::import::ImportError>,
-) -> Result<Imported, CliError> {
-    let text = std::fs::read_to_string(file)
-        .map_err(|error| CliError::usage(format!("cannot read {}: {error}", file.display()), "give a text file"))?;
-    read(&text).map_err(|error| {
-        let help = "an outline is a closed path of an SVG drawing, or the boundary of a planar ASCII Gmsh mesh";
-        CliError::usage(format!("{}: {error}", file.display()), help)
-    })
+/// The scene of a file, and what became of everything in it.
+fn import(file: &Path, args: &NewArgs, names: &StarterNames) -> Result<(String, String), CliError> {
+    let bytes = std::fs::read(file).map_err(|error| {
+        CliError::usage(format!("cannot read {}: {error}", file.display()), "give a drawing or a mesh")
+    })?;
+    let options = ImportOptions { size: args.size, length: &names.length, stress: &names.stress };
+    let read = || -> Result<(String, Imported), ImportError> {
+        let mut imported = if args.svg.is_some() {
+            let text = std::str::from_utf8(&bytes).map_err(|error| {
+                let line = 1 + bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
+                ImportError::Syntax {
+                    line,
+                    what: "this is no text: give an SVG file that is not compressed".to_owned(),
+                }
+            })?;
+            svg::read(text, &options)?
+        } else {
+            gmsh::read(&bytes, &options)?
+        };
+        Ok((starter::imported(names, &mut imported)?, imported))
+    };
+    match read() {
+        Ok((text, imported)) => Ok((text, imported.summary.to_string())),
+        Err(error) => {
+            let help = match &error {
+                ImportError::NoScene { help, .. } => help.clone(),
+                _ => "a body is a closed shape of an SVG drawing, or the boundary of a planar Gmsh mesh".to_owned(),
+            };
+            Err(CliError::usage(format!("{}: {error}", file.display()), help))
+        }
+    }
 }

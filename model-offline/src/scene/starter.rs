@@ -1,7 +1,9 @@
 //! A commented scene to start from, on a block of tissue or on an outline from elsewhere.
 
-use super::import::Imported;
-use crate::geometry::{Point2, Polygon, distance_to_polyline};
+use super::Scene;
+use super::import::{ImportError, Imported, ImportedNeedle, Role};
+use crate::geometry::{Point2, Polygon, distance_to_polyline, segments_meet};
+use crate::material::Preset;
 use std::fmt::Write as _;
 
 /// What a starter scene is called and measured in.
@@ -17,83 +19,125 @@ pub struct StarterNames {
 
 /// Paddle positions that are suggested at most.
 const PADDLES: usize = 5;
+/// A needle's contact as part of the edge that it enters.
+const CONTACT: f64 = 0.3;
 
 /// The text of a valid, commented scene. Without an import: a block of 100 by 60 with one inclusion.
 ///
-/// What holds the body, where the needle goes in and where paddles may sit is a suggestion: the lowest edge is immobile,
-/// the needle enters at the highest edge, paddles sit on the longest of the others, the target is the innermost point.
+/// What holds the body, where the needle goes in and where paddles may sit is a suggestion where the import does not
+/// give it: the lowest edge is immobile, the needle enters at the highest edge, paddles sit on the longest of the
+/// others, the target is the innermost point.
 pub fn starter(names: &StarterNames, imported: Option<&Imported>) -> String {
     let block = || {
         let rectangle =
             |a: [f64; 2], b: [f64; 2]| Polygon::new([a, [b[0], a[1]], b, [a[0], b[1]]].map(Point2::from).to_vec()).ok();
         let outline = rectangle([0.0, 0.0], [100.0, 60.0])?;
-        Some(Imported { outline, inclusions: rectangle([55.0, 25.0], [75.0, 45.0]).into_iter().collect() })
+        Some(Imported::of(outline, rectangle([55.0, 25.0], [75.0, 45.0]).into_iter().collect()))
     };
     let Some(imported) = imported.cloned().or_else(block) else {
         return String::new();
     };
-    Layout::suggest(&imported.outline).text(names, &imported)
+    Layout::of(&imported).text(names, &imported)
+}
+
+/// The starter scene of an import, which is a valid one; what the import does not give is named in its summary.
+///
+/// # Errors
+/// [`ImportError::NoScene`] says whose shape makes it invalid, and what to do.
+pub fn imported(names: &StarterNames, imported: &mut Imported) -> Result<String, ImportError> {
+    let text = starter(names, Some(imported));
+    let parts = [
+        (imported.immobile.is_empty(), "fixed"),
+        (imported.needle.is_none(), "needle"),
+        (imported.target.is_none(), "target"),
+        (imported.paddles.is_empty(), "paddles"),
+    ];
+    imported.summary.suggested = parts.iter().filter(|part| part.0).map(|part| part.1).collect();
+    match Scene::parse(&text, "<new scene>") {
+        Ok(_) => Ok(text),
+        Err(error) => {
+            let role = role_at(&text, error.line);
+            Err(ImportError::NoScene { role, what: error.message, help: format!("{}; {}", hint(role), error.help) })
+        }
+    }
+}
+
+/// Whose section a line of the scene is in.
+fn role_at(text: &str, line: usize) -> Role {
+    let sections = text.lines().take(line).filter(|line| line.starts_with('['));
+    match sections.last().and_then(|section| section.trim_start_matches('[').split(']').next()) {
+        Some("inclusion") => Role::Inclusion,
+        Some("immobile") => Role::Fixed,
+        Some("needle") => Role::Needle,
+        Some("target") => Role::Target,
+        Some("paddle") => Role::Paddle(None),
+        _ => Role::Body,
+    }
+}
+
+/// What to draw otherwise.
+fn hint(role: Role) -> &'static str {
+    match role {
+        Role::Body => "redraw the shape named `body`",
+        Role::Inclusion => "redraw or remove the shapes named `inclusion-…`",
+        Role::Needle => "draw or move the line named `needle`",
+        Role::Target => "draw or move the shape named `target`",
+        Role::Paddle(_) => "draw or move the lines named `paddle-1`, `paddle-2`, …",
+        Role::Fixed => "draw or move the line named `fixed`",
+    }
 }
 
 /// Where things go on an outline.
 struct Layout {
-    immobile: [Point2; 2],
-    contact: [Point2; 2],
+    immobile: Vec<Vec<Point2>>,
+    contact: Vec<Point2>,
     axis: Point2,
     depth: f64,
     target: Point2,
-    paddles: Vec<[Point2; 2]>,
+    paddles: Vec<(u32, [Point2; 2])>,
     spacing: f64,
 }
 
 impl Layout {
-    fn suggest(outline: &Polygon) -> Self {
+    /// What the import gives, and suggestions for the rest that keep clear of it.
+    fn of(imported: &Imported) -> Self {
+        let outline = &imported.outline;
         let edges: Vec<[Point2; 2]> = outline.edges().map(|(a, b)| [a, b]).collect();
-        let height = |edge: &[Point2; 2]| 0.5 * (edge[0].y + edge[1].y);
-        let length = |edge: &[Point2; 2]| (edge[1] - edge[0]).norm();
         let size = outline.size();
+        let given: Vec<[Point2; 2]> = {
+            let contact = imported.needle.iter().map(|needle| &needle.contact);
+            let lines = imported.immobile.iter().chain(contact);
+            let pieces = lines.flat_map(|line| line.windows(2)).map(|piece| [piece[0], piece[1]]);
+            pieces.chain(imported.paddles.iter().map(|paddle| paddle.1)).collect()
+        };
+        let free = |piece: [Point2; 2]| is_free(piece, &given, size);
         // Short edges are parts of curves: nothing sits on them where a longer one is nearly as good.
-        let score = |edge: &[Point2; 2], sign: f64| sign * height(edge) - 0.5 * length(edge);
-        let best = |sign: f64, not: Option<usize>| {
-            let candidates = (0..edges.len()).filter(|i| Some(*i) != not);
-            candidates.min_by(|&a, &b| score(&edges[a], sign).total_cmp(&score(&edges[b], sign))).unwrap_or(0)
+        let score = |edge: &[Point2; 2], sign: f64| sign * 0.5 * (edge[0].y + edge[1].y) - 0.5 * length(edge);
+        let best = |sign: f64, candidates: &mut dyn Iterator<Item = usize>| {
+            candidates.min_by(|&a, &b| score(&edges[a], sign).total_cmp(&score(&edges[b], sign)))
         };
-        let supported = best(1.0, None);
-        let entry = best(-1.0, Some(supported));
-        let along = edges[entry][1] - edges[entry][0];
-        let middle = edges[entry][0] + along * 0.5;
-        let normal = Point2::new(-along.y, along.x).normalize();
-        let axis = if outline.contains(middle + normal * (1e-3 * size)) { normal } else { -normal };
-        let immobile = edges[supported];
-        let contact = [middle - along * 0.15, middle + along * 0.15];
-        let mut others: Vec<[Point2; 2]> = (0..edges.len())
-            .filter(|i| *i != supported && *i != entry)
-            .flat_map(|i| {
-                let [a, b] = edges[i];
-                // Long edges carry two paddles; none reaches a corner, where it could touch the immobile part.
-                let spans: &[(f64, f64)] =
-                    if length(&edges[i]) > 0.25 * size { &[(0.15, 0.45), (0.55, 0.85)] } else { &[(0.2, 0.8)] };
-                spans.iter().map(move |(from, to)| [a + (b - a) * *from, a + (b - a) * *to]).collect::<Vec<_>>()
-            })
-            .collect();
-        if others.is_empty() {
-            others.push([edges[entry][0] + along * 0.02, edges[entry][0] + along * 0.25]);
-        }
-        others.sort_by(|a, b| length(b).total_cmp(&length(a)));
-        others.truncate(PADDLES);
-        // Around the body, so that neighbours have neighbouring numbers.
-        let station = |p: &[Point2; 2]| {
-            let centre = 0.5 * (p[0] + p[1]);
-            edges.iter().position(|e| distance_to_polyline(centre, e) < 1e-6 * size).unwrap_or(0)
+        let all = 0..edges.len();
+        let supported = best(1.0, &mut all.clone().filter(|i| free(edges[*i]))).unwrap_or(0);
+        let immobile =
+            if imported.immobile.is_empty() { vec![edges[supported].to_vec()] } else { imported.immobile.clone() };
+        let suggested = imported.immobile.is_empty();
+        let mut entries = all.clone().filter(|i| !(suggested && *i == supported) && free(middle_of(edges[*i])));
+        let entry = best(-1.0, &mut entries).unwrap_or_else(|| usize::from(suggested && supported == 0));
+        let needle = imported.needle.clone().unwrap_or_else(|| straight_in(outline, edges[entry]));
+        let paddles = if imported.paddles.is_empty() {
+            let held: Vec<[Point2; 2]> =
+                immobile.iter().chain([&needle.contact]).flat_map(|l| l.windows(2)).map(|p| [p[0], p[1]]).collect();
+            suggested_paddles(&edges, &held, size)
+        } else {
+            imported.paddles.clone()
         };
-        others.sort_by_key(station);
         Self {
             immobile,
-            contact,
-            axis,
-            depth: rounded(0.05 * size),
-            target: innermost(outline, &contact),
-            paddles: others,
+            depth: rounded(0.05 * size).min(rounded_down(needle.most)),
+            target: imported.target.unwrap_or_else(|| innermost(outline, &needle.contact)),
+            contact: needle.contact,
+            axis: needle.axis,
+            paddles,
             spacing: rounded(size / 25.0),
         }
     }
@@ -111,21 +155,20 @@ impl Layout {
              #   host-sim run --scene FILE                 simulate the insertion and write a report\n\n\
              [scene]\nname = {name:?}\ndimension = 2                       # plane strain\n\
              units = {{ length = {length:?}, stress = {stress:?} }}\n\n\
-             [domain]                            # the body: a simple polygon\noutline = {}\n\n\
-             [material]                          # Young's modulus 2.8, Poisson's ratio 0.4: soft tissue if stress is in kPa\n\
-             model = \"neo-hookean\"               # fung | neo-hookean | saint-venant-kirchhoff | linear\n\
-             lambda = 4.0                        # E ν / ((1 + ν)(1 − 2ν))\nmu = 1.0                            # E / (2 (1 + ν))\n\
-             # In place of these three, where the unit of stress is known: preset = \"breast-fat\", or another of the literature;\n\
-             # `model-offline materials` lists them.\n",
-            polygon(&imported.outline)
+             [domain]                            # the body: a simple polygon\noutline = {}\n\n{}",
+            polygon(&imported.outline),
+            material(imported.material)
         );
         for inclusion in &imported.inclusions {
             let _ = write!(
                 out,
-                "\n[[inclusion]]                       # a region of another stiffness\noutline = {}\n\
-                 stiffness = 10.0                    # times the body's\n",
-                polygon(inclusion)
+                "\n[[inclusion]]                       # a region of another stiffness\noutline = {}\n",
+                polygon(&inclusion.outline)
             );
+            out += &match inclusion.material {
+                None => "stiffness = 10.0                    # times the body's\n".to_owned(),
+                Some(preset) => format!("material = {{ preset = \"{preset}\" }}\n"),
+            };
         }
         let _ = write!(
             out,
@@ -135,17 +178,16 @@ impl Layout {
              axis = {}                  # direction of insertion\n\
              depth = {}                         # how far the contact is pushed\nincrements = 10\n\n\
              [target]                            # the point to hold still\nposition = {}\n",
-            points(&self.immobile),
+            self.immobile.iter().map(|path| points(path)).collect::<Vec<_>>().join(", "),
             points(&self.contact),
             point(self.axis),
             number(self.depth),
             point(self.target)
         );
-        for (i, paddle) in self.paddles.iter().enumerate() {
+        for (index, paddle) in &self.paddles {
             let _ = write!(
                 out,
-                "\n[[paddle]]                          # a place where the paddle may sit\nindex = {}\nsegment = {}\n",
-                i + 1,
+                "\n[[paddle]]                          # a place where the paddle may sit\nindex = {index}\nsegment = {}\n",
                 points(paddle)
             );
         }
@@ -162,6 +204,70 @@ impl Layout {
         );
         out
     }
+}
+
+/// The section of the body's material.
+fn material(preset: Option<Preset>) -> String {
+    let Some(preset) = preset else {
+        return "[material]                          # Young's modulus 2.8, Poisson's ratio 0.4: soft tissue if stress is in kPa\n\
+                model = \"neo-hookean\"               # fung | neo-hookean | saint-venant-kirchhoff | linear\n\
+                lambda = 4.0                        # E ν / ((1 + ν)(1 − 2ν))\n\
+                mu = 1.0                            # E / (2 (1 + ν))\n\
+                # In place of these three, where the unit of stress is known: preset = \"breast-fat\", or another of the literature;\n\
+                # `model-offline materials` lists them.\n"
+            .to_owned();
+    };
+    format!(
+        "[material]                          # `model-offline materials` lists more of them\npreset = \"{preset}\"\n"
+    )
+}
+
+fn length(edge: &[Point2; 2]) -> f64 {
+    (edge[1] - edge[0]).norm()
+}
+
+/// Whether a piece of the boundary touches none of others.
+fn is_free(piece: [Point2; 2], others: &[[Point2; 2]], size: f64) -> bool {
+    others.iter().all(|[a, b]| !segments_meet(piece[0], piece[1], *a, *b, 2e-3 * size))
+}
+
+/// The part of an edge that a needle's contact takes.
+fn middle_of(edge: [Point2; 2]) -> [Point2; 2] {
+    let along = edge[1] - edge[0];
+    let middle = edge[0] + along * 0.5;
+    [middle - along * (0.5 * CONTACT), middle + along * (0.5 * CONTACT)]
+}
+
+/// A needle straight into the middle of an edge.
+fn straight_in(outline: &Polygon, edge: [Point2; 2]) -> ImportedNeedle {
+    let along = edge[1] - edge[0];
+    let middle = edge[0] + along * 0.5;
+    let normal = Point2::new(-along.y, along.x).normalize();
+    let axis = if outline.contains(middle + normal * (1e-3 * outline.size())) { normal } else { -normal };
+    ImportedNeedle { contact: middle_of(edge).to_vec(), axis, most: f64::INFINITY }
+}
+
+/// Places on the longest edges that keep clear of what is held, numbered around the body.
+fn suggested_paddles(edges: &[[Point2; 2]], held: &[[Point2; 2]], size: f64) -> Vec<(u32, [Point2; 2])> {
+    let spans = edges.iter().enumerate().flat_map(|(i, [a, b])| {
+        // Long edges carry two paddles; none reaches a corner, where it could touch the immobile part.
+        let spans: &[(f64, f64)] =
+            if length(&[*a, *b]) > 0.25 * size { &[(0.15, 0.45), (0.55, 0.85)] } else { &[(0.2, 0.8)] };
+        spans.iter().map(move |(from, to)| (i, [a + (b - a) * *from, a + (b - a) * *to])).collect::<Vec<_>>()
+    });
+    let mut others: Vec<(usize, [Point2; 2])> = spans.filter(|(_, span)| is_free(*span, held, size)).collect();
+    if others.is_empty() {
+        // Beside the contact, near a corner.
+        let beside = edges.iter().enumerate().flat_map(|(i, [a, b])| {
+            [(0.02, 0.25), (0.75, 0.98)].map(|(from, to)| (i, [a + (b - a) * from, a + (b - a) * to]))
+        });
+        others = beside.filter(|(_, span)| is_free(*span, held, size)).take(1).collect();
+    }
+    others.sort_by(|a, b| length(&b.1).total_cmp(&length(&a.1)));
+    others.truncate(PADDLES);
+    // Around the body, so that neighbours have neighbouring numbers.
+    others.sort_by_key(|(edge, _)| *edge);
+    (1..).zip(others).map(|(index, (_, span))| (index, span)).collect()
 }
 
 /// The point of a grid that is farthest from the boundary and from the needle's contact.
@@ -185,6 +291,12 @@ fn innermost(outline: &Polygon, contact: &[Point2]) -> Point2 {
 fn rounded(value: f64) -> f64 {
     let step = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
     (value / step).round() * step
+}
+
+/// Two significant digits, no more than the value.
+fn rounded_down(value: f64) -> f64 {
+    let step = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
+    if value.is_finite() { (value / step).floor() * step } else { value }
 }
 
 /// A thousandth of `scale`.
@@ -222,8 +334,7 @@ fn polygon(polygon: &Polygon) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Scene;
-    use crate::scene::import::{assemble, svg};
+    use crate::scene::import::{ImportOptions, svg};
 
     fn names() -> StarterNames {
         StarterNames { name: "mine".into(), length: "mm".into(), stress: "kPa".into() }
@@ -235,7 +346,8 @@ mod tests {
         assert_eq!((scene.paddles.len(), scene.inclusions.len(), scene.length_unit.as_str()), (4, 1, "mm"));
     }
 
-    /// Every outline gives a scene that passes validation: polygons of 3 to 40 corners, long and short, small and large.
+    /// Every outline gives a scene that passes validation: polygons of 3 to 40 corners, long and short, small and
+    /// large.
     #[test]
     fn any_outline_becomes_a_valid_scene() {
         for corners in [3, 4, 5, 7, 12, 40] {
@@ -244,7 +356,7 @@ mod tests {
                     let angle = std::f64::consts::TAU * (f64::from(i) + 0.31) / f64::from(corners);
                     Point2::new(width * angle.cos(), height * angle.sin())
                 });
-                let imported = assemble(vec![points.collect()], None).unwrap();
+                let imported = Imported::of(Polygon::new(points.collect()).unwrap(), Vec::new());
                 let text = starter(&names(), Some(&imported));
                 let scene = Scene::parse(&text, "starter").unwrap_or_else(|e| panic!("{corners} {width}: {e}\n{text}"));
                 assert!(scene.needle.depth > 0.0);
@@ -255,7 +367,7 @@ mod tests {
     #[test]
     fn a_drawing_becomes_a_valid_scene() {
         let drawing = r#"<svg><path d="M 0 0 C 40 -60 160 -60 200 0 Z"/><circle r="3"/></svg>"#;
-        let imported = svg::read(drawing, Some(120.0)).unwrap();
+        let imported = svg::read(drawing, &ImportOptions { size: Some(120.0), ..Default::default() }).unwrap();
         let scene = Scene::parse(&starter(&names(), Some(&imported)), "drawing").unwrap();
         assert!((scene.outline.bounds().1.x - 120.0).abs() < 0.1);
     }
