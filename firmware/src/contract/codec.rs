@@ -142,8 +142,27 @@ pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, Ta
 /// # Errors
 /// As [`decode`].
 pub fn decode_into<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>) -> Result<(), TableError> {
+    fill_again(bytes, table, Labels::Skip)
+}
+
+/// As [`decode_into`], with the labels: for whoever compares the table's unit with that of what is attached.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_labelled_into<T: Scalar, const D: usize>(
+    bytes: &[u8],
+    table: &mut Table<T, D>,
+) -> Result<(), TableError> {
+    fill_again(bytes, table, Labels::Keep)
+}
+
+fn fill_again<T: Scalar, const D: usize>(
+    bytes: &[u8],
+    table: &mut Table<T, D>,
+    labels: Labels,
+) -> Result<(), TableError> {
     table.knots.clear();
-    fill(bytes, table, Labels::Skip).inspect_err(|_| table.knots.clear())
+    fill(bytes, table, labels).inspect_err(|_| table.knots.clear())
 }
 
 /// What becomes of the texts in a table, which only reports show.

@@ -16,7 +16,7 @@ pub mod table;
 mod validate;
 
 pub(crate) use bounds::TableBounds;
-pub use codec::{Header, decode, decode_into, encode};
+pub use codec::{Header, decode, decode_into, decode_labelled_into, encode};
 pub use error::TableError;
 pub use faults::{Faults, Mode};
 pub use field::Field;

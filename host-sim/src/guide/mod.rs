@@ -1,4 +1,4 @@
-//! Guides: run simulations, what is in the simulated world, check timing, inject faults, run the controller on a microcontroller, and what may be relied on.
+//! Guides: run simulations, what is in the simulated world, check timing, inject faults, run the controller on a microcontroller, connect hardware, and what may be relied on.
 //!
 //! For whoever precomputes tables, and for how it all works with the equations, see [`model_offline::guide`]. Every command
 //! line on these pages is run by `cargo test -p host-sim --test documentation`, but for those marked in their source.
@@ -19,6 +19,9 @@ pub mod inject_faults {}
 
 #[doc = include_str!("run_on_a_microcontroller.md")]
 pub mod run_on_a_microcontroller {}
+
+#[doc = include_str!("connect_hardware.md")]
+pub mod connect_hardware {}
 
 #[doc = include_str!("threat_model.md")]
 pub mod threat_model {}

@@ -107,6 +107,11 @@ fn functions_of_firmware_fit_a_screen() {
 }
 
 #[test]
+fn functions_of_the_c_library_fit_a_screen() {
+    assert_functions_fit("firmware/c");
+}
+
+#[test]
 fn no_imports_of_firmware_run_in_a_circle() {
     assert_no_circles("firmware");
 }

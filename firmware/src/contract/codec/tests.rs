@@ -54,6 +54,16 @@ fn a_table_read_in_place_has_everything_but_labels() {
 }
 
 #[test]
+fn a_table_read_in_place_with_its_labels_is_the_whole_table() {
+    let mut table = std::boxed::Box::new(Table::empty());
+    let good = encoded(&example::table());
+    decode_labelled_into::<f64, 2>(&good, &mut table).unwrap();
+    assert_eq!(*table, example::table());
+    assert!(decode_labelled_into::<f64, 2>(&good[1..], &mut table).is_err());
+    assert!(table.knots.is_empty(), "what is refused leaves no table behind");
+}
+
+#[test]
 fn the_largest_table_fits() {
     let mut table = example::table();
     let last = table.knots.last().unwrap().clone();
