@@ -389,6 +389,12 @@ pub struct BodyFrame {
     pub depth: f64,
     /// Nodes there.
     pub nodes: Vec<[f64; 2]>,
+    /// Norm of the Green–Lagrange strain at every node; results of older versions have none.
+    #[serde(default)]
+    pub strain: Vec<f64>,
+    /// Von Mises stress at every node, stress; empty where the displacement does not tell it (tissue that relaxes).
+    #[serde(default)]
+    pub von_mises: Vec<f64>,
 }
 
 /// What a needle that slips met on its way, by the full model.

@@ -8,12 +8,15 @@ use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
 use model_offline::output;
 use model_offline::output::vtu::{self, Shown};
-use model_offline::output::{State, body, check_outputs};
+use model_offline::output::{State, body, check_outputs, has_stress};
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use std::path::{Path, PathBuf};
+
+/// How much deeper than the scene's a depth may be that was computed from it, as a part of it.
+const ROUNDING: f64 = 1e-6;
 
 /// Options of `solve`.
 #[derive(Debug, clap::Args)]
@@ -79,7 +82,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
             "add [material.relaxation] to the scene, or leave --dwell out",
         ));
     }
-    if scene.needle.shaft.is_some() && args.depth > scene.needle.depth {
+    if scene.needle.shaft.is_some() && args.depth > scene.needle.depth * (1.0 + ROUNDING) {
         return Err(CliError::usage(
             format!("--depth is {}, and the needle of this scene goes to {}", args.depth, scene.needle.depth),
             "raise depth in [needle]: nodes are placed along its shaft",
@@ -96,9 +99,11 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
 fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<(), CliError> {
     let (model, _) = discretise(scene)?;
     let position = args.paddle.map(|index| scene.paddle_position(index)).transpose().map_err(ModelError::from)?;
+    // Nodes are placed along a shaft: it ends where they end.
+    let depth = if scene.needle.shaft.is_some() { args.depth.min(scene.needle.depth) } else { args.depth };
     // In pieces of the scene's increment: the path matters near the limits of stability, and to a needle that slips.
-    let increments = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
-    let way = Way { depth: args.depth, paddle: displacement, increments, seconds: args.depth / scene.needle.speed };
+    let increments = (depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
+    let way = Way { depth, paddle: displacement, increments, seconds: args.depth / scene.needle.speed };
     let mut solved = match scene.needle.shaft {
         Some(_) => match insert(&model, position, way)? {
             Inserted::Pushing(body) => Solved::Pushing(body),
@@ -283,7 +288,7 @@ fn beside(vtu: &Path) -> [PathBuf; 2] {
 fn write_for_paraview(model: &TissueModel, state: State<'_>, file: &Path) -> Result<(), CliError> {
     let [parts, script] = beside(file);
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let shown = Shown { body: &name(file), parts: &name(&parts), stress: vtu::has_stress(model) };
+    let shown = Shown { body: &name(file), parts: &name(&parts), stress: has_stress(model) };
     output::write_whole(file, vtu::vtu(model, state.coefficients).as_bytes())?;
     output::write_whole(&parts, vtu::parts(model, state).as_bytes())?;
     Ok(output::write_whole(&script, vtu::script(model.scene(), shown).as_bytes())?)

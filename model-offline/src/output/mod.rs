@@ -11,7 +11,7 @@ pub mod terminal;
 pub mod vtu;
 
 pub use preflight::{OutputRefused, RefusalReason, check_outputs};
-pub use state::State;
+pub use state::{NodalFields, State, has_stress};
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use model_offline::model::TissueModel;
 use model_offline::output::State;
-use model_offline::output::vtu::{Shown, has_stress, parts, script, vtu};
+use model_offline::output::has_stress;
+use model_offline::output::vtu::{Shown, parts, script, vtu};
 
 use crate::record::files::Artifact;
 use crate::world::retrace::Retrace;

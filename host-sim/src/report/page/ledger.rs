@@ -37,7 +37,7 @@ pub(super) fn section(run: &RunResult) -> Markup {
             "Published = consumed + overwritten + discarded + in flight, for every stream. Ticks due = RUN + HOLD + SAFE + \
              skipped. Without an entry: " b { (count(unaccounted)) } "."
         }
-        div.scroll { table {
+        div.scroll.on-screen { table {
             caption { span { "Samples" } }
             thead { tr {
                 th { "controlled run" } th.left { "stream" } th { "published" } th { "consumed" } th { "overwritten" }

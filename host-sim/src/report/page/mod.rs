@@ -4,6 +4,7 @@
 //! from [`model_offline::output::chart`] and are styled by the page, so that they follow light, dark and print.
 
 mod attachments;
+mod conclusion;
 mod embed;
 mod insertion;
 mod ledger;
@@ -27,10 +28,10 @@ use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
 
 use self::embed::{charts, inline, panels};
 use self::insertion::{CaseCharts, case_charts, case_name, cause_panel, error_panels, needle_panels};
-use super::paper::{is_paper, paper_optima};
+use super::paper::is_paper;
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 
-const SCRIPT: &str = include_str!("page.js");
+const SCRIPT: &str = concat!(include_str!("common.js"), include_str!("page.js"), include_str!("charts.js"));
 /// Whatever a string in the result says, the page loads nothing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
@@ -45,69 +46,12 @@ const PARTS: [(&str, &str); 7] = [
     ("repeat", "To repeat it"),
 ];
 
-/// The result in one sentence.
-fn sentence(run: &RunResult) -> String {
-    let paddles = |placement: &PlacementResult| Some((placement.best_static, placement.best_dynamic?));
-    let paper: Vec<_> = run.placements.iter().map(|p| paper_optima(&run.scene, p.tissue)).collect();
-    let all_agree =
-        paper.iter().zip(&run.placements).all(|(paper, placement)| paper.is_some() && *paper == paddles(placement));
-    let placements: Vec<String> = run
-        .placements
-        .iter()
-        .zip(&paper)
-        .map(|(placement, paper)| {
-            let (static_paddle, dynamic) = (placement.best_static, placement.dynamic_name());
-            let found = match paper {
-                Some((static_paddle, dynamic)) if !all_agree => format!(" (the paper: {static_paddle} and {dynamic})"),
-                _ => String::new(),
-            };
-            format!(
-                "tissue {}: best static paddle {static_paddle}, best dynamic paddle {dynamic}{found}",
-                placement.tissue
-            )
-        })
-        .collect();
-    let agreement = if all_agree && !paper.is_empty() { ", all as in the paper" } else { "" };
-    let reduction = reduction(run, |case| case.improvement).map_or_else(String::new, |change| {
-        let none = reduction(run, |case| case.improvement_over_none)
-            .map_or_else(String::new, |change| format!(" and {change} than without a paddle"));
-        format!("; the dynamic paddle's largest error is {change} than the static one's{none}")
-    });
-    let text = format!("{}{agreement}{reduction}.", placements.join("; "));
-    text.replacen("tissue", "Tissue", 1)
-}
-
-/// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.
-fn reduction(run: &RunResult, factor: impl Fn(&CaseResult) -> Option<f64>) -> Option<String> {
-    let factors: Vec<f64> = run.cases.iter().filter_map(factor).filter(|factor| factor.is_finite()).collect();
-    (!factors.is_empty()).then(|| change(&factors))
-}
-
-/// "2.5 to 40 times smaller", "3 times larger" for errors that are so many times smaller.
-fn change(factors: &[f64]) -> String {
-    // Small factors with a digit behind the point: "1 times smaller" says nothing.
-    let times = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
-    let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = factors.iter().copied().fold(0.0, f64::max);
-    let range = |from: f64, to: f64| {
-        let (from, to) = (times(from), times(to));
-        if from == to { from } else { format!("{from} to {to}") }
-    };
-    if low >= 1.0 {
-        format!("{} times smaller", range(low, high))
-    } else if high < 1.0 {
-        format!("{} times larger", range(high.recip(), low.recip()))
-    } else {
-        format!("between {} times larger and {} times smaller", times(low.recip()), times(high))
-    }
-}
-
 fn head(run: &RunResult) -> Markup {
     let unit = &run.units[0];
     html! {
         p.quiet { "Stillpoint report" }
         h1 { "Scene " (run.scene) }
-        p.lead { (sentence(run)) }
+        @for sentence in conclusion::sentences(run) { p.lead { (sentence) } }
         div.scroll { table {
             caption { span {
                 (in_unit("Largest target displacement orthogonal to the needle", unit)) " over an insertion of "
@@ -170,6 +114,22 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
         h3 { "The body under each strategy" }
         p { "At the end of the insertion, or wherever the slider is. Colour is the size of the displacement from rest; \
              dashed is the outline at rest. Displacements are drawn as they are, not enlarged." }
+        (controls(run, surface))
+        @for (i, case) in run.cases.iter().enumerate() {
+            div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
+        }
+        figure.colours { (inline(&surface.colour_bar(run))) }
+        p.quiet {
+            @if frames > 1 { "Between " (frames) " solved states per strategy the slider interpolates. " }
+            span.needs-script { "Values appear under the pointer. " }
+            "A strategy that would repeat another case is left out."
+        }
+    }
+}
+
+/// What the bodies show: case, depth, field, and how much of the body.
+fn controls(run: &RunResult, surface: &scene::Surface) -> Markup {
+    html! {
         fieldset.needs-script.on-screen {
             legend { "Along the insertion" }
             @for (i, case) in run.cases.iter().enumerate() {
@@ -180,14 +140,12 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
                 input #depth-slider type="range" min="0" max="200" value="200";
                 output #depth-reading for="depth-slider" {}
             }
-        }
-        @for (i, case) in run.cases.iter().enumerate() {
-            div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
-        }
-        figure.colours { (inline(&surface.colour_bar(run))) }
-        p.quiet {
-            @if frames > 1 { "Between " (frames) " solved states per strategy the slider interpolates. " }
-            "A strategy that would repeat another case is left out."
+            div.slide {
+                label for="field" { "colour" }
+                select #field { @for field in surface.fields(run) { option value=(field.key) { (field.label) } } }
+                label for="part" { "of" }
+                select #part { option value="whole" { "the whole body" } option value="near" { "the target's surroundings" } }
+            }
         }
     }
 }
@@ -265,6 +223,7 @@ pub fn render_with(run: &RunResult, attachments: &Attachments) -> String {
                         section #attached { h2 { (parts.len() + 1) ". From other commands" } (attached) }
                     }
                 }
+                div #tip.on-screen hidden {}
                 script type="application/json" #insertion-data { (PreEscaped(slider::data(run, &surface, &cases))) }
                 script { (PreEscaped(SCRIPT)) }
             }
@@ -307,7 +266,7 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     };
     let (insertion, needle) = (panels(error_panels), panels(needle_panels));
     let columns = insertion.len().checked_div(run.cases.len()).unwrap_or(1);
-    let reduction = reduction(run, |case| case.improvement).map_or_else(
+    let reduction = conclusion::factors(run, |case| case.improvement).map_or_else(
         || "Error along the insertion".to_owned(),
         |change| format!("The dynamic paddle's largest error is {change} than the static one's"),
     );

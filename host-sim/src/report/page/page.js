@@ -1,6 +1,7 @@
-"use strict";
-// Moves the bodies and the marks in the charts along the insertion. Without it the page shows the end.
+// Moves the bodies and the marks in the charts along the insertion, and chooses what the colours show. Without it the page
+// shows the displacement at the end.
 (() => {
+  const { number, tip } = common;
   const data = JSON.parse(document.getElementById("insertion-data").textContent);
   const slider = document.getElementById("depth-slider");
   const reading = document.getElementById("depth-reading");
@@ -8,15 +9,6 @@
   if (!data || !slider) return;
   for (const part of document.querySelectorAll(".needs-script")) part.classList.remove("needs-script");
 
-  const superscript = (power) => [...String(power)].map((c) => c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]).join("");
-  const number = (value) => {
-    if (value === null || !Number.isFinite(value)) return "–";
-    if (value === 0) return "0";
-    const power = Math.floor(Math.log10(Math.abs(value)));
-    const text = power < -4 || power > 5 ? (value / 10 ** power).toFixed(2) + "\u00a0×\u00a010" + superscript(power)
-      : value.toFixed(Math.max(0, 2 - power));
-    return text.replace("-", "−");
-  };
   // Linear between the neighbours of `depth` in rows whose depth is `key(row)`; f is the part of the way.
   const between = (rows, key, depth) => {
     let i = rows.findIndex((row) => key(row) >= depth);
@@ -34,13 +26,59 @@
   };
   const bodies = data.bodies.map((body) => {
     const svg = document.getElementById(body.id);
-    return { ...body, polygons: [...svg.querySelectorAll(".field polygon")], edge: svg.querySelector(".edge"),
+    return { ...body, svg, polygons: [...svg.querySelectorAll(".field polygon")], edge: svg.querySelector(".edge"),
       aim: svg.querySelector(".aim"), tool: svg.querySelector(".tool"), shaft: svg.querySelector(".shaft"),
+      part: svg.closest("[data-case]"), values: [],
       numbers: document.getElementById(body.id + "-numbers"), final: body.series[body.series.length - 1] };
   });
   const charts = data.charts.map(([id, span]) => ({ cursor: document.querySelector("#" + id + " .cursor"), span }));
   const place = ([x, y]) => x.toFixed(1) + "," + y.toFixed(1);
   const shift = (group, [x, y]) => group && group.setAttribute("transform", `translate(${(x * data.scale).toFixed(2)},${(-y * data.scale).toFixed(2)})`);
+
+  // The state between two solved ones: nodes in px, and the fields that were solved for.
+  const stateAt = (frames, depth, end) => {
+    const last = frames[frames.length - 1];
+    const [a, b, f] = end ? [last, last, 0] : between(frames, (frame) => frame.depth, depth);
+    const value = (list, i) => list.length ? list[i] : 0;
+    const mixed = (key) => data.rest.map((_, i) => mix(value(a[key], i), value(b[key], i), f));
+    return { nodes: a.nodes.map((node, i) => [mix(node[0], b.nodes[i][0], f), mix(node[1], b.nodes[i][1], f)]), mixed };
+  };
+  const moved = (nodes) => nodes.map((node, i) => [(node[0] - data.rest[i][0]) / data.scale, (data.rest[i][1] - node[1]) / data.scale]);
+  const valuesOf = (state, key) => {
+    if (key === "size") return moved(state.nodes).map(([x, y]) => Math.hypot(x, y));
+    if (key === "orthogonal") return moved(state.nodes).map(([x, y]) => Math.abs(x * data.normal[0] + y * data.normal[1]));
+    return state.mixed(key);
+  };
+  const inTriangles = (values) => data.triangles.map((corners) => corners.reduce((sum, corner) => sum + values[corner], 0) / 3);
+  // Triangles that reach into the window at rest.
+  const near = data.triangles.map((corners) => corners.some((corner) => {
+    const [x, y] = data.rest[corner], [left, top, width, height] = data.window;
+    return x >= left && x <= left + width && y >= top && y <= top + height;
+  }));
+  const field = document.getElementById("field"), part = document.getElementById("part");
+  const bar = document.querySelector(".colours svg");
+  let largest = 1;
+  // One scale for all strategies of a case and all depths, so that colours can be compared along both.
+  const scale = (chosen, onlyNear) => {
+    let beyond = false;
+    largest = Number.MIN_VALUE;
+    for (const body of bodies) {
+      if (body.part.hidden) continue;
+      for (const frame of body.frames) {
+        const values = inTriangles(valuesOf(stateAt([frame], frame.depth, true), chosen.key));
+        const shown = values.filter((value, i) => Number.isFinite(value) && (!onlyNear || near[i])).sort((a, b) => a - b);
+        if (shown.length === 0) continue;
+        const within = Math.ceil(shown.length * (1 - (onlyNear ? 0 : chosen.beyond)));
+        largest = Math.max(largest, shown[within - 1]);
+        beyond = beyond || within < shown.length;
+      }
+    }
+    const [low, middle, high] = bar.querySelectorAll("text.tick");
+    const label = bar.querySelector("text.muted");
+    low.textContent = "0"; middle.textContent = number(largest / 2);
+    high.textContent = number(largest) + (beyond ? " and more" : "");
+    label.textContent = chosen.label;
+  };
 
   const show = (depth) => {
     const end = depth >= data.depth * (1 - 1e-9);
@@ -54,20 +92,17 @@
       shift(body.aim, [here[0] - there[0], here[1] - there[1]]);
       shift(body.tool, [now[3] - body.final[3], now[4] - body.final[4]]);
       shift(body.shaft, data.axis.map((part) => part * (depth - data.depth)));
-      const frames = body.frames;
-      if (frames.length < 2) continue;
-      const [a, b, f] = end ? [frames[frames.length - 1], frames[frames.length - 1], 0] : between(frames, (frame) => frame.depth, depth);
-      const nodes = a.nodes.map((node, i) => [mix(node[0], b.nodes[i][0], f), mix(node[1], b.nodes[i][1], f)]);
-      const size = nodes.map((node, i) => Math.hypot(node[0] - data.rest[i][0], node[1] - data.rest[i][1]));
+      if (body.frames.length < 2) continue;
+      const state = stateAt(body.frames, depth, end);
+      body.values = inTriangles(valuesOf(state, field.value));
       data.triangles.forEach((corners, i) => {
-        const mean = (size[corners[0]] + size[corners[1]] + size[corners[2]]) / 3;
-        const band = Math.min(data.bands - 1, Math.floor(mean / data.largest * data.bands));
+        const band = Math.min(data.bands - 1, Math.floor(body.values[i] / largest * data.bands));
         const polygon = body.polygons[i];
         if (!polygon) return;
-        polygon.setAttribute("points", corners.map((corner) => place(nodes[corner])).join(" "));
+        polygon.setAttribute("points", corners.map((corner) => place(state.nodes[corner])).join(" "));
         polygon.setAttribute("class", "f" + band);
       });
-      if (body.edge) body.edge.setAttribute("points", data.boundary.map((i) => place(nodes[i])).join(" "));
+      if (body.edge) body.edge.setAttribute("points", data.boundary.map((i) => place(state.nodes[i])).join(" "));
     }
     for (const { cursor, span: [left, right, low, high] } of charts) {
       const x = mix(left, right, (depth - low) / (high - low));
@@ -76,12 +111,36 @@
       cursor.style.visibility = "visible";
     }
   };
-  const choose = (chosen) => { for (const part of cases) part.hidden = part.dataset.case !== chosen; };
+  const move = () => show(data.depth * slider.value / slider.max);
+  const redraw = () => {
+    const chosen = data.fields.find((one) => one.key === field.value) || data.fields[0];
+    const zoomed = part.value === "near";
+    for (const body of bodies) {
+      body.svg.setAttribute("viewBox", (zoomed ? data.window : [0, 0, ...data.size]).map((px) => px.toFixed(1)).join(" "));
+      body.svg.classList.toggle("zoomed", zoomed);
+    }
+    scale(chosen, zoomed);
+    move();
+  };
+  const choose = (chosen) => { for (const one of cases) one.hidden = one.dataset.case !== chosen; };
   for (const radio of document.querySelectorAll("input[name=case]")) {
-    radio.addEventListener("change", () => choose(radio.value));
+    radio.addEventListener("change", () => { choose(radio.value); redraw(); });
     if (radio.checked) choose(radio.value);
   }
-  const move = () => show(data.depth * slider.value / slider.max);
+  for (const select of [field, part]) select.addEventListener("change", redraw);
   slider.addEventListener("input", move);
-  move();
+  redraw();
+
+  for (const body of bodies) {
+    const chosen = () => data.fields.find((one) => one.key === field.value) || data.fields[0];
+    body.polygons.forEach((polygon, i) => polygon.addEventListener("pointermove", (event) =>
+      tip.show(event, [`${chosen().label}: ${number(body.values[i])}`])));
+    body.svg.addEventListener("pointerleave", tip.hide);
+  }
+  // On paper every case is there, as the page was before its script: whole, at the end.
+  addEventListener("beforeprint", () => {
+    for (const one of cases) one.hidden = false;
+    [slider.value, field.value, part.value] = [slider.max, "size", "whole"];
+    redraw();
+  });
 })();

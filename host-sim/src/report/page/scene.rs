@@ -3,13 +3,15 @@
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
+use serde::Serialize;
+
 use model_offline::output::chart::number::{in_unit, number};
 use model_offline::output::chart::style::band;
 use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
 
 use super::embed::inline;
 use super::view::{PlaneView, along, inside, middle};
-use crate::bench::result::{CaseResult, Geometry, RunResult, StrategyResult};
+use crate::bench::result::{BodyFrame, CaseResult, Geometry, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
 
 /// Width of the scene and of a body, px.
@@ -103,6 +105,20 @@ pub(super) fn displaced(view: &PlaneView, geometry: &Geometry, nodes: &[[f64; 2]
         .collect()
 }
 
+/// What the colour of a body can show.
+#[derive(Clone, Debug, Serialize)]
+pub(super) struct Field {
+    /// Its name in the page's script.
+    pub(super) key: &'static str,
+    /// What a reader sees, with its unit.
+    pub(super) label: String,
+    /// Part of the triangles whose values are beyond the scale: fields that are without bound at the rim of a contact.
+    pub(super) beyond: f64,
+}
+
+/// Half a side of the window around the target, as a part of the scene's size.
+const WINDOW: f64 = 0.18;
+
 /// What all bodies of a page share.
 #[derive(Debug)]
 pub(super) struct Surface {
@@ -169,6 +185,34 @@ impl Surface {
         });
         drawing.target(view.at(at));
         drawing
+    }
+
+    /// What the colour can show: what the results have.
+    pub(super) fn fields(&self, run: &RunResult) -> Vec<Field> {
+        let unit = &run.units[0];
+        let has = |of: fn(&BodyFrame) -> &Vec<f64>| {
+            run.results().flat_map(|result| &result.frames).any(|frame| !of(frame).is_empty())
+        };
+        let field = |key, label: String, beyond| Field { key, label, beyond };
+        let strain = has(|frame| &frame.strain);
+        let stress = has(|frame| &frame.von_mises);
+        [
+            Some(field("size", in_unit("size of the displacement", unit), 0.0)),
+            Some(field("orthogonal", in_unit("displacement orthogonal to the needle, its size", unit), 0.0)),
+            strain.then(|| field("strain", "Green–Lagrange strain ‖E‖".to_owned(), 0.02)),
+            stress.then(|| field("von_mises", in_unit("von Mises stress", &run.units[1]), 0.02)),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// The window around the target: corner and size, px.
+    pub(super) fn window(&self, geometry: &Geometry) -> [f64; 4] {
+        let [x, y] = self.view.at(geometry.target);
+        let half = self.view.length(WINDOW * self.view.extent);
+        let [width, height] = self.view.size();
+        [x - half, y - half * height / width, 2.0 * half, 2.0 * half * height / width]
     }
 
     /// The colours and what they mean.

@@ -51,7 +51,7 @@ fn rows(run: &RunResult) -> Vec<(&'static str, String, String)> {
 
 fn tables(run: &RunResult) -> Markup {
     html! {
-        div.scroll { table {
+        div.scroll.on-screen { table {
             caption { span { "Controller tables" } }
             thead { tr {
                 th { "case" } th { "paddle" } th { "knots" } th { "bytes" } th { "gain per sample" }
@@ -107,7 +107,7 @@ pub(super) fn section(run: &RunResult) -> Markup {
             } } }
         } }
         (tables(run))
-        div.scroll { table {
+        div.scroll.on-screen { table {
             caption { span { "Files beside this page" } }
             thead { tr { th { "case" } th.left { "file" } th.left { "SHA-256" } } }
             tbody { @for case in &run.cases { (case_files(case)) } }

@@ -4,7 +4,7 @@ use model_offline::output::chart::style::BANDS;
 use serde::Serialize;
 
 use super::insertion::CaseCharts;
-use super::scene::{Surface, body_id};
+use super::scene::{Field, Surface, body_id};
 use crate::bench::result::{RunResult, StrategyResult};
 
 /// Points of a time series that the slider can show.
@@ -14,7 +14,10 @@ const POINTS: usize = 200;
 struct Data<'a> {
     depth: f64,
     bands: usize,
-    largest: f64,
+    fields: Vec<Field>,
+    /// The window around the target: corner and size, px.
+    window: [f64; 4],
+    size: [f64; 2],
     triangles: &'a [[usize; 3]],
     boundary: &'a [usize],
     rest: Vec<[f64; 2]>,
@@ -22,14 +25,14 @@ struct Data<'a> {
     axis: [f64; 2],
     normal: [f64; 2],
     scale: f64,
-    bodies: Vec<DrawnBody>,
+    bodies: Vec<DrawnBody<'a>>,
     charts: Vec<(String, [f64; 4])>,
 }
 
 #[derive(Serialize)]
-struct DrawnBody {
+struct DrawnBody<'a> {
     id: String,
-    frames: Vec<DrawnFrame>,
+    frames: Vec<DrawnFrame<'a>>,
     /// Depth, orthogonal error, axial displacement, paddle x, paddle y.
     series: Vec<[f64; 5]>,
     /// Displacement of the paddle in the drawing.
@@ -37,13 +40,16 @@ struct DrawnBody {
 }
 
 #[derive(Serialize)]
-struct DrawnFrame {
+struct DrawnFrame<'a> {
     depth: f64,
     nodes: Vec<[f64; 2]>,
+    strain: &'a [f64],
+    von_mises: &'a [f64],
 }
 
+/// A hundredth of a pixel: displacements that are small beside the body are coloured, too.
 fn rounded(point: [f64; 2]) -> [f64; 2] {
-    point.map(|value| (value * 10.0).round() / 10.0)
+    point.map(|value| (value * 100.0).round() / 100.0)
 }
 
 /// Five significant digits are more than anybody reads.
@@ -51,13 +57,15 @@ fn short(value: f64) -> f64 {
     format!("{value:.4e}").parse().unwrap_or(value)
 }
 
-fn body(run: &RunResult, surface: &Surface, id: String, strategy: &StrategyResult) -> DrawnBody {
-    let frame = |depth: f64, nodes: &[[f64; 2]]| DrawnFrame {
-        depth,
-        nodes: surface.view.path(nodes).into_iter().map(rounded).collect(),
-    };
-    let rest = frame(0.0, &run.geometry.nodes);
-    let frames = strategy.frames.iter().map(|one| frame(one.depth, &one.nodes));
+fn body<'a>(run: &RunResult, surface: &Surface, id: String, strategy: &'a StrategyResult) -> DrawnBody<'a> {
+    let path = |nodes: &[[f64; 2]]| surface.view.path(nodes).into_iter().map(rounded).collect();
+    let rest = DrawnFrame { depth: 0.0, nodes: path(&run.geometry.nodes), strain: &[], von_mises: &[] };
+    let frames = strategy.frames.iter().map(|frame| DrawnFrame {
+        depth: frame.depth,
+        nodes: path(&frame.nodes),
+        strain: &frame.strain,
+        von_mises: &frame.von_mises,
+    });
     let stride = strategy.series.len().div_ceil(POINTS).max(1);
     let last = strategy.series.len().saturating_sub(1);
     let points = strategy.series.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
@@ -84,7 +92,9 @@ pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) ->
     let data = Data {
         depth: run.settings.depth,
         bands: BANDS,
-        largest: surface.largest,
+        fields: surface.fields(run),
+        window: surface.window(geometry).map(|px| if px.is_finite() { px } else { 0.0 }),
+        size: surface.view.size(),
         triangles: &surface.triangles,
         boundary: &surface.boundary,
         rest: surface.view.path(&geometry.nodes).into_iter().map(rounded).collect(),

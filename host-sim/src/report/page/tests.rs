@@ -59,11 +59,16 @@ fn strategy(mode: RunMode, paddle: Option<u32>, error: f64) -> StrategyResult {
         needle_csv: Vec::new(),
         series: series.to_vec(),
         deformed_nodes: nodes.clone(),
-        frames: vec![BodyFrame { depth: 0.05, nodes: rest() }, BodyFrame { depth: 0.1, nodes }],
+        frames: vec![frame(0.05, rest()), frame(0.1, nodes)],
         needle: controlled.then(needle),
         plant_step_us: 1.0,
         plant: crate::world::tissue::PlantAccount::default(),
     }
+}
+
+fn frame(depth: f64, nodes: Vec<[f64; 2]>) -> BodyFrame {
+    let each = |value: f64| vec![value; nodes.len()];
+    BodyFrame { depth, strain: each(2.0 * depth), von_mises: each(600.0 * depth), nodes }
 }
 
 fn causes() -> CausesResult {
@@ -291,6 +296,93 @@ fn a_scene_without_a_dynamic_paddle_says_so_and_agrees_with_nothing() {
     }
 }
 
+/// What the bodies can be coloured by: what the result has, and no more.
+#[test]
+fn fields_that_a_result_does_not_have_are_not_offered() {
+    let offered = |run: &RunResult| {
+        let page = render(run);
+        let from = page.find("<select id=\"field\">").unwrap();
+        let list = &page[from..from + page[from..].find("</select>").unwrap()];
+        list.split("value=\"").skip(1).map(|rest| rest[..rest.find('"').unwrap()].to_owned()).collect::<Vec<_>>()
+    };
+    let mut run = run("paper");
+    assert_eq!(offered(&run), ["size", "orthogonal", "strain", "von_mises"]);
+    let each = |run: &mut RunResult, act: fn(&mut BodyFrame)| {
+        for case in &mut run.cases {
+            let all = &mut case.strategies;
+            let all = [&mut all.none, &mut all.static_paddle, &mut all.dynamic, &mut all.dynamic_free_run];
+            all.into_iter().flatten().flat_map(|strategy| &mut strategy.frames).for_each(act);
+        }
+    };
+    each(&mut run, |frame| frame.von_mises.clear());
+    assert_eq!(offered(&run), ["size", "orthogonal", "strain"]);
+    each(&mut run, |frame| frame.strain.clear());
+    assert_eq!(offered(&run), ["size", "orthogonal"]);
+}
+
+/// What the page tells under the pointer can be told: every curve has a name, and every chart what its axes stand for.
+#[test]
+fn every_curve_can_be_read() {
+    let page = render(&run("paper"));
+    let mut curves = 0;
+    for drawing in drawings(&page) {
+        let text = format!("<svg{drawing}</svg>");
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let with = |name: &'static str| document.descendants().filter(move |node| node.has_attribute(name));
+        for frame in document.descendants().filter(|node| node.attribute("class") == Some("frame")) {
+            for axis in ["data-x", "data-y"] {
+                let words: Vec<&str> = frame.attribute(axis).unwrap().split(' ').collect();
+                let [low, high] = [words[0], words[1]].map(|word| word.parse::<f64>().unwrap());
+                assert!(low < high && ["linear", "log"].contains(&words[2]), "{words:?}");
+            }
+            assert!(frame.attribute("data-x-name").is_some());
+        }
+        assert!(with("data-name").count() == 0 || with("data-x").count() == 1, "{drawing}");
+        curves += with("data-name").count();
+    }
+    // Two cases of three strategies, two enlarged, two components of the paddle, three forces, one slip.
+    assert!(curves >= 2 * (3 + 2 + 2 + 3 + 1), "{curves}");
+}
+
+/// What would make a run worthless stands in its first lines.
+#[test]
+fn the_conclusion_says_what_spoils_it() {
+    let said = |run: &RunResult| conclusion::sentences(run).join(" ");
+    let mut good = run("mine");
+    for case in &mut good.cases {
+        for strategy in [&mut case.strategies.dynamic, &mut case.strategies.dynamic_free_run].into_iter().flatten() {
+            strategy.run_share = Some(1.0);
+        }
+    }
+    let text = said(&good);
+    assert_eq!(conclusion::sentences(&good).len(), 3, "{text}");
+    assert!(
+        text.contains("200 times smaller than without a paddle and 40 times smaller than the best static"),
+        "{text}"
+    );
+    assert!(text.contains("in RUN all the time") && text.contains("none of 12 deadlines was missed"), "{text}");
+    assert!(text.contains("no tick or sample is unaccounted for"), "{text}");
+
+    let free_run = |run: &mut RunResult, act: fn(&mut StrategyResult)| {
+        act(run.cases[1].strategies.dynamic_free_run.as_mut().unwrap());
+    };
+    let mut run = good.clone();
+    free_run(&mut run, |strategy| {
+        (strategy.run_share, strategy.outside_run_for) = (Some(0.834), Faults::NEEDLE_STALE);
+    });
+    assert!(said(&run).contains("in RUN for only 83 % of an insertion (free-run, NEEDLE_STALE)"), "{}", said(&run));
+    let mut run = good.clone();
+    free_run(&mut run, |strategy| strategy.plant_timing.as_mut().unwrap().deadline_misses = 2);
+    assert!(said(&run).contains("2 of 12 deadlines were MISSED"), "{}", said(&run));
+    let mut run = good.clone();
+    free_run(&mut run, |strategy| strategy.ledger.as_mut().unwrap().unaccounted = 7);
+    assert!(said(&run).contains("7 ticks or samples are UNACCOUNTED"), "{}", said(&run));
+    for case in &mut run.cases {
+        (case.improvement, case.improvement_over_none) = (Some(0.5), Some(0.2));
+    }
+    assert!(said(&run).contains("5.0 times larger than without a paddle"), "{}", said(&run));
+}
+
 #[test]
 fn strings_of_the_result_are_text() {
     let page = render(&run(EVIL));
@@ -379,9 +471,9 @@ fn pictures_are_files_of_their_own() {
 
 #[test]
 fn a_paddle_that_makes_it_worse_is_said_to() {
-    assert_eq!(change(&[277.3]), "277 times smaller");
-    assert_eq!(change(&[2.5, 40.2]), "2.5 to 40 times smaller");
-    assert_eq!(change(&[0.02]), "50 times larger");
-    assert_eq!(change(&[0.5, 0.02]), "2.0 to 50 times larger");
-    assert_eq!(change(&[0.5, 4.0]), "between 2.0 times larger and 4.0 times smaller");
+    assert_eq!(conclusion::change(&[277.3]), "277 times smaller");
+    assert_eq!(conclusion::change(&[2.5, 40.2]), "2.5 to 40 times smaller");
+    assert_eq!(conclusion::change(&[0.02]), "50 times larger");
+    assert_eq!(conclusion::change(&[0.5, 0.02]), "2.0 to 50 times larger");
+    assert_eq!(conclusion::change(&[0.5, 4.0]), "between 2.0 times larger and 4.0 times smaller");
 }

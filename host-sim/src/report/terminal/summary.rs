@@ -155,13 +155,15 @@ fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::
         let Some(causes) = &case.causes else { continue };
         let left = causes.without.iter().map(|w| format!("{:.digits$} without the {}", w.left.peak, w.cause.title()));
         let left: Vec<String> = left.collect();
+        let left = match left.is_empty() {
+            true => "nothing that can be taken away".to_owned(),
+            false => format!("is left: {}; {:.digits$} without any of it", left.join(", "), causes.without_all.peak),
+        };
         writeln!(
             text,
-            "  {}, of the dynamic error is left: {}; {:.digits$} without any of it; no controller could leave less on average than {:.digits$}",
-            case.tissue,
-            left.join(", "),
-            causes.without_all.peak,
-            causes.bound.sensor.peak.max(causes.bound.paddle)
+            "  {}, of the dynamic error {left}; with this sensor no controller could leave less on average than {:.digits$}, \
+             with the paddle's rate none less than {:.digits$}",
+            case.tissue, causes.bound.sensor.peak, causes.bound.paddle
         )?;
     }
     Ok(())
@@ -229,7 +231,11 @@ fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fm
         (None, Some(_), Some(error), _) => {
             write!(text, ", at most {error:.1e} from the full model on the same way")?;
             if let Some(apart_s) = plant.puncture_apart_s {
-                write!(text, " (whose skin gives way up to {:.0} ms apart)", 1e3 * apart_s)?;
+                write!(text, " (whose skin gives way up to {:.0} ms apart", 1e3 * apart_s)?;
+                match plant.puncture_apart_error {
+                    Some(apart) => write!(text, ", the targets {apart:.1e} meanwhile)")?,
+                    None => write!(text, ")")?,
+                }
             }
             Some(error)
         }
@@ -318,8 +324,8 @@ mod tests {
         );
         let small = PlantAccount { extrapolation_error: Some(0.04), ..path.clone() };
         assert_eq!(said(small.clone()), ", at most 4.0e-2 from the full model on the same way");
-        let apart = PlantAccount { puncture_apart_s: Some(0.025), ..small.clone() };
-        assert!(said(apart).ends_with("on the same way (whose skin gives way up to 25 ms apart)"));
+        let apart = PlantAccount { puncture_apart_s: Some(0.025), puncture_apart_error: Some(0.3), ..small.clone() };
+        assert!(said(apart).ends_with("(whose skin gives way up to 25 ms apart, the targets 3.0e-1 meanwhile)"));
         let unknown = PlantAccount { not_verified: Some("no way".to_owned()), extrapolation_error: None, ..path };
         let words = said(unknown);
         assert!(words.contains("NOT VERIFIED") && words.contains("no way") && words.contains("60 %"), "{words}");

@@ -113,6 +113,16 @@ pub(super) struct Settled {
 }
 
 impl Settled {
+    /// Ends and scale in words that a script can read.
+    pub(super) fn span(&self) -> String {
+        let [low, high] = self.range;
+        let scale = match self.scale {
+            Scale::Linear => "linear",
+            Scale::Log => "log",
+        };
+        format!("{low:e} {high:e} {scale}")
+    }
+
     /// Place between the ends, 0 to 1; not finite where there is none.
     pub(super) fn fraction(&self, value: f64) -> f64 {
         let [low, high] = self.range;

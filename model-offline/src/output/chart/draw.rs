@@ -1,5 +1,6 @@
 //! Panels as shapes: heading, axes, marks, legend, from top to bottom.
 
+use super::axis::Axis;
 use super::drawing::{Anchor, Drawing, MARKER, TEXT, TITLE, text_width, wrap};
 use super::legend::{Key, Legend};
 use super::notes::{self, Box2, Name};
@@ -145,6 +146,7 @@ pub(super) fn draw(panel: &Panel, layout: &Layout, head: f64, legend: &Legend) -
         drawing.text("muted", [0.0, first + LINE * i as f64], Anchor::Start, line);
     }
     axes(&mut drawing, &frame);
+    frame_for_reading(&mut drawing, panel, &frame);
     let first = frame.bottom() + 6.0 + layout.ticks + 12.0;
     for (i, line) in layout.abscissa.iter().enumerate() {
         let middle = frame.corner[0] + 0.5 * frame.size[0];
@@ -153,6 +155,22 @@ pub(super) fn draw(panel: &Panel, layout: &Layout, head: f64, legend: &Legend) -
     marks(&mut drawing, panel, &frame);
     legend.draw(&mut drawing, [LEFT, head + PLOT + below], layout.width - LEFT);
     drawing
+}
+
+/// The rectangle between the axes with what it stands for, for a page that tells values under the pointer.
+fn frame_for_reading(drawing: &mut Drawing, panel: &Panel, frame: &PlotArea) {
+    let unit = |axis: &Axis| if axis.unit == "1" { String::new() } else { axis.unit.clone() };
+    drawing.data_rectangle(
+        "frame",
+        [frame.corner, frame.size],
+        &[
+            ("x", &frame.x.span()),
+            ("y", &frame.y.span()),
+            ("x-name", &panel.x.quantity),
+            ("x-unit", &unit(&panel.x)),
+            ("y-unit", &unit(&panel.y)),
+        ],
+    );
 }
 
 /// The axes of a rectangle: lines, ticks with their labels, and lines across it.
@@ -247,7 +265,7 @@ fn marks(drawing: &mut Drawing, panel: &Panel, frame: &PlotArea) {
 fn draw_series(drawing: &mut Drawing, series: &Series, frame: &PlotArea, taken: &mut Vec<Box2>) {
     if let Some(dash) = series.line {
         for piece in frame.pieces(&series.points) {
-            drawing.polyline(&line_class(series.colour, dash), &piece);
+            drawing.named_polyline(&line_class(series.colour, dash), &series.label, &piece);
             taken.extend(notes::along(&piece));
         }
     }

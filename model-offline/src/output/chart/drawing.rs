@@ -149,6 +149,24 @@ impl Drawing {
         }
     }
 
+    /// The same with a name that a page can tell; none where it is empty.
+    pub(super) fn named_polyline(&mut self, class: &str, name: &str, points: &[Px]) {
+        let name = if name.is_empty() { String::new() } else { format!(" data-name=\"{}\"", escape(name)) };
+        let text = joined(points);
+        self.shape(points, format_args!(r#"<polyline class="{class}"{name} points="{text}"/>"#));
+    }
+
+    /// A rectangle, corner and size, with data for a page's script.
+    pub(super) fn data_rectangle(&mut self, class: &str, [corner, size]: [Px; 2], data: &[(&str, &str)]) {
+        let [x, y, width, height] = [corner[0], corner[1], size[0], size[1]].map(px);
+        let data = data.iter().filter(|(_, value)| !value.is_empty());
+        let data: String = data.map(|(name, value)| format!(" data-{name}=\"{}\"", escape(value))).collect();
+        self.shape(
+            &[corner, size],
+            format_args!(r#"<rect class="{class}" x="{x}" y="{y}" width="{width}" height="{height}"{data}/>"#),
+        );
+    }
+
     /// A closed shape; left out when any corner is not finite.
     pub fn polygon(&mut self, class: &str, points: &[Px]) {
         let text = joined(points);

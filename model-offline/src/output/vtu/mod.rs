@@ -11,9 +11,9 @@ pub use script::{Shown, script};
 use self::grid::{Array, Grid, Shape};
 use crate::discretization::Integration;
 use crate::geometry::Point2;
-use crate::material::{Law, Material as _, Matrix, determinant, green_lagrange};
+use crate::material::{Law, Matrix, determinant, green_lagrange};
 use crate::model::TissueModel;
-use crate::output::state::cell_gradients;
+use crate::output::state::{cauchy_stress, cell_gradients, has_stress, in_space, von_mises};
 
 /// The body as a VTU file, cells connected: nodal cells as polygons, elements as triangles, quadratic ones as such.
 ///
@@ -36,11 +36,6 @@ pub fn vtu(model: &TissueModel, coefficients: &[f64]) -> String {
     });
     let displacement = Array::new(in_unit("displacement", &scene.length_unit), 3, moved.collect());
     grid.file(&[displacement], &of_cells(model, &cell_gradients(model, coefficients)))
-}
-
-/// Whether a displacement tells the stress: in tissue that relaxes it does not, and some laws know no stress out of the plane.
-pub fn has_stress(model: &TissueModel) -> bool {
-    model.tissue().laws().iter().all(|law| law.relaxation().is_none() && law.holds_in_space())
 }
 
 fn push(grid: &mut Grid, integration: Integration, corners: &[Point2]) {
@@ -73,10 +68,7 @@ fn of_cells(model: &TissueModel, gradients: &[Matrix<2>]) -> Vec<Array> {
         Array::new("det_f".to_owned(), 1, det_f.collect()),
     ];
     if has_stress(model) {
-        let stress = |(cell, h): (usize, &Matrix<2>)| {
-            let parts = model.tissue().parts(cell as u32);
-            parts.fold(Matrix::<3>::zeros(), |sum, (law, factor)| sum + law.cauchy_stress(&in_space(h)) * factor)
-        };
+        let stress = |(cell, h)| cauchy_stress(model, cell, h);
         let stresses: Vec<Matrix<3>> = gradients.iter().enumerate().map(stress).collect();
         let named = |name| in_unit(name, &scene.stress_unit);
         arrays.extend([
@@ -88,11 +80,6 @@ fn of_cells(model: &TissueModel, gradients: &[Matrix<2>]) -> Vec<Array> {
     arrays
 }
 
-/// A planar displacement gradient in space: plane strain.
-fn in_space(h: &Matrix<2>) -> Matrix<3> {
-    h.fixed_resize::<3, 3>(0.0)
-}
-
 fn rows(tensors: &[Matrix<3>]) -> Vec<f64> {
     tensors.iter().flat_map(|t| t.transpose().as_slice().to_vec()).collect()
 }
@@ -102,11 +89,6 @@ fn principal(tensor: &Matrix<3>) -> [f64; 3] {
     let mut values: [f64; 3] = tensor.symmetric_eigenvalues().into();
     values.sort_by(|a, b| b.total_cmp(a));
     values
-}
-
-/// √(3/2) times the norm of the deviator.
-fn von_mises(stress: &Matrix<3>) -> f64 {
-    (1.5 * (stress - Matrix::<3>::identity() * (stress.trace() / 3.0)).norm_squared()).sqrt()
 }
 
 /// A name with its unit.
