@@ -17,11 +17,11 @@ fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works()
     let folder = tempfile::tempdir().unwrap();
     let report = folder.path().join("report");
     let arguments = ["run", "--quiet", "--insertion-time", "0.5", "--out"];
-    assert!(Command::new(PROGRAM).args(arguments).arg(&report).status().unwrap().success());
+    succeeds(Command::new(PROGRAM).args(arguments).arg(&report));
     std::fs::write(report.join("pareto.svg"), "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"9\" height=\"9\"/>")
         .unwrap();
     std::fs::write(report.join("faults.csv"), "id,name\n1,step over budget\n").unwrap();
-    assert!(Command::new(PROGRAM).arg("report").arg(&report).status().unwrap().success());
+    succeeds(Command::new(PROGRAM).arg("report").arg(&report));
     browser.look(1280, 1000, "light");
     browser.open(&format!("file://{}/report.html", report.display()));
 
@@ -50,6 +50,7 @@ fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works()
     for i in 0..3 {
         assert_ne!(before[i], after[i], "{i}: {before} {after}");
     }
+    maps_can_be_chosen_and_read(&browser);
     // Nothing is wider than the window, on a phone either; nothing is fetched.
     for (width, scheme) in [(1280, "light"), (1280, "dark"), (390, "light")] {
         browser.look(width, 1000, scheme);
@@ -66,6 +67,68 @@ fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works()
         json!(0)
     );
     assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// A machine that others use may be too slow for free-run for a while, which is rightly refused.
+#[track_caller]
+fn succeeds(command: &mut Command) {
+    for attempt in 1..=5 {
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        let is_busy = said.contains("cannot keep a period") && attempt < 5;
+        assert!(output.status.success() || is_busy, "{}: {said}", output.status);
+        if output.status.success() {
+            return;
+        }
+    }
+}
+
+/// The field, the part of the body that is shown, what is under the pointer, and pictures to keep.
+fn maps_can_be_chosen_and_read(browser: &Browser) {
+    let choose = |id: &str, value: &str| {
+        browser.run(&format!(
+            "const s = document.querySelector('#{id}'); s.value = '{value}'; s.dispatchEvent(new Event('change'))"
+        ))
+    };
+    let classes = "return [...document.querySelectorAll('#body0-dynamic .field polygon')].map((p) => p.getAttribute('class')).join()";
+    let words = "return [...document.querySelectorAll('.colours text')].map((t) => t.textContent).join('; ')";
+    let shown = |browser: &Browser| (browser.run(classes), browser.run(words));
+    let mut seen = vec![shown(browser)];
+    for field in ["orthogonal", "strain", "von_mises"] {
+        choose("field", field);
+        let now = shown(browser);
+        assert!(seen.iter().all(|before| before.0 != now.0 && before.1 != now.1), "{field}: {now:?}");
+        seen.push(now);
+    }
+    assert!(seen[2].1.as_str().unwrap().contains("Green–Lagrange strain"), "{:?}", seen[2].1);
+    let window = || browser.run("return document.querySelector('#body0-dynamic').getAttribute('viewBox')");
+    let whole = window();
+    choose("part", "near");
+    assert_ne!(window(), whole);
+    let tip = |element: &str, right: f64, down: f64| {
+        let script = format!(
+            "const e = {element}, r = e.getBoundingClientRect(); e.dispatchEvent(new PointerEvent('pointermove', \
+             {{ clientX: r.left + {right} * r.width, clientY: r.top + {down} * r.height, bubbles: true }})); \
+             const t = document.querySelector('#tip'); return t.hidden ? '' : t.textContent"
+        );
+        browser.run(&script).as_str().unwrap().to_owned()
+    };
+    let told = tip("document.querySelector('#body0-dynamic .field polygon')", 0.5, 0.5);
+    assert!(told.starts_with("von Mises stress: "), "{told}");
+    // At 3/4 of the way every strategy has an error, and the axis says where that is.
+    let told = tip("document.querySelector('#case0-error rect.frame')", 0.75, 0.5);
+    assert!(
+        told.starts_with("needle depth 0.075") && told.contains("no paddle: ") && told.contains("dynamic, paddle 3: "),
+        "{told}"
+    );
+    let kept = browser.run(
+        "const kept = []; HTMLAnchorElement.prototype.click = function () { kept.push([this.download, this.href.slice(0, 18)]); }; \
+         document.querySelector('#case0-error').parentNode.querySelector('.save button').click(); return kept[0]",
+    );
+    assert!(kept[0].as_str().unwrap().ends_with(".svg") && kept[1] == "data:image/svg+xml", "{kept}");
+    choose("part", "whole");
+    choose("field", "size");
+    assert_eq!(shown(browser).1, seen[0].1, "as it was");
 }
 
 /// Ends the simulation, whatever the test does.
@@ -108,20 +171,29 @@ fn the_live_view_shows_pauses_steps_and_obeys_its_knobs() {
     assert!(browser.run(painted).as_u64().unwrap() > 10_000, "the body is drawn");
 
     browser.run("document.querySelector('#pause').click()");
-    browser.wait_for("return window.stillpoint.paused === true || (document.querySelector('#step').click(), false)");
-    // Steps that were asked for while waiting may still be on their way, the longer the busier the machine is.
-    let settled = || loop {
-        let tick = || browser.run("return window.stillpoint.tick").as_u64().unwrap();
-        let before = tick();
-        std::thread::sleep(std::time::Duration::from_secs(1));
-        if tick() == before {
-            return before;
-        }
+    browser.wait_for("return window.stillpoint.paused === true");
+    let tick = || browser.run("return window.stillpoint.tick").as_u64().unwrap();
+    let stays_at = |expected: u64| {
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        assert_eq!(tick(), expected, "time is held");
     };
-    let before = settled();
+    // What it says of the controller, and the largest error of all ticks, not of those that this page has seen.
+    let before = tick();
+    stays_at(before);
+    assert!(
+        ["RUN", "HOLD"].contains(&browser.run("return document.querySelector('#mode').textContent").as_str().unwrap())
+    );
+    browser.open(&address);
+    browser.wait_for("return window.stillpoint.scenes === 1 && window.stillpoint.tick > 0");
+    assert_eq!(
+        browser.run("return window.stillpoint.tick"),
+        json!(before),
+        "the same moment for a page that comes late"
+    );
+    assert!(browser.run("return window.stillpoint.rows()").as_u64().unwrap() > 10, "with what it has missed");
     browser.run("document.querySelector('#step').click()");
     browser.wait_for(&format!("return window.stillpoint.tick > {before}"));
-    assert_eq!(settled(), before + 1, "paused again after one step");
+    stays_at(before + 1);
     browser.look(390, 844, "dark");
     browser.picture("live-phone-dark.png");
     browser.run("document.querySelector('#pace').value = '0'; document.querySelector('#pace').dispatchEvent(new Event('change')); document.querySelector('#pause').click()");
@@ -132,6 +204,10 @@ fn the_live_view_shows_pauses_steps_and_obeys_its_knobs() {
     browser.wait_for("return window.stillpoint.stiffness === 0.01");
     assert_eq!(browser.run("return window.stillpoint.errors.length"), json!(0));
     browser.run("document.querySelector('#finish').click()");
+    browser.wait_for("return window.stillpoint.finished === true");
+    assert!(
+        browser.run("return document.querySelector('#state').textContent").as_str().unwrap().starts_with("finished")
+    );
     assert!(simulation.0.wait().unwrap().success());
     let mut rest = String::new();
     std::io::Read::read_to_string(&mut said, &mut rest).unwrap();

@@ -26,6 +26,8 @@ pub(super) struct Events {
     insertion: u64,
     number: u64,
     idle: u32,
+    /// Whether the page knows that nothing new will come.
+    told: bool,
     _place: Slot,
 }
 
@@ -33,7 +35,17 @@ impl Events {
     pub(super) fn new(shared: Arc<Shared>, deadline: Arc<Deadline>, place: Slot) -> Self {
         let mut looks = interval(Duration::from_nanos(FRAME_NS / 2));
         looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        Self { shared, deadline, looks, waiting: VecDeque::new(), insertion: 0, number: 0, idle: 0, _place: place }
+        Self {
+            shared,
+            deadline,
+            looks,
+            waiting: VecDeque::new(),
+            insertion: 0,
+            number: 0,
+            idle: 0,
+            told: false,
+            _place: place,
+        }
     }
 
     /// The next event. It is asked for when there is room for it: a page that does not read is asked for nothing, and
@@ -60,10 +72,14 @@ impl Events {
                 ViewState { insertion: self.insertion, number: self.number, .. } = state;
                 self.idle = 0;
             }
+            None if self.shared.is_over() && !self.told => {
+                self.told = true;
+                self.waiting.push_back(event("idle", &serde_json::json!({ "finished": true })));
+            }
             None => {
                 self.idle += 1;
                 if self.idle.is_multiple_of(LOOKS_PER_WORD) {
-                    let finished = self.shared.is_finished();
+                    let finished = self.shared.is_over();
                     self.waiting.push_back(event("idle", &serde_json::json!({ "finished": finished })));
                 }
             }

@@ -4,6 +4,7 @@ use serde_json::{Value, json};
 
 use super::shared::{Shared, ViewState};
 use crate::report::page::mesh;
+use crate::runtime::names;
 
 /// One file: no network but the events of its own address.
 pub(super) const PAGE: &str = include_str!("page.html");
@@ -23,6 +24,7 @@ pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
     json!({
         "name": scene.name,
         "title": state.title,
+        "live": state.live,
         "mode": state.mode.map(|mode| mode.to_string()),
         "unit": scene.length_unit,
         "outline": outline,
@@ -37,6 +39,8 @@ pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
         "target": [scene.target.x, scene.target.y],
         "paddle": paddle.map(|paddle| path(&paddle.segment)),
         "knobs": shared.knobs(),
+        "history": state.history.rows,
+        "trail": state.history.trail,
     })
 }
 
@@ -53,12 +57,17 @@ pub(super) fn frame(state: &ViewState, shared: &Shared) -> Value {
         "time": state.time_s,
         "tick": state.tick,
         "depth": state.depth,
+        "answer": state.answer.map(|answer| json!({
+            "mode": names::mode::name(answer.mode),
+            "faults": answer.faults.to_string(),
+        })),
+        "largest": state.largest,
         "target": state.target,
         "paddle": state.paddle,
         "moved": nodes,
         "solve_us": state.solve_ns as f64 * 1e-3,
         "late_us": state.late_ns as f64 * 1e-3,
-        "paused": shared.is_paused(),
+        "paused": state.held,
         "pace": shared.pace(),
         "dropped": shared.dropped(),
     })

@@ -30,6 +30,9 @@ const MAX_HEADER_BYTES: usize = 16 * 1024;
 /// Time for the whole header.
 const HEADER_TIME: Duration = Duration::from_secs(2);
 
+/// Time for the last words to every page: a few looks at what is new.
+const LAST_WORDS: Duration = Duration::from_millis(150);
+
 /// A live view that is being served. It ends with the process.
 #[derive(Debug)]
 pub struct View {
@@ -68,6 +71,14 @@ impl View {
     /// Where the page is, with the token that opens it.
     pub fn address(&self) -> &str {
         &self.address
+    }
+}
+
+impl Drop for View {
+    /// Pages are told that this is the end, and not left to guess from a connection that breaks.
+    fn drop(&mut self) {
+        self.shared.end();
+        std::thread::sleep(LAST_WORDS);
     }
 }
 

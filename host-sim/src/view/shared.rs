@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use model_offline::model::TissueModel;
 use serde::{Deserialize, Serialize};
 
+use crate::runtime::plant::observer::Answer;
 use crate::runtime::time::mode::RunMode;
 
 /// Time between two pictures: 30 a second.
@@ -69,6 +70,10 @@ pub(super) struct ViewState {
     /// Counts insertions: a new one has new geometry.
     pub(super) insertion: u64,
     pub(super) title: String,
+    /// Whether time stands still at this tick.
+    pub(super) held: bool,
+    /// Whether it is one of the view's own, under its knobs, and no part of the comparison of strategies.
+    pub(super) live: bool,
     pub(super) mode: Option<RunMode>,
     pub(super) model: Option<Arc<TissueModel>>,
     pub(super) paddle_index: u32,
@@ -76,12 +81,56 @@ pub(super) struct ViewState {
     pub(super) time_s: f64,
     pub(super) tick: u64,
     pub(super) depth: f64,
+    pub(super) answer: Option<Answer>,
+    /// Largest orthogonal error of every tick since the needle moves, length: a page that comes late knows it, too.
+    pub(super) largest: f64,
+    /// What a page that comes late has missed.
+    pub(super) history: History,
     pub(super) target: [f64; 2],
     pub(super) paddle: [f64; 2],
     /// Longest solve since the state before, ns.
     pub(super) solve_ns: u64,
     /// Latest start of a tick after its release since the state before, ns; free-run only.
     pub(super) late_ns: u64,
+}
+
+/// States of the present insertion as [time in s, orthogonal error, longest solve in µs, lateness in µs], and the target's
+/// way: evenly thinned out where they become many.
+#[derive(Clone, Debug)]
+pub(super) struct History {
+    pub(super) rows: Vec<[f64; 4]>,
+    pub(super) trail: Vec<[f64; 2]>,
+    stride: u64,
+    seen: u64,
+}
+
+/// Rows of a history before it is thinned out to half of them.
+const HISTORY: usize = 1024;
+
+impl Default for History {
+    fn default() -> Self {
+        Self { rows: Vec::with_capacity(HISTORY), trail: Vec::with_capacity(HISTORY), stride: 1, seen: 0 }
+    }
+}
+
+impl History {
+    /// Adds a state. Allocates nothing.
+    pub(super) fn push(&mut self, row: [f64; 4], target: [f64; 2]) {
+        if self.seen.is_multiple_of(self.stride) {
+            if self.rows.len() == HISTORY {
+                self.stride *= 2;
+                let mut at = 0..;
+                self.rows.retain(|_| at.next().is_some_and(|i: u32| i.is_multiple_of(2)));
+                let mut at = 0..;
+                self.trail.retain(|_| at.next().is_some_and(|i: u32| i.is_multiple_of(2)));
+            }
+            if self.seen.is_multiple_of(self.stride) {
+                self.rows.push(row);
+                self.trail.push(target);
+            }
+        }
+        self.seen += 1;
+    }
 }
 
 /// Everything that the loop and the view's threads share.
@@ -95,6 +144,8 @@ pub(super) struct Shared {
     pace: AtomicU64,
     restart: AtomicBool,
     finish: AtomicBool,
+    /// The program ends: nothing new will come.
+    over: AtomicBool,
     /// Restarts are for the view's own insertions, not for the comparison of strategies.
     may_restart: AtomicBool,
     /// States that were dropped because a view thread held the last one.
@@ -116,6 +167,7 @@ impl Shared {
             pace: AtomicU64::new(1000),
             restart: AtomicBool::new(false),
             finish: AtomicBool::new(false),
+            over: AtomicBool::new(false),
             may_restart: AtomicBool::new(false),
             dropped: AtomicU64::new(0),
         }
@@ -131,7 +183,11 @@ impl Shared {
         self.restart.store(true, Ordering::Release);
     }
 
+    /// Steps that are still waiting are no longer wanted once time goes on.
     pub(super) fn set_paused(&self, paused: bool) {
+        if !paused {
+            self.steps.store(0, Ordering::Release);
+        }
         self.paused.store(paused, Ordering::Release);
     }
 
@@ -167,9 +223,24 @@ impl Shared {
         self.finish.load(Ordering::Acquire)
     }
 
+    /// Nothing new will come.
+    pub(super) fn end(&self) {
+        self.over.store(true, Ordering::Release);
+    }
+
+    /// Whether nothing new will come.
+    pub(super) fn is_over(&self) -> bool {
+        self.over.load(Ordering::Acquire)
+    }
+
     /// From here on the page may end insertions early.
     pub(super) fn allow_restarts(&self) {
         self.may_restart.store(true, Ordering::Release);
+    }
+
+    /// Whether insertions are the view's own.
+    pub(super) fn restarts_are_allowed(&self) -> bool {
+        self.may_restart.load(Ordering::Acquire)
     }
 
     /// Knobs only take effect at the start of an insertion: what they asked for is being done.
@@ -179,8 +250,7 @@ impl Shared {
 
     /// Whether the present insertion is to end early.
     pub(super) fn ends_early(&self) -> bool {
-        self.may_restart.load(Ordering::Acquire)
-            && (self.restart.load(Ordering::Acquire) || self.finish.load(Ordering::Acquire))
+        self.restarts_are_allowed() && (self.restart.load(Ordering::Acquire) || self.finish.load(Ordering::Acquire))
     }
 
     /// States that were dropped because somebody was reading.
@@ -226,6 +296,21 @@ mod tests {
         assert!(KNOBS.check().is_ok());
         assert!(Knobs { latency: -1.0, ..KNOBS }.check().unwrap_err().to_string().starts_with("latency"));
         assert!(Knobs { noise: f64::NAN, ..KNOBS }.check().is_err());
+    }
+
+    /// However long an insertion, its history is even, begins at its beginning, and takes no more room.
+    #[test]
+    fn a_long_history_is_thinned_out_evenly() {
+        let mut history = History::default();
+        let room = history.rows.capacity();
+        for i in 0..100_000_u32 {
+            history.push([f64::from(i), 0.0, 0.0, 0.0], [f64::from(i), 0.0]);
+            assert!(history.rows.len() == history.trail.len() && history.rows.capacity() == room);
+        }
+        let gaps: Vec<f64> = history.rows.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();
+        assert!(history.rows[0][0] == 0.0 && gaps.iter().all(|gap| *gap == gaps[0]), "{gaps:?}");
+        assert!(history.rows.len() > HISTORY / 2 - 1 && history.rows.last().unwrap()[0] > 99_000.0);
+        assert!(history.rows.iter().zip(&history.trail).all(|(row, target)| row[0] == target[0]));
     }
 
     #[test]

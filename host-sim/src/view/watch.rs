@@ -57,8 +57,13 @@ pub(super) struct Watch {
     due_ns: u64,
     solve_ns: u64,
     late_ns: u64,
+    /// Direction in which the target is to stay, and its largest displacement along that, length.
+    normal: [f64; 2],
+    largest: f64,
     /// When the next tick of free-run is due, ns.
     expected_ns: Option<u64>,
+    /// Whether time is held after the tick that was offered last.
+    held: bool,
 }
 
 impl Watch {
@@ -71,6 +76,7 @@ impl Watch {
                 insertion: state.insertion + 1,
                 number: state.number,
                 title,
+                live: shared.restarts_are_allowed(),
                 mode: Some(mode),
                 model: Some(Arc::new(model.clone())),
                 paddle_index: paddle,
@@ -79,12 +85,25 @@ impl Watch {
             };
         }
         let pacing = Pacing::new(period_ns);
-        Self { shared: Arc::clone(shared), mode, pacing, due_ns: 0, solve_ns: 0, late_ns: 0, expected_ns: None }
+        let normal = model.scene().needle.orthogonal().into();
+        Self {
+            shared: Arc::clone(shared),
+            mode,
+            pacing,
+            due_ns: 0,
+            solve_ns: 0,
+            late_ns: 0,
+            normal,
+            largest: 0.0,
+            expected_ns: None,
+            held: false,
+        }
     }
 }
 
 impl Observer for Watch {
-    /// Leaves a state if one is due and nobody reads the last one. Never waits.
+    /// Leaves a state if one is due and nobody reads the last one. Waits for nobody, unless time is held after this tick:
+    /// then the page is to show this one, and no earlier one.
     fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment) {
         let now = now_ns();
         self.solve_ns = self.solve_ns.max(now.saturating_sub(moment.began_ns));
@@ -95,21 +114,36 @@ impl Observer for Watch {
             self.late_ns = self.late_ns.max(moment.began_ns.saturating_sub(due_ns));
             self.expected_ns = Some(time_ns + self.pacing.period_ns);
         }
-        // A paused simulation shows every single step.
-        if now < self.due_ns && !self.shared.is_paused() {
+        let [x, y] = moment.truth.target;
+        let error = self.normal[0] * x + self.normal[1] * y;
+        if moment.is_counted {
+            self.largest = self.largest.max(error.abs());
+        }
+        self.held = self.mode == RunMode::Lockstep && self.shared.is_paused();
+        if now < self.due_ns && !self.held {
             return;
         }
-        let Some(mut state) = self.shared.try_state() else { return };
+        let free = if self.held { Some(self.shared.state()) } else { self.shared.try_state() };
+        let Some(mut state) = free else { return };
         self.due_ns = now + FRAME_NS;
         tissue.copy_coefficients(&mut state.coefficients);
         state.number += 1;
+        state.held = self.held;
         state.time_s = moment.time_s;
         state.tick = moment.truth.tick;
         state.depth = moment.truth.depth;
+        state.answer = moment.answer;
+        state.largest = self.largest;
         state.target = moment.truth.target;
         state.paddle = moment.truth.paddle;
         state.solve_ns = std::mem::take(&mut self.solve_ns);
         state.late_ns = std::mem::take(&mut self.late_ns);
+        let [solve_us, late_us] = [state.solve_ns, state.late_ns].map(|ns| ns as f64 * 1e-3);
+        // Before the needle starts there is no time of its own: a line from there would be a ramp that never was.
+        if moment.time_s < 0.0 {
+            return;
+        }
+        state.history.push([moment.time_s, error, solve_us, late_us], moment.truth.target);
     }
 
     /// Whether the page wants the insertion to end now.
@@ -117,9 +151,10 @@ impl Observer for Watch {
         self.shared.ends_early()
     }
 
-    /// Holds time while paused, and to keep pace with the clock on the wall.
+    /// Holds time while paused, and to keep pace with the clock on the wall. A pause that was asked for since the last offer
+    /// begins with the next tick: the tick that is held is the one that is shown.
     fn hold(&mut self) {
-        while self.shared.is_paused() && !self.shared.ends_early() && signals::check().is_ok() {
+        while self.held && self.shared.is_paused() && !self.shared.ends_early() && signals::check().is_ok() {
             let step = self.shared.take_step();
             self.pacing.restart();
             if step {
@@ -155,7 +190,7 @@ mod tests {
         };
         let mut watch = Watch::new(&shared, insertion);
         let truth = Truth { tick: 1, time_ns: 0, depth: 0.0, target: [0.0; 2], paddle: [0.0; 2] };
-        let moment = Moment { truth, time_s: 0.0, began_ns: 0 };
+        let moment = Moment { truth, time_s: 0.0, began_ns: 0, is_counted: true, answer: None };
         let reader = shared.state();
         watch.offer(&tissue, &moment);
         assert_eq!((reader.number, shared.dropped()), (0, 1));

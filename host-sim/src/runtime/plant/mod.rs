@@ -9,12 +9,12 @@ pub mod rehearsal;
 
 use std::time::{Duration, Instant};
 
-use firmware::Faults;
 use firmware::contract::PaddleCommand;
+use firmware::{Faults, Mode};
 use iceoryx2::service::Service;
 
 use self::ages::InputAges;
-use self::observer::{Moment, Observer};
+use self::observer::{Answer, Moment, Observer};
 use super::error::RuntimeError;
 use super::time::clock::now_ns;
 use crate::exchange::{LinkError, PlantPorts};
@@ -33,6 +33,7 @@ pub struct PlantLoop<'m> {
     first_ns: Option<u64>,
     solving: Duration,
     observer: Option<Box<dyn Observer>>,
+    answer: Option<Answer>,
     ages: InputAges,
 }
 
@@ -42,7 +43,7 @@ impl<'m> PlantLoop<'m> {
         let truths = Vec::with_capacity(simulation.ticks() as usize);
         let duration_ns = simulation.duration_ns();
         let ages = InputAges::default();
-        Self { world, duration_ns, truths, first_ns: None, solving: Duration::ZERO, observer: None, ages }
+        Self { world, duration_ns, truths, first_ns: None, solving: Duration::ZERO, observer: None, answer: None, ages }
     }
 
     /// Somebody looks on from now.
@@ -66,7 +67,9 @@ impl<'m> PlantLoop<'m> {
         let truth = self.world.advance(tick, time_ns)?;
         self.solving += before.elapsed();
         if let Some(observer) = &mut self.observer {
-            let moment = Moment { truth, time_s: self.world.since_start_s(time_ns), began_ns };
+            let time_s = self.world.since_start_s(time_ns);
+            let is_counted = self.world.needle_started_ns().is_some() && time_s >= self.world.drive.wait_s();
+            let moment = Moment { truth, time_s, began_ns, is_counted, answer: self.answer };
             observer.offer(&self.world.tissue, &moment);
         }
         self.truths.push(truth);
@@ -96,6 +99,10 @@ impl<'m> PlantLoop<'m> {
     /// [`RuntimeError::NeverArmed`] when RUN does not come.
     fn act(&mut self, command: Option<&PaddleCommand>, time_ns: u64, elapsed_ns: u64) -> Result<(), RuntimeError> {
         self.world.act(command, time_ns, elapsed_ns);
+        if let Some(command) = command {
+            self.answer =
+                Some(Answer { mode: Mode::from_wire(command.state), faults: Faults::from_bits(command.faults) });
+        }
         let waited_ns = time_ns - self.first_ns.unwrap_or(time_ns);
         match command {
             Some(command) if self.world.needle_started_ns().is_none() && waited_ns > LONGEST_WAIT_FOR_RUN_NS => {

@@ -1,5 +1,6 @@
 //! Somebody who looks on while a plant runs: the loop tells, and never waits for an answer.
 
+use firmware::{Faults, Mode};
 use model_offline::model::TissueModel;
 
 use crate::runtime::time::mode::RunMode;
@@ -15,11 +16,24 @@ pub struct Moment {
     pub time_s: f64,
     /// When the tick began to be solved, ns of the steady clock.
     pub began_ns: u64,
+    /// Whether the needle moves already: before, nothing is to be held.
+    pub is_counted: bool,
+    /// What the controller's last command said; none before the first one.
+    pub answer: Option<Answer>,
+}
+
+/// What a command says of the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Mode; none where the number is none of its own.
+    pub mode: Option<Mode>,
+    /// Faults that are present.
+    pub faults: Faults,
 }
 
 /// Looks on.
 pub trait Observer: std::fmt::Debug + Send {
-    /// A moment that may be looked at; must not wait.
+    /// A moment that may be looked at; must not wait, but where it holds time after this moment.
     fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment);
 
     /// Whether the insertion is to end now.
