@@ -109,6 +109,24 @@ fn a_polling_peer_dies_with_a_killed_parent() {
     wait_for("the peer goes on without its parent", || (!is_alive(peer)).then_some(()));
 }
 
+/// Two that poll with real-time priority at once, two processes each, where there are two processors: whoever spins lets the
+/// other's partner run. Without that all four waited for ever, and the machine with them.
+#[test]
+fn two_that_poll_at_once_both_end() {
+    let mut both = [(); 2].map(|()| start(&["timing", "--rate", "1000", "--seconds", "0.5"]));
+    let until = Instant::now() + Duration::from_secs(60);
+    while both.iter_mut().any(|child| child.try_wait().unwrap().is_none()) && Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    for mut child in both {
+        let ended = child.try_wait().unwrap().is_some();
+        children(child.id()).into_iter().for_each(|peer| signal(peer, "KILL"));
+        let _ = child.kill();
+        let output = child.wait_with_output().unwrap();
+        assert!(ended, "it waits for ever: {}", message(&output));
+    }
+}
+
 #[test]
 fn an_emulator_dies_with_its_run() {
     // Without QEMU, or the target for bare metal, there is no emulator.

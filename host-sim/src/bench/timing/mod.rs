@@ -10,6 +10,7 @@ pub mod machine;
 mod own;
 mod partner;
 pub mod peer;
+mod spin;
 mod stimulus;
 
 use std::path::PathBuf;

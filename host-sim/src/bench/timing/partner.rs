@@ -12,6 +12,7 @@ use iceoryx2::service::ipc;
 use super::blocks::{ModeAnswer, Stamps};
 use super::own::TICKS_TO_RUN;
 use super::peer::{Bare, DATAGRAM, Transport};
+use super::spin::Spin;
 use super::stimulus::{Samples, Stimulus};
 use crate::bench::rounds::MeasuredLoop;
 use crate::exchange::{Departure, PlantPorts, Space};
@@ -258,12 +259,11 @@ impl Drop for Running {
 }
 
 fn spin(mut done: impl FnMut() -> bool) {
-    let mut polls: u32 = 0;
+    let (mut polls, mut spin): (u32, _) = (0, Spin::default());
     let mut since = None;
     while !done() {
-        std::hint::spin_loop();
         polls = polls.wrapping_add(1);
-        if !polls.is_multiple_of(1 << 16) {
+        if !spin.nothing() && !polls.is_multiple_of(1 << 16) {
             continue;
         }
         if signals::check().is_err() || since.get_or_insert_with(Instant::now).elapsed() > TIMEOUT {

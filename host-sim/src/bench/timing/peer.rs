@@ -15,6 +15,7 @@ use iceoryx2::service::port_factory::PortFactory as _;
 use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
 
 use super::machine::pin;
+use super::spin::Spin;
 use crate::exchange::{ControllerPorts, Space};
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::signals;
@@ -109,10 +110,10 @@ fn over_link(options: &PeerOptions<'_>, stepper: &mut Stepper<'_>) -> Result<(),
     ports.connect()?;
     request_real_time_at(options.priority);
     poll(|look| {
-        let Some(needle) = ports.needle() else { return Ok(!look || ports.has_peer()) };
+        let Some(needle) = ports.needle() else { return Ok(nothing(!look || ports.has_peer())) };
         let command = stepper.step((needle, ports.target(), ports.paddle()));
         ports.send(&command)?;
-        Ok(true)
+        Ok(Polled::Answered)
     })
 }
 
@@ -124,9 +125,9 @@ fn over_bare(options: &PeerOptions<'_>) -> Result<(), RuntimeError> {
     }
     request_real_time_at(options.priority);
     poll(|look| {
-        let Some(ping) = bare.receive()? else { return Ok(!look || bare.has_peer()) };
+        let Some(ping) = bare.receive()? else { return Ok(nothing(!look || bare.has_peer())) };
         bare.send(ping)?;
-        Ok(true)
+        Ok(Polled::Answered)
     })
 }
 
@@ -140,18 +141,18 @@ fn over_socket(options: &PeerOptions<'_>, stepper: &mut Stepper<'_>) -> Result<(
     poll(|_| {
         let length = match socket.recv(&mut buffer) {
             Ok(length) => length,
-            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => return Ok(true),
-            Err(_) => return Ok(false),
+            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => return Ok(Polled::Nothing),
+            Err(_) => return Ok(Polled::Gone),
         };
         let Ok((needle, target, paddle)) = postcard::from_bytes::<Datagram>(&buffer[..length]) else {
-            return Ok(false); // The empty datagram is the end.
+            return Ok(Polled::Gone); // The empty datagram is the end.
         };
         let command = stepper.step((needle, target, Some(paddle)));
         let mut answer = [0; DATAGRAM];
         if let Ok(bytes) = postcard::to_slice(&command, &mut answer) {
             let _ = socket.send(bytes);
         }
-        Ok(true)
+        Ok(Polled::Answered)
     })
 }
 
@@ -161,19 +162,37 @@ fn look() -> Result<(), RuntimeError> {
     Ok(())
 }
 
+/// What a poll found.
+enum Polled {
+    Nothing,
+    Answered,
+    /// Nobody is left on the other side.
+    Gone,
+}
+
+fn nothing(is_there: bool) -> Polled {
+    if is_there { Polled::Nothing } else { Polled::Gone }
+}
+
 /// Calls `answer` until it says that the other side has gone; it is told when it is time to look for that.
-fn poll(mut answer: impl FnMut(bool) -> Result<bool, RuntimeError>) -> Result<(), RuntimeError> {
-    let mut polls: u64 = 0;
+fn poll(mut answer: impl FnMut(bool) -> Result<Polled, RuntimeError>) -> Result<(), RuntimeError> {
+    let (mut polls, mut spin): (u64, _) = (0, Spin::default());
+    // A nap is long: after each of them there is time to look.
+    let mut napped = false;
     loop {
         polls += 1;
-        let look = polls.is_multiple_of(POLLS_PER_LOOK);
+        let look = napped || polls.is_multiple_of(POLLS_PER_LOOK);
         if look {
             signals::check()?;
         }
-        if !answer(look)? {
-            return Ok(());
+        match answer(look)? {
+            Polled::Nothing => napped = spin.nothing(),
+            Polled::Answered => {
+                spin.something();
+                napped = false;
+            }
+            Polled::Gone => return Ok(()),
         }
-        std::hint::spin_loop();
     }
 }
 
