@@ -256,6 +256,88 @@ fn skin_that_holds_is_pushed_as_a_patch_and_skin_that_never_gives_way_is_one() {
     }
 }
 
+/// All that the base does: first at the skin, then, from where that gives way, at a needle through open skin. Integrated in
+/// small steps over the force, it is the account's work and what the skin took; with a paddle, whose force is not in that
+/// integral, the energy of skin that holds stands for it.
+#[test]
+fn skin_that_gives_way_takes_what_was_stored_in_it() {
+    for open in nonlinear() {
+        let depth = open.needle.depth;
+        let shut = Pressed::new(&open, 0.12 * depth);
+        let mut scene = open.clone();
+        scene.needle.shaft.as_mut().unwrap().puncture_force = shut.force;
+        let model = TissueModel::new(&scene).unwrap();
+        for paddle in [Vector2::zeros(), Vector2::new(0.02, -0.03) * depth] {
+            let way = Way { depth, paddle, increments: 12, seconds: 0.0 };
+            let Inserted::Within { needle, punctured_at } = insert(&model, Some(1), way).unwrap() else {
+                panic!("{}: the skin holds", scene.name)
+            };
+            let energy = needle.energy();
+            let told = energy.work + energy.paddle + energy.base + energy.puncture.unwrap();
+            let done = done_in_all(&open, paddle, punctured_at);
+            assert!(energy.puncture.unwrap() > 0.1 * done, "{}: the skin takes little: {energy:?} {done}", scene.name);
+            assert!((told - done).abs() < 0.01 * done, "{}: {energy:?} is {told}, done was {done}", scene.name);
+        }
+        let within = within(&TissueModel::new(&open).unwrap(), Some(1), 3).energy();
+        assert_eq!(within.puncture, None, "nothing was punctured");
+    }
+}
+
+/// Skin that holds, pushed to a depth.
+struct Pressed {
+    force: f64,
+    /// Work by force over depth.
+    work: f64,
+    energy: f64,
+}
+
+impl Pressed {
+    fn new(scene: &Scene, depth: f64) -> Self {
+        Self::with_paddle(scene, depth, Vector2::zeros())
+    }
+
+    /// The paddle goes along straight, to this place.
+    fn with_paddle(scene: &Scene, depth: f64, paddle: Vector2<f64>) -> Self {
+        let model = TissueModel::new(scene).unwrap();
+        let mut body = model.body(Some(1), NewtonSettings::default()).unwrap();
+        let (mut force, mut work) = (0.0, 0.0);
+        for step in 1..=100 {
+            let share = f64::from(step) / 100.0;
+            body.drive(depth * share, paddle * share).unwrap();
+            let now = body.contact_force();
+            work += 0.5 * (force + now) * depth / 100.0;
+            force = now;
+        }
+        Self { force, work, energy: body.equilibrium().energy() }
+    }
+}
+
+/// Work of base and paddle to the scene's depth where the skin gives way at this one.
+fn done_in_all(scene: &Scene, paddle: Vector2<f64>, punctured_at: f64) -> f64 {
+    let depth = scene.needle.depth;
+    let pressed = Pressed::with_paddle(scene, punctured_at, paddle * (punctured_at / depth));
+    let model = TissueModel::new(scene).unwrap();
+    let mut needle = SlippingNeedle::at_rest(&model, Some(1)).unwrap();
+    let (mut force, mut work, mut at_puncture) = (0.0, 0.0, 0.0);
+    for step in 1..=300 {
+        let share = f64::from(step) / 300.0;
+        needle.advance(depth * share, paddle * share).unwrap();
+        let now = needle.base_force();
+        let energy = needle.energy();
+        let step = match paddle == Vector2::zeros() {
+            true => 0.5 * (force + now) * depth / 300.0,
+            false => energy.work + energy.paddle + energy.base - work,
+        };
+        force = now;
+        work += step;
+        if needle.depth() <= punctured_at {
+            at_puncture = work;
+        }
+    }
+    let before = if paddle == Vector2::zeros() { pressed.work } else { pressed.energy };
+    before + work - at_puncture
+}
+
 #[test]
 fn what_cannot_be_is_refused_and_nothing_is_lost() {
     let patch = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();

@@ -11,9 +11,11 @@ use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::Vector2;
 use serde::Serialize;
 
-/// Where the work at the needle's base and of the paddle went, since it is in:
-/// work + paddle + base = stored + friction + cutting. Of a needle that is moved across its line the work is counted, and the
-/// balance does not close: a seventh of that work is missing in a body that it has just been pushed into.
+/// Where the work at the needle's base and of the paddle went on the way through open skin:
+/// work + paddle + base = stored + friction + cutting. Where the skin had to be punctured more was done before, which it took
+/// as it gave way: what base and paddle have done in all is work + paddle + base + puncture. Of a needle that is moved across
+/// its line the work is counted, and the balance does not close: a seventh of that work is missing in a body that it has just
+/// been pushed into.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct EnergyAccount {
     /// Work at the base.
@@ -28,6 +30,17 @@ pub struct EnergyAccount {
     pub friction: f64,
     /// Dissipated by cutting: the tip's force over the way that it went past tissue.
     pub cutting: f64,
+    /// Taken by the skin as it gave way: the energy of the body that was pushed, less what an open one took to the same depth.
+    /// None for skin that relaxes, whose energy does not tell of the work.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub puncture: Option<f64>,
+}
+
+impl EnergyAccount {
+    /// What has been done through open skin.
+    pub(super) fn put_in(&self) -> f64 {
+        self.work + self.paddle + self.base
+    }
 }
 
 /// A needle in a body, with its history.
@@ -259,6 +272,11 @@ impl<'m> SlippingNeedle<'m> {
     /// Where the work has gone.
     pub fn energy(&self) -> EnergyAccount {
         self.energy
+    }
+
+    /// What the skin took as it gave way.
+    pub(super) fn skin_gave_way(&mut self, taken: f64) {
+        self.energy.puncture = (!self.model.tissue().relaxes()).then_some(taken);
     }
 
     /// What the shaft does along the cut, from the entry on; the tip last.
