@@ -4,8 +4,13 @@ use assert_cmd::Command;
 
 /// The one case of a run of a second of simulated insertion.
 fn case(more: &str) -> serde_json::Value {
+    lockstep(&format!("--insertion-time 1 --feedback observer --rate 200 {more}"))
+}
+
+/// The one case of a run.
+fn lockstep(more: &str) -> serde_json::Value {
     let folder = tempfile::tempdir().unwrap();
-    let words = "run --quiet --tissue inclusion --mode lockstep --insertion-time 1 --feedback observer --rate 200";
+    let words = "run --quiet --tissue inclusion --mode lockstep";
     let mut run = Command::new(env!("CARGO_BIN_EXE_host-sim"));
     run.args(words.split(' ')).args(more.split_whitespace()).arg("--out").arg(folder.path().join("report"));
     run.assert().success();
@@ -16,6 +21,10 @@ fn case(more: &str) -> serde_json::Value {
 
 fn peak(case: &serde_json::Value) -> f64 {
     case["strategies"]["dynamic"]["max_orthogonal_error"].as_f64().unwrap()
+}
+
+fn rms(case: &serde_json::Value) -> f64 {
+    case["strategies"]["dynamic"]["rms_orthogonal_error"].as_f64().unwrap()
 }
 
 /// Largest error without a cause.
@@ -41,6 +50,7 @@ fn what_is_left_without_a_cause_is_what_a_run_without_it_leaves() {
     let whole = case(&format!("--table-tissue homogeneous {lag} --causes"));
     assert_eq!(names(&whole), ["sensor-noise", "sensor-delay", "table", "paddle"]);
     same(whole["causes"]["whole"]["peak"].as_f64().unwrap(), peak(&whole));
+    same(whole["causes"]["whole"]["rms"].as_f64().unwrap(), rms(&whole));
     same(without(&whole, "table"), peak(&case(lag)));
     same(without(&whole, "paddle"), peak(&case("--table-tissue homogeneous")));
     same(without(&whole, "sensor-delay"), peak(&case(&format!("--table-tissue homogeneous {lag} --latency 0"))));
@@ -67,6 +77,19 @@ fn no_controller_could_know_more_than_the_sensor_tells() {
     let slow = whole["causes"]["bound"]["paddle"].as_f64().unwrap();
     assert_eq!(slow, 0.0, "a paddle at its own rate is fast enough");
     assert_eq!(bound(&case(""), "sensor"), 0.0);
+}
+
+/// A paddle that cannot follow leaves at least what the fastest one leaves that knows its way beforehand, at the place of
+/// the table's paddle.
+#[test]
+fn a_paddle_that_is_too_slow_leaves_no_less_than_its_bound() {
+    let sensor = "--noise 0 --latency 0 --target-rate 1000";
+    for (time, is_slow) in [(0.1, true), (0.2, true), (3.0, false)] {
+        let slow = lockstep(&format!("--scene breast --insertion-time {time} {sensor} --causes"));
+        let bound = slow["causes"]["bound"]["paddle"].as_f64().unwrap();
+        assert_eq!(bound > 0.0, is_slow, "{time} s: {bound}");
+        assert!(bound <= peak(&slow), "{time} s: {bound} of {}", peak(&slow));
+    }
 }
 
 #[test]

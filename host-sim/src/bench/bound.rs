@@ -6,8 +6,10 @@
 //! paddle has done already is known to it. What is left has the variance
 //!
 //! ```text
-//! h(t)ᵀ · (1 + Σ h(tⱼ) h(tⱼ)ᵀ / σ²)⁻¹ · h(t)        over all samples with tⱼ + latency ≤ t
+//! h(t)ᵀ · (1 + Σ (h(tⱼ) h(tⱼ)ᵀ + g(tⱼ) g(tⱼ)ᵀ) / σ²)⁻¹ · h(t)        over all samples with tⱼ + latency ≤ t
 //! ```
+//!
+//! where h is across the needle and g along it: a sample shows both, and what moves along the needle tells of the same factor.
 //!
 //! and this is the least mean square error of *every* causal controller (the conditional mean is the estimator of least variance;
 //! Anderson & Moore, Optimal Filtering, 1979, section 2.3). One that knows less, as all real ones do, leaves more. It is a mean over
@@ -34,8 +36,8 @@ pub struct Bound {
 pub(super) struct Unknown<'a> {
     /// Moments, s, rising.
     pub(super) times_s: &'a [f64],
-    /// Displacements at every moment, length.
-    pub(super) shapes: &'a [Vec<f64>],
+    /// Displacements at every moment, across the needle and along it, length. What is left across it counts.
+    pub(super) shapes: &'a [Vec<[f64; 2]>],
     /// The first moment whose error counts.
     pub(super) counts_from: usize,
 }
@@ -55,8 +57,10 @@ impl Unknown<'_> {
     /// The least expected error of any causal controller with this sensor.
     pub(super) fn least_error(&self, seen: &Seen) -> Errors {
         let Self { times_s, shapes, counts_from } = self;
-        let at = |moment: usize| DVector::from_iterator(shapes.len(), shapes.iter().map(|shape| shape[moment]));
-        let largest = shapes.iter().flatten().fold(0.0_f64, |most, value| most.max(value.abs()));
+        let at = |moment: usize, component: usize| {
+            DVector::from_iterator(shapes.len(), shapes.iter().map(|shape| shape[moment][component]))
+        };
+        let largest = shapes.iter().flatten().flatten().fold(0.0_f64, |most, value| most.max(value.abs()));
         // An exact sensor is one whose noise nobody sees.
         let noise = seen.noise.max(1e-9 * largest);
         let begin_s = times_s.first().copied().unwrap_or(0.0);
@@ -71,15 +75,16 @@ impl Unknown<'_> {
                 while times_s[sampled] + 1e-9 < begin_s + count * seen.period_s {
                     sampled += 1;
                 }
-                let shown = at(sampled);
-                information += &shown * shown.transpose() / (noise * noise);
+                for shown in [at(sampled, 0), at(sampled, 1)] {
+                    information += &shown * shown.transpose() / (noise * noise);
+                }
                 count += 1.0;
             }
             if count > before {
                 covariance = information.clone().cholesky().map_or(covariance, |factor| factor.inverse());
             }
             if moment >= *counts_from {
-                let left = at(moment);
+                let left = at(moment, 0);
                 let variance = left.dot(&(&covariance * &left)).max(0.0);
                 squares += variance;
                 peak = peak.max(variance);
@@ -120,15 +125,32 @@ mod tests {
         (0..count).map(|k| 0.01 * k as f64).collect()
     }
 
-    fn unknown<'a>(times_s: &'a [f64], shapes: &'a [Vec<f64>]) -> Unknown<'a> {
+    fn unknown<'a>(times_s: &'a [f64], shapes: &'a [Vec<[f64; 2]>]) -> Unknown<'a> {
         Unknown { times_s, shapes, counts_from: 0 }
+    }
+
+    /// What moves across the needle only.
+    fn across(shape: &[f64]) -> Vec<[f64; 2]> {
+        shape.iter().map(|value| [*value, 0.0]).collect()
+    }
+
+    /// What moves twice as far along the needle is seen five times as well: as with a fifth of the noise's variance.
+    #[test]
+    fn motion_along_the_needle_tells_of_motion_across_it() {
+        let times_s = moments(400);
+        let shape: Vec<f64> = times_s.iter().map(|time_s| f64::sin(3.0 * time_s)).collect();
+        let oblique: Vec<[f64; 2]> = shape.iter().map(|value| [*value, 2.0 * value]).collect();
+        let both = unknown(&times_s, &[oblique]).least_error(&SEEN);
+        let clearer = Seen { noise: SEEN.noise / 5f64.sqrt(), ..SEEN };
+        let one = unknown(&times_s, &[across(&shape)]).least_error(&clearer);
+        assert!((both.rms - one.rms).abs() < 1e-12 && (both.peak - one.peak).abs() < 1e-12, "{both:?} {one:?}");
     }
 
     /// Of a constant, n samples leave 1/(1 + n/σ²).
     #[test]
     fn of_a_constant_it_is_the_mean_of_the_samples() {
         let times_s = moments(1001);
-        let least = unknown(&times_s, &[vec![1.0; 1001]]).least_error(&SEEN);
+        let least = unknown(&times_s, &[across(&[1.0; 1001])]).least_error(&SEEN);
         let variance = |moment: usize| {
             let arrived = if moment < 25 { 0 } else { (moment - 25) / 10 + 1 };
             1.0 / (1.0 + arrived as f64 / 0.09)
@@ -143,7 +165,7 @@ mod tests {
     fn without_noise_only_the_delay_is_left() {
         let times_s = moments(500);
         let shape: Vec<f64> = times_s.iter().map(|time_s| f64::sin(3.0 * time_s)).collect();
-        let least = unknown(&times_s, std::slice::from_ref(&shape)).least_error(&Seen { noise: 0.0, ..SEEN });
+        let least = unknown(&times_s, &[across(&shape)]).least_error(&Seen { noise: 0.0, ..SEEN });
         // The first sample shows nothing, the second one is taken at 0.1 s and arrives at 0.35.
         let exact = (shape[..35].iter().map(|value| value * value).sum::<f64>() / 500.0).sqrt();
         assert!((least.rms - exact).abs() < 1e-6, "{} {exact}", least.rms);
@@ -158,7 +180,7 @@ mod tests {
             times_s.iter().map(|time_s| 0.4 * time_s * time_s).collect::<Vec<f64>>(),
             times_s.iter().map(|time_s| f64::cos(5.0 * time_s)).collect(),
         ];
-        let least = unknown(&times_s, &shapes).least_error(&SEEN);
+        let least = unknown(&times_s, &shapes.each_ref().map(|shape| across(shape))).least_error(&SEEN);
         let mut random = Pcg64Mcg::seed_from_u64(3);
         let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
         let (mut best, mut poorer, trials) = (0.0, 0.0, 2000);

@@ -4,7 +4,7 @@
 //! Causes do not add up: noise that is taken away lets nothing else be seen better, and a table that knows everything
 //! leaves a slow sensor nothing to be slow about. What each is worth is what is left without it alone.
 
-use firmware::contract::Table;
+use firmware::contract::{Knot, Table};
 use model_offline::model::TissueModel;
 use model_offline::placement::discretise;
 use model_offline::scene::{Motion, Scene};
@@ -137,9 +137,10 @@ impl Examined<'_> {
         let unknown = present.iter().filter(|cause| matches!(cause, Cause::Table | Cause::Motion | Cause::Deflection));
         let shapes = unknown.map(|cause| {
             let without = blind(&[*cause])?;
-            Ok(whole.iter().zip(without).map(|(with, without)| with.error - without.error).collect())
+            let left = whole.iter().zip(without);
+            Ok(left.map(|(with, without)| [with.error - without.error, with.axial - without.axial]).collect())
         });
-        let shapes = shapes.collect::<Result<Vec<Vec<f64>>, SimError>>()?;
+        let shapes = shapes.collect::<Result<Vec<Vec<[f64; 2]>>, SimError>>()?;
         let times_s: Vec<f64> = whole.iter().map(|moment| moment.since_start_s).collect();
         let unknown = Unknown {
             times_s: &times_s,
@@ -153,16 +154,32 @@ impl Examined<'_> {
             latency_s: 1e-3 * latency + simulation.actuator.delay_ticks as f64 / rate,
             noise: (simulation.loop_settings.noise_for(simulation.depth).powi(2) + rounding).sqrt(),
         };
-        let alone = self.inserted(&[], knowing, |insertion, _| insertion.moments(AttachedPaddle::None))?;
+        // The paddle is attached and holds already where it does not move.
+        let held = AttachedPaddle::Held(table.paddle.index);
+        let alone = self.inserted(&[], knowing, |insertion, _| insertion.moments(held))?;
         let pushed: Vec<f64> = alone.iter().map(|moment| moment.error).collect();
         let times_alone: Vec<f64> = alone.iter().map(|moment| moment.since_start_s).collect();
-        let normal = self.model.scene().needle.orthogonal();
-        let effect = table.knots.iter().map(|knot| knot.jacobian.tr_mul(&normal).norm()).fold(0.0, f64::max);
         Ok(Bound {
             sensor: unknown.least_error(&seen),
             delay: unknown.least_error(&Seen { noise: 0.0, ..seen }),
-            paddle: least_error_at_rate(&times_alone, &pushed, effect * simulation.actuator.max_rate),
+            paddle: least_error_at_rate(&times_alone, &pushed, self.fastest()),
         })
+    }
+
+    /// How fast the paddle can move the target across the needle at most, length/s: by its own motion, and by what the
+    /// deeper needle makes of a displacement that it has already. As far as the tissue is linear in the paddle's displacement.
+    fn fastest(&self) -> f64 {
+        let Self { table, simulation, .. } = self;
+        let normal = self.model.scene().needle.orthogonal();
+        let across = |knot: &Knot<f64, 2>| knot.jacobian.tr_mul(&normal);
+        let effect = table.knots.iter().map(|knot| across(knot).norm()).fold(0.0, f64::max);
+        let per_depth = table.knots.windows(2).map(|pair| {
+            let [shallow, deep] = [&pair[0], &pair[1]];
+            (across(deep) - across(shallow)).norm() / (deep.depth - shallow.depth)
+        });
+        let change = per_depth.fold(0.0, f64::max);
+        let farthest = (simulation.actuator.max_rate * simulation.duration_s).min(table.paddle.max_displacement);
+        effect * simulation.actuator.max_rate + change * simulation.needle_speed() * farthest
     }
 
     /// A table of the simulated scene for the same paddle; none where the controller has it already.

@@ -39,6 +39,8 @@ pub(super) struct Moment {
     pub(super) since_start_s: f64,
     /// Orthogonal displacement of the target, length.
     pub(super) error: f64,
+    /// Its displacement along the needle, length.
+    pub(super) axial: f64,
     /// Whether the needle has set out, and has waited long enough.
     pub(super) counts: bool,
     /// Whether the controller is in RUN.
@@ -129,7 +131,7 @@ impl<'a> InProcess<'a> {
         };
         let mut state = State::new();
         let mut command = None;
-        let normal = model.scene().needle.orthogonal();
+        let (normal, axis) = (model.scene().needle.orthogonal(), model.scene().needle.axis);
         if controller.is_none() {
             world.start_needle(0);
         }
@@ -143,6 +145,7 @@ impl<'a> InProcess<'a> {
             visit(Moment {
                 since_start_s,
                 error: normal.dot(&Vector2::from(truth.target)),
+                axial: axis.dot(&Vector2::from(truth.target)),
                 counts: since_start_s >= 0.0 && since_start_s >= simulation.needle.wait_s(),
                 in_run: command.as_ref().is_some_and(|command| command.state == Mode::Run as u32),
             });

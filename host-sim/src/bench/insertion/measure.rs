@@ -2,6 +2,7 @@
 
 use firmware::Faults;
 use model_offline::model::TissueModel;
+use model_offline::output::NodalFields;
 use nalgebra::Vector2;
 
 use crate::bench::result::{BodyFrame, NeedlePoint, NeedleResult, SeriesPoint, StrategyResult};
@@ -35,9 +36,12 @@ pub(super) fn measure(
     let (normal, axis) = (model.scene().needle.orthogonal(), model.scene().needle.axis);
     let truths = plant.truths();
     let error = |truth: &Truth| Vector2::from(truth.target).dot(&normal);
-    // Before the needle moves nothing is to be held.
-    let waits = |truth: &Truth| export::csv::seconds_since(truth.time_ns, started_ns) < waited_s;
-    let counted = if waited_s > 0.0 { &truths[truths.partition_point(waits)..] } else { truths };
+    // Before the needle moves nothing is to be held; at its start it has not moved.
+    let waits = |truth: &Truth| {
+        let since_start_s = export::csv::seconds_since(truth.time_ns, started_ns);
+        since_start_s <= 0.0 || since_start_s < waited_s
+    };
+    let counted = &truths[truths.partition_point(waits)..];
     let worst = counted.iter().max_by(|a, b| error(a).abs().total_cmp(&error(b).abs()));
     let squares: f64 = counted.iter().map(|truth| error(truth).powi(2)).sum();
     let travel =
@@ -112,12 +116,20 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth], started_ns
         // The last one is the end, with what the controller removed after the needle had arrived.
         let index = if i == count { last } else { gone.partition_point(|gone| *gone < part).min(last) };
         let Ok(tissue) = retrace.go_on_to(index) else { break };
+        let NodalFields { strain, von_mises } = tissue.nodal_fields().unwrap_or_default();
         frames.push(BodyFrame {
             depth: truths[index].depth,
             nodes: tissue.deformed_nodes().into_iter().map(|node| node.map(rounded)).collect(),
+            strain: strain.into_iter().map(digits).collect(),
+            von_mises: von_mises.unwrap_or_default().into_iter().map(digits).collect(),
         });
     }
     frames
+}
+
+/// Four significant digits are beyond any colour.
+fn digits(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 /// Forces and slip in so many points at most, and the whole shaft where the needle is deepest.

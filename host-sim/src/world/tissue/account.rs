@@ -40,6 +40,9 @@ pub struct PlantAccount {
     /// `extrapolation_error` leaves these moments out where they are less than a tenth of a second.
     #[serde(default)]
     pub puncture_apart_s: Option<f64>,
+    /// Largest distance from the full model's target displacement in these moments, length.
+    #[serde(default)]
+    pub puncture_apart_error: Option<f64>,
     /// Why the full model could not be taken the same way, where it could not: then nothing is known of how far off this was.
     #[serde(default)]
     pub not_verified: Option<String>,
@@ -63,6 +66,7 @@ impl Default for PlantAccount {
             solves: None,
             extrapolation_error: None,
             puncture_apart_s: None,
+            puncture_apart_error: None,
             not_verified: None,
             error_at_end: None,
         }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 use clap::ValueEnum;
 use model_offline::model::{Body, Pose, TissueModel};
 use model_offline::needle::Course;
+use model_offline::output::NodalFields;
 use model_offline::reduction::along_path::{PathBody, along};
 use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, Extrapolated, TrainingError};
@@ -122,22 +123,21 @@ impl AlongInsertion {
         let way = |time: f64| model.pose_at(time, self.trajectory.at(time).depth);
         let full = along(model, paddle, &way, self.interval_s, &self.paddle)?;
         let mut body = self.body.afresh();
-        let mut held = HeldAgainst { largest: 0.0, at_end: 0.0, apart_s: 0.0, needle: Vec::new() };
-        let mut beside = 0.0_f64;
+        let mut held = HeldAgainst { largest: 0.0, at_end: 0.0, apart_s: 0.0, apart: 0.0, needle: Vec::new() };
         for (k, (full, paddle)) in full.into_iter().zip(&self.paddle).enumerate() {
             let since_start_s = self.interval_s * k as f64;
             body.go_to(since_start_s, *paddle);
             held.at_end = (body.target_displacement() - full.target).norm();
             if body.is_apart_from(full.needle.cut_length.is_none()) {
                 held.apart_s += self.interval_s;
-                beside = beside.max(held.at_end);
+                held.apart = held.apart.max(held.at_end);
             } else {
                 held.largest = held.largest.max(held.at_end);
             }
             held.needle.push(NeedleMoment { since_start_s, reading: full.needle });
         }
         if held.apart_s > MOST_APART_S {
-            held.largest = held.largest.max(beside);
+            held.largest = held.largest.max(held.apart);
         }
         Ok(held)
     }
@@ -151,6 +151,8 @@ struct HeldAgainst {
     at_end: f64,
     /// How long the skin held in one of them only, s.
     apart_s: f64,
+    /// Largest distance between the targets meanwhile, length.
+    apart: f64,
     /// What the needle met.
     needle: Vec<NeedleMoment>,
 }
@@ -340,21 +342,20 @@ impl<'m> TissuePlant<'m> {
         }
     }
 
+    /// The coefficients of a picture: those behind the present state, solved for where the model has condensed them out.
+    fn picture(&self) -> Option<Vec<f64>> {
+        // The linear model has condensed the nodes out; the picture is the full model's.
+        if matches!(self.kind, Kind::Condensed(_)) {
+            return Some(self.solved_in_full().ok()?.equilibrium().coefficients().to_vec());
+        }
+        let mut coefficients = Vec::new();
+        self.copy_coefficients(&mut coefficients);
+        Some(coefficients)
+    }
+
     /// Where the nodes are now.
     pub fn deformed_nodes(&self) -> Vec<[f64; 2]> {
-        let coefficients = match &self.kind {
-            Kind::Full(body) => body.equilibrium().coefficients().to_vec(),
-            Kind::Extrapolated(body) => body.coefficients(),
-            Kind::Reduced { full: Some(body), full_answers: true, .. } => body.equilibrium().coefficients().to_vec(),
-            Kind::Reduced { body, .. } => body.coefficients(),
-            Kind::Course { course, .. } => course.coefficients().to_vec(),
-            Kind::Path(along) => along.body.coefficients().to_vec(),
-            // The linear model has condensed the nodes out; the picture is the full model's.
-            Kind::Condensed(_) => match self.solved_in_full() {
-                Ok(body) => body.equilibrium().coefficients().to_vec(),
-                Err(_) => return Vec::new(),
-            },
-        };
+        let Some(coefficients) = self.picture() else { return Vec::new() };
         let displacements = self.model.nodal_displacements(&coefficients).unwrap_or_default();
         self.model
             .positions()
@@ -362,6 +363,11 @@ impl<'m> TissuePlant<'m> {
             .zip(displacements)
             .map(|(rest, displacement)| [rest.x + displacement.x, rest.y + displacement.y])
             .collect()
+    }
+
+    /// Strain and stress at the nodes now; none where there is no state to show.
+    pub fn nodal_fields(&self) -> Option<NodalFields> {
+        Some(NodalFields::new(self.model, &self.picture()?))
     }
 
     /// The account, with the distance from the full model at the present state. A full model that was extrapolated to
@@ -375,10 +381,11 @@ impl<'m> TissuePlant<'m> {
             account.extrapolation_error = Some(body.account().largest_error);
         } else if let Kind::Path(taken) = &self.kind {
             match taken.held_against_full(self.model, self.paddle) {
-                Ok(HeldAgainst { largest, at_end, apart_s, needle }) => {
+                Ok(HeldAgainst { largest, at_end, apart_s, apart, needle }) => {
                     account.extrapolation_error = Some(largest);
                     account.error_at_end = Some(at_end);
                     account.puncture_apart_s = (apart_s > 0.0).then_some(apart_s);
+                    account.puncture_apart_error = (apart_s > 0.0).then_some(apart);
                     if self.model.scene().needle.shaft.is_some() {
                         self.needle = needle;
                     }
