@@ -180,3 +180,25 @@ fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> 
     let model = TissueModel::on(scene, certified.model.planar().clone(), certified.model.spacing())?;
     Ok(Judged { model, estimate, reference })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretization::{Integration, Method};
+
+    /// A smaller tolerance takes more rounds of refinement and more nodes, and the round is what is told.
+    #[test]
+    fn the_level_counts_rounds_of_refinement() {
+        let found = [0.2, 0.01].map(|tolerance| {
+            let mut scene = Scene::bundled("paper").unwrap().without_inclusions();
+            scene.discretization.method = Method::new(Integration::FemT6);
+            scene.discretization.resolution = Resolution::Tolerance(tolerance);
+            let judged = discretise_judged(&scene).unwrap();
+            let estimate = judged.estimate.unwrap();
+            assert!(estimate.worst() <= tolerance && estimate.level >= MIN_LEVEL, "{estimate:?}");
+            (estimate.level, judged.model.nodes())
+        });
+        let [(loose, few), (tight, many)] = found;
+        assert!(tight > loose && many > few, "{found:?}");
+    }
+}

@@ -99,3 +99,42 @@ impl PlacementStudy {
         verdict(&self.placement)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is at rest is as far off as another model of it, and what that leaves open.
+    #[test]
+    fn errors_are_distances_to_the_reference_and_what_it_leaves_open() {
+        let scene = Scene::bundled("paper").unwrap();
+        let study = PlacementStudy::run(&scene, &PlacementOptions::default()).unwrap();
+        let reference = Reference::compute(&scene, 0.02).unwrap();
+        let responses = crate::placement::rest::rest_responses(&study.model).unwrap();
+        let errors = accuracy(&scene, &study.placement, &reference, 2).unwrap();
+        assert_eq!(errors.paddles.len(), 5);
+        for (i, (errors, expected)) in errors.paddles.iter().zip(reference.errors(&responses)).enumerate() {
+            let (limit, open) = (&reference.responses()[i], reference.open_by_paddle()[i]);
+            assert!(open > 0.0);
+            let measure = errors.controllability_measure.unwrap();
+            assert!((measure / expected - 1.0).abs() < 1e-9, "{measure} {expected}");
+            let jacobian = (responses[i].jacobian - limit.jacobian).norm() / limit.jacobian.norm();
+            assert!((errors.jacobian - jacobian - open).abs() < 1e-12);
+            let found = responses[i].best_direction.unwrap() - limit.best_direction.unwrap();
+            let direction = found.norm() + open * limit.controllability_measure;
+            assert!((errors.best_direction.unwrap() - direction).abs() < 1e-9 * direction);
+            let apart = (responses[i].target_per_depth - limit.target_per_depth).norm();
+            assert!(errors.target_per_depth > apart && errors.target_per_depth < apart + 0.02);
+        }
+    }
+
+    #[test]
+    fn a_study_says_what_its_numbers_mean() {
+        let study = PlacementStudy::run(&Scene::bundled("tethered").unwrap(), &PlacementOptions::default()).unwrap();
+        assert!(
+            study.verdict().iter().any(|line| line.starts_with("no paddle of this scene can")),
+            "{:?}",
+            study.verdict()
+        );
+    }
+}
