@@ -182,6 +182,17 @@ fn usage_errors_exit_2() {
     model_offline().args(["schema"]).assert().success();
 }
 
+/// Questions need somebody who answers.
+#[test]
+fn without_a_terminal_nothing_is_asked() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("mine.toml");
+    let asked = model_offline().args(["new", "--interactive", "-o"]).arg(&output).write_stdin("100\n").assert();
+    let said = String::from_utf8(asked.code(2).get_output().stderr.clone()).unwrap();
+    assert!(said.contains("--interactive asks on a terminal") && !output.exists(), "{said}");
+    model_offline().args(["new", "--interactive", "--svg", "drawing.svg"]).assert().code(2);
+}
+
 #[test]
 fn what_a_study_varies_itself_is_refused_with_the_reason() {
     for (command, option) in

@@ -133,7 +133,7 @@ impl Layout {
         };
         Self {
             immobile,
-            depth: rounded(0.05 * size).min(rounded_down(needle.most)),
+            depth: imported.depth.unwrap_or_else(|| rounded(0.05 * size).min(rounded_down(needle.most))),
             target: imported.target.unwrap_or_else(|| innermost(outline, &needle.contact)),
             contact: needle.contact,
             axis: needle.axis,

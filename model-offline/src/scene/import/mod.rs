@@ -51,6 +51,8 @@ pub struct Imported {
     pub needle: Option<ImportedNeedle>,
     /// The point to hold still.
     pub target: Option<Point2>,
+    /// How deep the needle goes.
+    pub depth: Option<f64>,
     /// Places of the paddle, with their numbers. None where the file gives none.
     pub paddles: Vec<(u32, [Point2; 2])>,
     /// What became of everything in the file.
@@ -68,6 +70,7 @@ impl Imported {
             immobile: Vec::new(),
             needle: None,
             target: None,
+            depth: None,
             paddles: Vec::new(),
             summary: Summary::default(),
         }

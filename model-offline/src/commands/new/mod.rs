@@ -1,10 +1,13 @@
 //! `model-offline new`: a scene to start from.
 
+mod interactive;
+
 use super::error::CliError;
 use model_offline::output;
 use model_offline::scene::Scene;
 use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
 use model_offline::scene::starter::{self, StarterNames, starter};
+use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
 
 /// Options of `new`.
@@ -21,6 +24,9 @@ pub(super) struct NewArgs {
     /// the body.
     #[arg(long, value_name = "FILE")]
     msh: Option<PathBuf>,
+    /// Ask on the terminal for the few numbers that matter: size, material, target, depth.
+    #[arg(long, conflicts_with_all = ["svg", "msh"])]
+    interactive: bool,
     /// Length of the body's longer side, in the scene's unit [default: as in the file; drawings with a width in mm,
     /// cm, in, pt, pc, Q or px are to scale].
     #[arg(long, value_name = "LENGTH")]
@@ -49,12 +55,21 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
             return Err(usage("--size belongs to --svg or --msh".into(), "the starter block has its own size"));
         }
     }
+    // Before anybody is asked anything.
+    if let Some(path) = &args.output {
+        if path.exists() && !args.force {
+            return Err(usage(format!("{} is there already", path.display()), "name another file, or add --force"));
+        }
+        let inputs: Vec<&Path> = args.svg.iter().chain(&args.msh).map(PathBuf::as_path).collect();
+        output::check_outputs(&inputs, &[("--output", Some(path))])?;
+    }
     let stem = |path: &PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let source = args.output.as_ref().or(args.svg.as_ref()).or(args.msh.as_ref());
     let name = args.name.clone().or_else(|| source.and_then(stem)).unwrap_or_else(|| "my-scene".to_owned());
     let names = StarterNames { name, length: args.length.clone(), stress: args.stress.clone() };
     let (text, summary) = match args.svg.as_ref().or(args.msh.as_ref()) {
         Some(file) => import(file, args, &names)?,
+        None if args.interactive => (asked_for(&names)?, String::new()),
         None => (starter(&names, None), String::new()),
     };
     // A suggestion that validation refuses would only be found out by the next command.
@@ -64,17 +79,25 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
             print!("{text}");
             eprint!("{summary}");
         }
-        Some(path) if path.exists() && !args.force => {
-            return Err(usage(format!("{} is there already", path.display()), "name another file, or add --force"));
-        }
         Some(path) => {
-            let inputs: Vec<&Path> = args.svg.iter().chain(&args.msh).map(PathBuf::as_path).collect();
-            output::check_outputs(&inputs, &[("--output", Some(path))])?;
             output::write_whole(path, text.as_bytes())?;
             println!("{summary}{}\nnext: model-offline place {0}", path.display());
         }
     }
     Ok(())
+}
+
+/// The scene of somebody's answers.
+fn asked_for(names: &StarterNames) -> Result<String, CliError> {
+    let stdin = io::stdin();
+    if !stdin.is_terminal() {
+        let help = "without one, `model-offline new` gives a scene that is good as it is, to be edited";
+        return Err(CliError::usage("--interactive asks on a terminal, and there is none", help));
+    }
+    // What is written may go to standard output: questions do not.
+    let imported = interactive::ask(stdin.lock(), io::stderr(), names)
+        .map_err(|error| CliError::usage(error.to_string(), "nothing was written; begin again"))?;
+    Ok(starter(names, Some(&imported)))
 }
 
 /// The scene of a file, and what became of everything in it.
