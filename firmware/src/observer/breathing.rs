@@ -515,10 +515,22 @@ mod tests {
         }
     }
 
-    /// The textbook's filter in matrices of six by six, without safeguards.
     #[test]
     fn it_is_the_kalman_filter_of_six_states() {
-        let belief = Belief { max_gain: 10.0, ..belief(0.4) };
+        agrees_with_six_states(10.0);
+    }
+
+    /// Gains that the loop does not bear are lowered together, that on the slope to what its way bears; the covariance is then
+    /// Joseph's, which holds for any gains.
+    #[test]
+    fn it_is_a_filter_of_six_states_with_lower_gains_where_the_loop_bears_no_more() {
+        agrees_with_six_states(0.05);
+        agrees_with_six_states(0.01);
+    }
+
+    /// The textbook's filter in matrices of six by six, without any other safeguard.
+    fn agrees_with_six_states(max_gain: f64) {
+        let belief = Belief { max_gain, ..belief(0.4) };
         let mut observer = Observer::starting(&belief, 0.0, 0.0, 0.0);
         let breath = |time_s: f64| lujan(3.0, 4.0, time_s);
         let mut k = 0;
@@ -554,7 +566,7 @@ mod tests {
             put(4, 0, &block(waves.second_beside));
             (state, covariance, waves.rate)
         };
-        let mut depth = 0.0;
+        let (mut depth, mut lowered) = (0.0, 0);
         for step in 0..100 {
             let (state, covariance, rate) = of(&observer);
             let mut transition = SMatrix::<f64, 6, 6>::identity();
@@ -569,11 +581,19 @@ mod tests {
             let walks = [belief.level_walk * ULTRASOUND_S, belief.slope_walk * way, walk, walk, walk / 4.0, walk / 4.0];
             let before = transition * covariance * transition.transpose() + SMatrix::from_diagonal(&walks.into());
             let row = SMatrix::<f64, 1, 6>::from([1.0, 0.0, 1.0, 0.0, 1.0, 0.0].map(|x| [x]));
-            let gain = before * row.transpose() / ((row * before * row.transpose()).x + belief.noise);
+            let mut gain = before * row.transpose() / ((row * before * row.transpose()).x + belief.noise);
+            let seen = (row * gain).x;
+            if seen > max_gain {
+                gain *= max_gain / seen;
+                let steepest = max_gain * max_gain / (2.0 - max_gain) / way;
+                gain[1] = gain[1].clamp(-steepest, steepest);
+                lowered += 1;
+            }
             let measured = breath(f64::from(k + step) * ULTRASOUND_S) + 0.02 * depth;
             let expected = transition * state;
             let expected = expected + gain * (measured - (row * expected).x);
-            let after = (SMatrix::<f64, 6, 6>::identity() - gain * row) * before;
+            let kept = SMatrix::<f64, 6, 6>::identity() - gain * row;
+            let after = kept * before * kept.transpose() + gain * belief.noise * gain.transpose();
             depth += way;
             (observer.surprise, observer.surprise_variance) = (0.0, 0.0);
             observer.update(&belief, measured, depth, ULTRASOUND_S);
@@ -584,7 +604,7 @@ mod tests {
                 break;
             }
         }
-        assert!(depth > 2.0, "{depth}");
+        assert!(depth > 2.0 && (lowered > 10) == (max_gain < 1.0), "{depth} {lowered}");
     }
 
     /// cos⁴ is a level and two waves: what is left without noise is what the period is off by, and nothing once that is
@@ -646,6 +666,25 @@ mod tests {
         let observer = having_seen(&belief(0.1), 40.0, held, 5);
         assert!(!observer.predicts_breaths());
         assert!((observer.at(0.0) - 3.0).abs() < 0.1, "{}", observer.at(0.0));
+    }
+
+    /// What is foretold goes into the level as it ends, with the doubt that this brings: the estimate goes on from where it was.
+    #[test]
+    fn the_end_of_a_breath_is_no_jump() {
+        for held_at_s in [21.0, 22.0, 23.0] {
+            let held = |time_s: f64| lujan(3.0, 4.0, f64::min(time_s, held_at_s));
+            let belief = belief(0.1);
+            let mut observer = having_seen(&belief, held_at_s, held, 5);
+            let mut noise = Noise(11);
+            let (mut before, mut was_uncertain) = (0.0, 0.0);
+            while observer.predicts_breaths() {
+                before = observer.at(0.0) + observer.ahead(ULTRASOUND_S);
+                was_uncertain = observer.level_variance;
+                observer.update(&belief, held(held_at_s) + 0.1 * noise.next(), 0.0, ULTRASOUND_S);
+            }
+            assert!((observer.at(0.0) - before).abs() < 0.1, "{held_at_s} s: {before} {}", observer.at(0.0));
+            assert!(observer.level_variance > was_uncertain, "{held_at_s} s");
+        }
     }
 
     /// Deeper and quicker breaths are taken up.

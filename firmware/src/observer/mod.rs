@@ -305,10 +305,22 @@ mod tests {
 
     #[test]
     fn it_is_the_kalman_filter() {
-        let mut observer = Observer::starting(&BELIEF, 0.0, 0.0, 0.0);
-        let covariance = Matrix2::new(0.0, 0.0, 0.0, BELIEF.slope);
+        agrees_with_the_textbook(0.0);
+    }
+
+    /// A controller that is started with the needle in: the slope since the surface is what the level is uncertain by.
+    #[test]
+    fn it_is_the_kalman_filter_from_a_depth_on() {
+        agrees_with_the_textbook(5.0);
+    }
+
+    /// From a needle that is so deep already, in a table that begins at 1.
+    fn agrees_with_the_textbook(inserted: f64) {
+        let mut observer = Observer::starting(&BELIEF, 0.0, 1.0 + inserted, 1.0);
+        let since_the_surface = Vector2::new(inserted, 1.0);
+        let covariance = since_the_surface * BELIEF.slope * since_the_surface.transpose();
         let mut textbook = Textbook { state: Vector2::zeros(), covariance };
-        let mut depth = 0.0;
+        let mut depth = 1.0 + inserted;
         for k in 0..500 {
             // In, at rest, and out again; the samples swing about zero, so that nothing surprises.
             let way = if k < 200 {
@@ -392,6 +404,26 @@ mod tests {
         let (level, slope) = observer.gains(&belief, 0.0);
         assert_eq!(level, 0.25);
         assert!((slope - 1.0 / 24.0).abs() < 1e-15, "{slope}");
+        // An α-β filter keeps its bandwidth with β = α²/(2 − α) per step: over a way of 2 that is less, in and out.
+        for way in [2.0, -2.0] {
+            let observer = Observer { level_variance: 0.48, covariance: 0.08 * way / 2.0, ..Observer::default() };
+            let (_, slope) = observer.gains(&belief, way);
+            assert!((slope * way - 0.25 * 0.25 / 1.75).abs() < 1e-15, "{slope}");
+        }
+    }
+
+    /// Innovations over their standard deviation, summed: of 1 and 3 with a variance of 0.09 and noise of 0.16.
+    #[test]
+    fn surprise_is_a_sum_of_innovations_over_their_deviation() {
+        let mut observer = Observer { level_variance: 0.09, slope_variance: 1e-9, ..Observer::default() };
+        let widen = |observer: &mut Observer<f64>, by: f64| observer.widen_if_surprised(&BELIEF, by, 0.16);
+        widen(&mut observer, 0.5);
+        assert!((observer.surprise - 1.0).abs() < 1e-15 && observer.surprise_variance == 1.0);
+        widen(&mut observer, 1.5);
+        assert!((observer.surprise - (SURPRISE_MEMORY + 3.0)).abs() < 1e-14, "{}", observer.surprise);
+        let expected = 1.0 + SURPRISE_MEMORY * SURPRISE_MEMORY;
+        assert!((observer.surprise_variance - expected).abs() < 1e-15);
+        assert_eq!(observer.level_variance, 0.09, "less than it takes");
     }
 
     /// After a paddle has been placed by somebody, the estimate begins with what they claim, and lets go of it.
