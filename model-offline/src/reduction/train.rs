@@ -251,6 +251,7 @@ fn conformal_scale(outcomes: &[(f64, f64)]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::discretization::Resolution;
     use crate::scene::starter::{StarterNames, starter};
     use crate::solver::equilibrium::NewtonSettings;
 
@@ -318,36 +319,17 @@ mod tests {
         }
     }
 
-    /// A target on a line of symmetry needs nothing to be held; the paddle may move all the same, and no farther than it can.
+    /// Where nothing can be held, or nothing has to be, there is room of a fiftieth of the depth, and no more than the actuator has.
     #[test]
     fn the_paddle_has_room_where_it_is_not_needed() {
-        for unit in [1.0, 1e-3] {
-            let scene = format!(
-                "[scene]\nname = \"even\"\ndimension = 2\nunits = {{ length = \"mm\", stress = \"kPa\" }}\n\
-                 [domain]\noutline = [[0.0, 0.0], [{w}, 0.0], [{w}, {h}], [0.0, {h}]]\n\
-                 [material]\nmodel = \"neo-hookean\"\nlambda = 4.0\nmu = 1.0\n\
-                 [immobile]\npaths = [[[0.0, 0.0], [{w}, 0.0]]]\n\
-                 [needle]\ncontact = [[{a}, {h}], [{b}, {h}]]\naxis = [0.0, -1.0]\ndepth = {d}\n\
-                 [target]\nposition = [{m}, {t}]\n\
-                 [[paddle]]\nindex = 1\nsegment = [[0.0, {low}], [0.0, {high}]]\n\
-                 [actuator]\nmax_displacement = {limit}\n[discretization]\nspacing = {s}\n",
-                w = 80.0 * unit,
-                h = 60.0 * unit,
-                a = 35.0 * unit,
-                b = 45.0 * unit,
-                d = 6.0 * unit,
-                m = 40.0 * unit,
-                t = 30.0 * unit,
-                low = 20.0 * unit,
-                high = 40.0 * unit,
-                limit = 2.0 * unit,
-                s = 5.0 * unit,
-            );
-            let model = TissueModel::new(&Scene::parse(&scene, "even").unwrap()).unwrap();
-            // Without the paddle the target stays on the line: no paddle is needed, and none is attached.
-            for range in workspaces(&model, Some(0)).unwrap() {
-                assert!(range.amin() >= 0.02 * 6.0 * unit * (1.0 - 1e-12), "{range}");
-                assert!(range.amax() <= 2.0 * unit, "{range}");
+        let mut scene = Scene::bundled("prostate").unwrap();
+        scene.discretization.resolution = Resolution::Spacing(6.0);
+        let depth = scene.needle.depth;
+        for (most, expected) in [(1.0, 0.02 * depth), (0.01, 0.01)] {
+            scene.actuator.max_displacement = most;
+            let model = TissueModel::new(&scene).unwrap();
+            for range in workspaces(&model, None).unwrap() {
+                assert!((range - Vector2::repeat(expected)).amax() < 1e-12, "{range} at a depth of {depth}");
             }
         }
     }
