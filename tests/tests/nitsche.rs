@@ -65,6 +65,25 @@ fn the_tangent_is_the_derivative_of_the_force_at_large_gaps_too() {
 }
 
 #[test]
+fn the_force_is_the_derivative_of_the_energy() {
+    let Imposed { planar, tissue, nitsche } = imposed();
+    let (d, prescribed) = (field(&planar, 0.1), vec![0.02; nitsche.prescribed()]);
+    let energy = |d: &[f64]| nitsche.add_force(&tissue, d, &prescribed, &mut vec![0.0; d.len()]);
+    let mut force = vec![0.0; d.len()];
+    nitsche.add_force(&tissue, &d, &prescribed, &mut force);
+    let largest = force.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    for (u, force) in force.iter().enumerate() {
+        let moved = |by: f64| {
+            let mut d = d.clone();
+            d[u] += by;
+            energy(&d)
+        };
+        let difference = (moved(1e-5) - moved(-1e-5)) / 2e-5;
+        assert!((difference - force).abs() < 1e-7 * largest, "{u}: {difference} {force}, largest {largest}");
+    }
+}
+
+#[test]
 fn the_penalty_grows_with_the_stiffness_of_the_deformed_tissue_and_only_then() {
     let Imposed { planar, tissue, nitsche } = imposed();
     let rest = vec![0.0; 2 * planar.positions().len()];

@@ -528,6 +528,69 @@ mod tests {
         agrees_with_six_states(0.01);
     }
 
+    /// A detector that takes every sample as it is, and turns after a step of 1.
+    fn swings(samples: &[f64]) -> Swing<f64> {
+        let belief = BreathBelief { share: 1.0, step: 1.0 };
+        let mut swing = Swing::default();
+        samples.iter().for_each(|sample| drop(swing.watch(&belief, *sample, ULTRASOUND_S)));
+        swing
+    }
+
+    #[test]
+    fn a_swing_turns_where_it_is_farthest_once_it_has_come_back_by_a_step() {
+        // Less than a step is no direction.
+        assert_eq!((swings(&[5.0, 5.9, 4.2, 5.9]).rises, swings(&[5.0, 6.1]).rises), (None, Some(true)));
+        assert_eq!(swings(&[5.0, 3.9]).rises, Some(false));
+        // Up first: a top, and no bottom before it has turned again.
+        let up = swings(&[5.0, 7.0, 8.0, 7.5, 8.5, 7.6]);
+        assert_eq!((up.rises, up.extreme, up.top, up.bottom), (Some(true), 8.5, None, None));
+        let turned = swings(&[5.0, 7.0, 8.0, 8.5, 7.4, 6.0, 6.9]);
+        assert_eq!((turned.rises, turned.extreme, turned.top, turned.bottom), (Some(false), 6.0, Some(8.5), None));
+        let up_again = swings(&[5.0, 8.5, 6.0, 7.1, 9.0]);
+        assert_eq!((up_again.rises, up_again.top, up_again.bottom), (Some(true), Some(8.5), Some(6.0)));
+        // Down first: the other way round.
+        let down = swings(&[5.0, 3.0, 2.0, 2.9]);
+        assert_eq!((down.rises, down.extreme, down.top, down.bottom), (Some(false), 2.0, None, None));
+        let turned = swings(&[5.0, 3.0, 2.0, 3.1]);
+        assert_eq!((turned.rises, turned.top, turned.bottom), (Some(true), None, Some(2.0)));
+    }
+
+    #[test]
+    fn a_breath_begins_in_its_middle_uncertain_by_a_quarter_of_its_swing() {
+        let waves = Waves::beginning(4.0, 6.0);
+        assert!((waves.rate - PI / 2.0).abs() < 1e-15);
+        // The signal has gone on by the time that smoothing takes.
+        let since = BREATH_SMOOTHING * waves.rate;
+        assert!((waves.first[0] - 3.0 * since.sin()).abs() < 1e-6 && (waves.first[1] - 3.0 * since.cos()).abs() < 1e-6);
+        let quarter = 1.5 * 1.5;
+        assert_eq!((waves.of_first, waves.second), ([quarter, 0.0, quarter], [0.0; 2]));
+        let second = SECOND_WAVE * SECOND_WAVE * quarter;
+        assert_eq!(waves.of_second, [second, 0.0, second]);
+    }
+
+    /// As long as they are known better than by half of their size.
+    #[test]
+    fn surprise_widens_the_waves_up_to_half_of_their_size() {
+        let known = Waves {
+            first: [3.0, 4.0],
+            of_second: [1.0, 0.5, 2.0],
+            between: [[0.1, 0.2], [0.3, 0.4]],
+            ..Waves::beginning(4.0, 6.0)
+        };
+        for (variance, grows) in [(6.2, true), (6.25, false), (6.3, false)] {
+            let before = Waves { of_first: [variance, 1.0, 3.0], ..known };
+            let mut after = before;
+            after.widen(2.0);
+            let expected = Waves {
+                of_first: [2.0 * variance, 2.0, 6.0],
+                of_second: [2.0, 1.0, 4.0],
+                between: [[0.2, 0.4], [0.6, 0.8]],
+                ..before
+            };
+            assert_eq!(after, if grows { expected } else { before }, "{variance}");
+        }
+    }
+
     /// The textbook's filter in matrices of six by six, without any other safeguard.
     fn agrees_with_six_states(max_gain: f64) {
         let belief = Belief { max_gain, ..belief(0.4) };
