@@ -18,7 +18,9 @@ fn imposed() -> Imposed {
     let nodes = jittered_rectangle([1.0, 1.0], [5, 5], 0.2, 3);
     let planar = Planar::new(&rectangle(1.0, 1.0), &[], nodes, None, Method::new(Integration::Scni)).unwrap();
     let law = Law::fung(383.0, 318.5, 40.0, 1.5, 1.0).unwrap();
-    let tissue = Tissue::uniform(law, planar.cells().len());
+    // Cells that an inclusion cuts: parts of two laws.
+    let other = Law::neo_hookean(200.0, 100.0).unwrap();
+    let tissue = Tissue::new(vec![law, other], (0..planar.cells().len()).map(|_| vec![(0, 0.8), (1, 1.7)]));
     let points = planar.boundary_points_on(&[Point2::new(0.0, 0.0), Point2::new(1.0, 0.0)]).unwrap();
     let nitsche = Nitsche::new(&planar, &tissue, points);
     Imposed { planar, tissue, nitsche }

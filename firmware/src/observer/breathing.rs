@@ -663,6 +663,9 @@ mod tests {
             let (state, covariance, rate_now) = of(&observer);
             assert!((state - expected).amax() < 1e-12, "{step}: {state} {expected}");
             assert!((covariance - after).amax() < 1e-12 * after.amax().max(1.0), "{step}: {covariance} {after}");
+            let beside_the_level = (row * after * row.transpose()).x - after[(0, 0)];
+            let of_waves = observer.breathing.waves.unwrap().variance();
+            assert!((of_waves - beside_the_level).abs() < 1e-12 * after.amax().max(1.0), "{step}: {of_waves}");
             if rate_now != rate {
                 break;
             }
