@@ -45,6 +45,23 @@ impl<'m> Course<'m> {
     /// # Errors
     /// [`NeedleError`].
     pub fn at_rest(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, NeedleError> {
+        Self::with_settings(model, paddle, NewtonSettings::default())
+    }
+
+    /// The same for steps so small that the last factor serves the next one as well.
+    ///
+    /// # Errors
+    /// [`NeedleError`].
+    pub fn in_small_steps(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, NeedleError> {
+        Self::with_settings(model, paddle, NewtonSettings::SMALL_STEPS)
+    }
+
+    /// With these settings as long as the contact moves with the needle; a needle that is in has its own.
+    fn with_settings(
+        model: &'m TissueModel,
+        paddle: Option<usize>,
+        settings: NewtonSettings,
+    ) -> Result<Self, NeedleError> {
         let shaft = model.scene().needle.shaft;
         if shaft.is_some() && model.is_held_weakly() {
             return Err(NeedleError::HeldWeakly);
@@ -58,7 +75,7 @@ impl<'m> Course<'m> {
                 State::Within(Box::new(needle))
             }
             puncture_force => {
-                let body = model.body(paddle, NewtonSettings::default()).map_err(failed(0.0))?;
+                let body = model.body(paddle, settings).map_err(failed(0.0))?;
                 State::Pushing { body: Box::new(body), puncture_force, so_far: Vec::new() }
             }
         };

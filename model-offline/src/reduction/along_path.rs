@@ -366,7 +366,7 @@ struct Walk<'w> {
 
 impl<'w> Walk<'w> {
     fn course(&self) -> Result<Course<'w>, TrainingError> {
-        Course::at_rest(self.model, self.paddle).map_err(failed(0.0))
+        Course::in_small_steps(self.model, self.paddle).map_err(failed(0.0))
     }
 
     fn step(&self, course: &mut Course<'_>, k: usize, paddle: Vector2<f64>) -> Result<(), TrainingError> {

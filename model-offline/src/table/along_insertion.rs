@@ -32,7 +32,7 @@ pub(super) fn knots(
     let seconds = interval / scene.needle.speed / STEPS as f64;
     let index = scene.paddles[position].index;
     let steering = Steering { seconds, normal, enough: ENOUGH * depth, index };
-    let mut still = Course::at_rest(model, Some(position))?;
+    let mut still = Course::in_small_steps(model, Some(position))?;
     let mut steered = still.clone();
     let mut knots: heapless::Vec<Knot<f64, 2>, MAX_KNOTS> = heapless::Vec::new();
     // Paddle travel per step, as the last one needed it, in the direction that holds the target.

@@ -220,7 +220,7 @@ impl<'m> TissuePlant<'m> {
     /// # Errors
     /// [`WorldError::Needle`] when the body is not held.
     fn on_course(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, WorldError> {
-        let course = Course::at_rest(model, paddle).map_err(WorldError::Needle)?;
+        let course = Course::in_small_steps(model, paddle).map_err(WorldError::Needle)?;
         let kind = Kind::Course { course: Box::new(course), since_start_s: 0.0 };
         Ok(Self {
             model,
