@@ -199,6 +199,7 @@ fn a_free_run_shows_the_plants_stop_in_its_report() {
         .args(["--insertion-time", "8", "--duration", "9", "--out"])
         .arg(&out)
         .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     stop_in_the_loop(&mut child, 12);
@@ -210,6 +211,9 @@ fn a_free_run_shows_the_plants_stop_in_its_report() {
     let (misses, lateness_s) = worst([plant]);
     assert!(misses >= 900, "{misses} misses");
     assert!(lateness_s > 0.9, "largest lateness {lateness_s} s");
+    // Nobody at a terminal is told how far it is all the same.
+    let progress = String::from_utf8(output.stderr).unwrap();
+    assert!(progress.contains(" % of the steps after 4 s  homogeneous: dynamic, free-run"), "{progress}");
     // The first line of the figures has both sides.
     let text = String::from_utf8(output.stdout).unwrap();
     let line = text.lines().find(|line| line.contains("controller ") && line.contains("plant ")).unwrap();

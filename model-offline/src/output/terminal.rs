@@ -2,15 +2,35 @@
 
 use std::any::TypeId;
 use std::io::IsTerminal as _;
+use std::time::Duration;
 
-/// A progress bar of so many steps; hidden where standard error is not a terminal.
+/// Time between the lines that take a progress bar's place.
+const LINES_EVERY: Duration = Duration::from_secs(4);
+
+/// A progress bar of so many steps; where standard error is not a terminal, a line there every few seconds until the bar
+/// is finished or dropped.
 pub fn progress(steps: u64) -> indicatif::ProgressBar {
     if !std::io::stderr().is_terminal() {
-        return indicatif::ProgressBar::hidden();
+        let bar = indicatif::ProgressBar::with_draw_target(Some(steps), indicatif::ProgressDrawTarget::hidden());
+        let observed = bar.downgrade();
+        std::thread::spawn(move || {
+            loop {
+                std::thread::sleep(LINES_EVERY);
+                let Some(bar) = observed.upgrade().filter(|bar| !bar.is_finished()) else { return };
+                eprintln!("{}", progress_line(&bar));
+            }
+        });
+        return bar;
     }
     let style = indicatif::ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left  {msg}");
     let bar = indicatif::ProgressBar::new(steps);
     if let Ok(style) = style { bar.with_style(style) } else { bar }
+}
+
+/// How far something has come, in one line. What is left is not said: steps of a run differ too much in what they take.
+fn progress_line(bar: &indicatif::ProgressBar) -> String {
+    let (done, of) = (bar.position(), bar.length().unwrap_or(0).max(1));
+    format!("{:3} % of the steps after {} s  {}", 100 * done / of, bar.elapsed().as_secs(), bar.message())
 }
 
 /// Names the command that a word was meant for where clap does not: it counts letters near their places, and finds
@@ -43,4 +63,20 @@ pub fn accepting_negative_numbers(command: clap::Command) -> clap::Command {
         if is_number { option.allow_hyphen_values(true) } else { option }
     };
     command.mut_subcommands(|command| command.mut_args(accepting))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_says_how_far_it_is_and_with_what() {
+        let bar = indicatif::ProgressBar::with_draw_target(Some(40), indicatif::ProgressDrawTarget::hidden());
+        bar.set_message("controller tables");
+        bar.set_position(10);
+        let line = progress_line(&bar);
+        assert!(line.trim_start().starts_with("25 % of the steps") && line.ends_with("controller tables"), "{line}");
+        // Nothing is known of how many there will be.
+        assert!(progress_line(&indicatif::ProgressBar::hidden()).trim_start().starts_with("0 %"));
+    }
 }
