@@ -532,7 +532,9 @@ mod tests {
     fn swings(samples: &[f64]) -> Swing<f64> {
         let belief = BreathBelief { share: 1.0, step: 1.0 };
         let mut swing = Swing::default();
-        samples.iter().for_each(|sample| drop(swing.watch(&belief, *sample, ULTRASOUND_S)));
+        for sample in samples {
+            let _ = swing.watch(&belief, *sample, ULTRASOUND_S);
+        }
         swing
     }
 
