@@ -95,6 +95,28 @@ fn a_body_that_is_carried_along_feels_nothing() {
     assert!((course.base_force() - force).abs() < 1e-3 * force, "{} {force}", course.base_force());
 }
 
+/// Whether a factor is kept from step to step changes nothing but the time that it takes, the Jacobian included.
+#[test]
+fn small_steps_lead_to_the_same_states() {
+    for (name, effects) in [("breast", &[Effect::Creep][..]), ("prostate", &EVERYTHING[1..]), ("paper", &[][..])] {
+        let model = TissueModel::new(&scene(name, effects)).unwrap();
+        let depth = model.scene().needle.depth;
+        let mut exact = Course::at_rest(&model, Some(1)).unwrap();
+        let mut small = Course::in_small_steps(&model, Some(1)).unwrap();
+        for k in 1..=60 {
+            let time = f64::from(k) / 12.0;
+            let paddle = Vector2::new((2.0 * time).sin(), time.sin()) * (0.1 * depth);
+            let pose = Pose { paddle, ..way(&model)(time) };
+            exact.take_in(pose, 1.0 / 12.0).unwrap();
+            small.take_in(pose, 1.0 / 12.0).unwrap();
+            let off = (exact.target_displacement() - small.target_displacement()).norm();
+            assert!(off < 1e-6 * depth, "{name}, step {k}: {off}");
+        }
+        let (exact, small) = (exact.actuation_jacobian().unwrap(), small.actuation_jacobian().unwrap());
+        assert!((exact - small).norm() < 1e-5 * exact.norm(), "{name}: {exact} {small}");
+    }
+}
+
 /// The paddle's path of a table, walked in steps of another size.
 #[test]
 fn tables_along_an_insertion_hold_the_target() {
