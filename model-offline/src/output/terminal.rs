@@ -1,7 +1,7 @@
 //! What commands show on a terminal besides their results.
 
 use std::any::TypeId;
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::time::Duration;
 
 /// Time between the lines that take a progress bar's place.
@@ -17,7 +17,10 @@ pub fn progress(steps: u64) -> indicatif::ProgressBar {
             loop {
                 std::thread::sleep(LINES_EVERY);
                 let Some(bar) = observed.upgrade().filter(|bar| !bar.is_finished()) else { return };
-                eprintln!("{}", progress_line(&bar));
+                // Where nobody listens any more there is nobody to tell.
+                if writeln!(std::io::stderr(), "{}", progress_line(&bar)).is_err() {
+                    return;
+                }
             }
         });
         return bar;
