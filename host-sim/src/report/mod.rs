@@ -1,5 +1,6 @@
 //! What a person sees of results: the report's page and pictures, figures of studies, words on a terminal.
 
+mod below_noise;
 pub mod cyclictest;
 pub mod directory;
 pub mod page;

@@ -4,6 +4,7 @@ use firmware::Mode;
 use model_offline::output::chart::number::{number, plain};
 
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
 
 /// The three sentences; those that a result has nothing for are left out.
@@ -38,7 +39,8 @@ fn reduction(run: &RunResult) -> Option<String> {
     let none = factors(run, |case| case.improvement_over_none).map(|times| format!("{times} than without a paddle"));
     let held = factors(run, |case| case.improvement).map(|times| format!("{times} than the best static paddle's"));
     let both: Vec<String> = [none, held].into_iter().flatten().collect();
-    (!both.is_empty()).then(|| format!("The dynamic paddle's largest error is {}.", both.join(" and ")))
+    let why = below_noise(run).map_or_else(String::new, |why| format!("; {why}"));
+    (!both.is_empty()).then(|| format!("The dynamic paddle's largest error is {}{why}.", both.join(" and ")))
 }
 
 /// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.

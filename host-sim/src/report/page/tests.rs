@@ -383,6 +383,35 @@ fn the_conclusion_says_what_spoils_it() {
     assert!(said(&run).contains("5.0 times larger than without a paddle"), "{}", said(&run));
 }
 
+/// A target that moves by less than a measurement is off is no matter of feedback, and whoever reads that it got worse reads why.
+#[test]
+fn feedback_below_the_noise_is_told() {
+    let said = |run: &RunResult| conclusion::sentences(run).join(" ");
+    let told = "less than the sensor's noise of";
+    let with = |noise_over_moved: f64, improvement: f64| {
+        let mut run = run("mine");
+        let moved = |case: &CaseResult| case.strategies.none.as_ref().map(|none| none.max_orthogonal_error);
+        let moved = run.cases.iter().filter_map(moved).fold(0.0, f64::max);
+        run.settings.noise = noise_over_moved * moved;
+        run.cases.iter_mut().for_each(|case| case.improvement = Some(improvement));
+        run
+    };
+    assert!(!said(&with(0.9, 0.5)).contains(told) && !said(&with(f64::NAN, 0.5)).contains(told));
+    let worse = said(&with(1.1, 0.5));
+    assert!(
+        worse.contains(told) && worse.contains("the best static paddle, which needs no sensor, leaves less"),
+        "{worse}"
+    );
+    let better = said(&with(1.1, 2.0));
+    assert!(better.contains(told) && better.contains("is the table's doing"), "{better}");
+    let on_screen = |run: &RunResult| crate::report::terminal::summary::summary(run, "there".as_ref());
+    assert!(on_screen(&with(1.1, 0.5)).contains(told) && !on_screen(&with(0.9, 0.5)).contains(told));
+    // Without an insertion that has no paddle there is nothing to hold it against.
+    let mut unknown = with(1.1, 0.5);
+    unknown.cases.iter_mut().for_each(|case| case.strategies.none = None);
+    assert!(!said(&unknown).contains(told));
+}
+
 #[test]
 fn strings_of_the_result_are_text() {
     let page = render(&run(EVIL));

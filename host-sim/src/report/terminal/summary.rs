@@ -8,6 +8,7 @@ use model_offline::output::chart::number::plain;
 use model_offline::scene::PlantModel;
 
 use crate::bench::result::{CaseResult, RunResult, SimulationSettings, StrategyResult};
+use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
@@ -66,6 +67,9 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     let digits = decimals(smallest_told(results.map(|(_, result)| result.max_orthogonal_error)), 6);
     for case in &run.cases {
         write_case(text, case, digits)?;
+    }
+    if let Some(why) = below_noise(run) {
+        writeln!(text, "  {why}")?;
     }
     write_causes(text, run, digits)?;
     write_plant(text, run)?;
