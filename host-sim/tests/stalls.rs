@@ -211,11 +211,17 @@ fn a_free_run_shows_the_plants_stop_in_its_report() {
     let (misses, lateness_s) = worst([plant]);
     assert!(misses >= 900, "{misses} misses");
     assert!(lateness_s > 0.9, "largest lateness {lateness_s} s");
-    // Nobody at a terminal is told how far it is all the same.
+    // Nobody at a terminal is told how far it is all the same, and what is left of 9 s and a little.
     let progress = String::from_utf8(output.stderr).unwrap();
-    let is_its =
-        |line: &str| line.contains(" % of the steps after ") && line.ends_with("homogeneous: dynamic, free-run");
-    assert!(progress.lines().any(is_its), "{progress}");
+    let its = progress.lines().filter(|line| line.ends_with("homogeneous: dynamic, free-run"));
+    let left = its.map(|line| {
+        let (how_far, rest) = line.split_once(", about ").unwrap_or_else(|| panic!("{line}"));
+        assert!(how_far.contains(" % of the steps after "), "{line}");
+        rest.split_once(" s left").unwrap().0.parse::<u32>().unwrap()
+    });
+    let left: Vec<u32> = left.collect();
+    assert!(left.len() >= 2 && left.iter().all(|seconds| (1..=11).contains(seconds)), "{progress}");
+    assert!(left.windows(2).all(|pair| pair[1] < pair[0]), "{progress}");
     // The first line of the figures has both sides.
     let text = String::from_utf8(output.stdout).unwrap();
     let line = text.lines().find(|line| line.contains("controller ") && line.contains("plant ")).unwrap();

@@ -16,6 +16,7 @@ use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{self, InsertionBasis, Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
+use model_offline::output::terminal::LongRun;
 use model_offline::parallel;
 use model_offline::scene::TableScalar;
 use model_offline::scene::TissueVariant;
@@ -133,12 +134,12 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     check_directory(&args.out)?;
     let inputs: Vec<&Path> = args.table.iter().chain(&args.world.scene).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json.as_deref(), &args.out)?;
-    let bar = super::progress_bar(args.quiet);
+    let progress = if args.quiet { LongRun::hidden() } else { LongRun::new() };
     let options = args.options()?;
-    let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &bar))?;
+    let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &progress))?;
     let view = args.view.then(|| live_view(args, &comparison.simulation().loop_settings)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
-    bar.finish_and_clear();
+    progress.bar.finish_and_clear();
     write_run(&args.out, &compared.result, compared.artifacts)?;
     if let Some(path) = &args.json {
         write_json(path, &compared.result)?;

@@ -6,7 +6,7 @@ use crate::bench::result::RunResult;
 
 /// Says so where the target leaves the needle's line by less than a measurement of it is off; none where it moves further, or
 /// where no insertion without a paddle was simulated.
-pub fn below_noise(run: &RunResult) -> Option<String> {
+pub(super) fn below_noise(run: &RunResult) -> Option<String> {
     let without = run.cases.iter().filter_map(|case| case.strategies.none.as_ref());
     let moved = without.map(|none| none.max_orthogonal_error).reduce(f64::max)?;
     let noise = run.settings.noise;

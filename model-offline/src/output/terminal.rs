@@ -2,38 +2,127 @@
 
 use std::any::TypeId;
 use std::io::{IsTerminal as _, Write as _};
-use std::time::Duration;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 /// Time between the lines that take a progress bar's place.
 const LINES_EVERY: Duration = Duration::from_secs(4);
 
-/// A progress bar of so many steps; where standard error is not a terminal, a line there every few seconds until the bar
-/// is finished or dropped.
-pub fn progress(steps: u64) -> indicatif::ProgressBar {
+/// A progress bar of so many steps that all take about as long; where standard error is not a terminal, a line there every
+/// few seconds until the bar is finished or dropped.
+pub fn progress(steps: u64) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
-        let bar = indicatif::ProgressBar::with_draw_target(Some(steps), indicatif::ProgressDrawTarget::hidden());
-        let observed = bar.downgrade();
-        std::thread::spawn(move || {
-            loop {
-                std::thread::sleep(LINES_EVERY);
-                let Some(bar) = observed.upgrade().filter(|bar| !bar.is_finished()) else { return };
-                // Where nobody listens any more there is nobody to tell.
-                if writeln!(std::io::stderr(), "{}", progress_line(&bar)).is_err() {
-                    return;
-                }
-            }
-        });
-        return bar;
+        return with_lines(steps, TimeLeft::default());
     }
-    let style = indicatif::ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left  {msg}");
-    let bar = indicatif::ProgressBar::new(steps);
+    styled(ProgressBar::new(steps), ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left  {msg}"))
+}
+
+/// The progress of something whose steps differ in what they take: what is left is said where somebody foretells it.
+#[derive(Clone, Debug)]
+pub struct LongRun {
+    /// How far it has come.
+    pub bar: ProgressBar,
+    /// When it will have ended.
+    pub left: TimeLeft,
+}
+
+impl LongRun {
+    /// On a terminal a bar, else lines, as for [`progress`].
+    pub fn new() -> Self {
+        let left = TimeLeft::default();
+        if !std::io::stderr().is_terminal() {
+            return Self { bar: with_lines(0, left.clone()), left };
+        }
+        let shown = left.clone();
+        let told = move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
+            let _ = out.write_str(&in_words(shown.seconds()));
+        };
+        let style = ProgressStyle::with_template("{wide_bar} {percent} %{left}  {msg}");
+        let bar = styled(ProgressBar::new(0), style.map(|style| style.with_key("left", told)));
+        // Time goes by between steps, too.
+        bar.enable_steady_tick(Duration::from_millis(500));
+        Self { bar, left }
+    }
+
+    /// Nobody is told.
+    pub fn hidden() -> Self {
+        Self { bar: ProgressBar::hidden(), left: TimeLeft::default() }
+    }
+}
+
+impl Default for LongRun {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn styled<E>(bar: ProgressBar, style: Result<ProgressStyle, E>) -> ProgressBar {
     if let Ok(style) = style { bar.with_style(style) } else { bar }
 }
 
-/// How far something has come, in one line. What is left is not said: steps of a run differ too much in what they take.
-fn progress_line(bar: &indicatif::ProgressBar) -> String {
+/// A bar that nobody sees, and lines in its place.
+fn with_lines(steps: u64, left: TimeLeft) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
+    let observed = bar.downgrade();
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(LINES_EVERY);
+            let Some(bar) = observed.upgrade().filter(|bar| !bar.is_finished()) else { return };
+            // Where nobody listens any more there is nobody to tell.
+            if writeln!(std::io::stderr(), "{}", progress_line(&bar, left.seconds())).is_err() {
+                return;
+            }
+        }
+    });
+    bar
+}
+
+/// How far something has come, in one line.
+fn progress_line(bar: &ProgressBar, left_s: Option<f64>) -> String {
     let (done, of) = (bar.position(), bar.length().unwrap_or(0).max(1));
-    format!("{:3} % of the steps after {} s  {}", 100 * done / of, bar.elapsed().as_secs(), bar.message())
+    let (after, left) = (bar.elapsed().as_secs(), in_words(left_s));
+    format!("{:3} % of the steps after {after} s{left}  {}", 100 * done / of, bar.message())
+}
+
+fn in_words(left_s: Option<f64>) -> String {
+    left_s.map_or_else(String::new, |seconds| format!(", about {:.0} s left", seconds.ceil()))
+}
+
+/// When something will have ended, as far as somebody has foretold it. Clones tell the same.
+#[derive(Clone, Debug, Default)]
+pub struct TimeLeft(Arc<Mutex<Option<Expected>>>);
+
+/// From a moment on, a part takes so long, and those behind it so long, s.
+#[derive(Clone, Copy, Debug)]
+struct Expected {
+    since: Instant,
+    this_s: f64,
+    then_s: f64,
+}
+
+/// Part of what something has taken that it is thought to take on when it is overdue.
+const OVERDUE: f64 = 0.2;
+
+impl TimeLeft {
+    /// What begins now takes so long, and what comes then so long, s.
+    pub fn expect(&self, this_s: f64, then_s: f64) {
+        let expected = Expected { since: Instant::now(), this_s, then_s };
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Some(expected);
+    }
+
+    /// What is left by now, s; none where nothing was foretold.
+    pub fn seconds(&self) -> Option<f64> {
+        let expected = *self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        expected.map(|expected| expected.left(expected.since.elapsed().as_secs_f64()))
+    }
+}
+
+impl Expected {
+    fn left(&self, elapsed_s: f64) -> f64 {
+        (self.this_s - elapsed_s).max(OVERDUE * elapsed_s.min(self.this_s)) + self.then_s
+    }
 }
 
 /// Names the command that a word was meant for where clap does not: it counts letters near their places, and finds
@@ -73,13 +162,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_left_grows_less_and_is_never_nothing_before_the_end() {
+        let left = TimeLeft::default();
+        assert_eq!(left.seconds(), None);
+        left.expect(10.0, 5.0);
+        let seconds = left.clone().seconds().unwrap();
+        assert!(seconds > 14.0 && seconds <= 15.0, "{seconds}");
+        let expected = Expected { since: Instant::now(), this_s: 10.0, then_s: 5.0 };
+        assert_eq!([4.0, 9.0, 20.0].map(|elapsed| expected.left(elapsed)), [11.0, 6.8, 7.0]);
+    }
+
+    #[test]
     fn a_line_says_how_far_it_is_and_with_what() {
-        let bar = indicatif::ProgressBar::with_draw_target(Some(40), indicatif::ProgressDrawTarget::hidden());
+        let bar = ProgressBar::with_draw_target(Some(40), ProgressDrawTarget::hidden());
         bar.set_message("controller tables");
         bar.set_position(10);
-        let line = progress_line(&bar);
+        let line = progress_line(&bar, None);
         assert!(line.trim_start().starts_with("25 % of the steps") && line.ends_with("controller tables"), "{line}");
         // Nothing is known of how many there will be.
-        assert!(progress_line(&indicatif::ProgressBar::hidden()).trim_start().starts_with("0 %"));
+        assert!(progress_line(&ProgressBar::hidden(), None).trim_start().starts_with("0 %"));
+        assert!(progress_line(&bar, Some(7.2)).contains(", about 8 s left  controller"));
     }
 }

@@ -28,6 +28,7 @@ impl Comparison<'_> {
             let case = &self.cases[i];
             self.insertion(case, case.label(Strategy::dynamic(RunMode::Lockstep)), &step)
         };
+        self.begins(&format!("dynamic, {}", RunMode::Lockstep));
         if spectator.is_some() {
             let watched = |(i, table): (usize, &EncodedTable)| {
                 self.progress.say(&format!("{}: dynamic, {}", self.cases[i].tissue, RunMode::Lockstep));
@@ -35,7 +36,6 @@ impl Comparison<'_> {
             };
             return self.tables.iter().enumerate().map(watched).collect();
         }
-        self.progress.say(&format!("dynamic, {}", RunMode::Lockstep));
         let controller = |i: usize| self.controller(&self.tables[i], RunMode::Lockstep, None);
         // What leaves nothing to tidy up ends at once with a signal; the runs themselves look at signals, and each tidies
         // up its link. One must not end while another runs: hence one step after the other. Plants are made in order:

@@ -2,6 +2,7 @@
 
 mod cases;
 mod encoded_table;
+mod forecast;
 mod lockstep;
 mod progress;
 
@@ -21,6 +22,7 @@ use sha2::{Digest, Sha256};
 
 use self::cases::{Case, cases};
 pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
+use self::forecast::Forecast;
 pub use self::progress::{Progress, Silent};
 use super::causes::{CausesResult, Examined};
 use super::describe;
@@ -148,6 +150,7 @@ pub struct Comparison<'p> {
     simulation: Simulation,
     options: ComparisonOptions,
     progress: &'p dyn Progress,
+    forecast: Forecast,
     started: Instant,
     cases: Vec<Case>,
     studied: Vec<Studied>,
@@ -197,8 +200,18 @@ impl<'p> Comparison<'p> {
             }
         }
         let cases = cases([options.tissue, options.table_tissue], &scene, given.as_ref().map(|given| &given.table))?;
-        let mut comparison =
-            Self { scene, simulation, options, progress, started, cases, studied: Vec::new(), tables: Vec::new() };
+        let mut comparison = Self {
+            scene,
+            simulation,
+            options,
+            progress,
+            forecast: Forecast::default(),
+            started,
+            cases,
+            studied: Vec::new(),
+            tables: Vec::new(),
+        };
+        comparison.forecast = Forecast::of(comparison.parts());
         comparison.study()?;
         comparison.tables = comparison.compute_tables(given.as_ref())?;
         Ok(comparison)
@@ -241,18 +254,34 @@ impl<'p> Comparison<'p> {
         &self.simulation
     }
 
-    fn study(&mut self) -> Result<(), SimError> {
-        let occurs = |tissue| {
-            let is_its = move |case: &Case| case.tissue == tissue || case.table_tissue == tissue;
-            self.cases.iter().any(is_its)
+    /// The tissues of all cases.
+    fn tissues(&self) -> Vec<TissueVariant> {
+        let occurs = |tissue: &TissueVariant| {
+            self.cases.iter().any(|case| case.tissue == *tissue || case.table_tissue == *tissue)
         };
-        let tissues: Vec<TissueVariant> = TissueVariant::ALL.into_iter().filter(|tissue| occurs(*tissue)).collect();
+        TissueVariant::ALL.into_iter().filter(occurs).collect()
+    }
+
+    /// Whether a table of this tissue has to be computed.
+    fn needs_table(&self, tissue: TissueVariant) -> bool {
+        self.options.table.is_none() && self.cases.iter().any(|case| case.table_tissue == tissue)
+    }
+
+    fn is_in_free_run(&self, case: &Case) -> bool {
+        match self.options.mode {
+            None => !case.is_mismatch && self.options.hardware == Hardware::Native,
+            Some(mode) => mode == RunMode::FreeRun,
+        }
+    }
+
+    fn study(&mut self) -> Result<(), SimError> {
+        let tissues = self.tissues();
         let studies: u64 = tissues.iter().map(|tissue| steps(&tissue.of(&self.scene))).sum();
         let ticks = (self.simulation.duration_s * self.simulation.loop_settings.rate) as u64;
         let runs: u64 = self.cases.iter().map(|case| case.runs(self.options.mode)).sum();
         self.progress.begin(studies + runs * ticks);
         for tissue in tissues {
-            self.progress.say(&format!("{tissue}: placement"));
+            self.begins(&format!("{tissue}: placement"));
             let step = || self.progress.step();
             let options = PlacementOptions { threads: self.options.threads, progress: &step, newton: None };
             let simulated = tissue.of(&self.scene);
@@ -272,10 +301,10 @@ impl<'p> Comparison<'p> {
     /// A table for every case; those that are not given are computed on all threads, one for each tissue.
     fn compute_tables(&self, given: Option<&EncodedTable>) -> Result<Vec<EncodedTable>, SimError> {
         let loop_settings = &self.simulation.loop_settings;
-        let needed = |tissue: &TissueVariant| given.is_none() && self.cases.iter().any(|c| c.table_tissue == *tissue);
+        let needed = |tissue: &TissueVariant| self.needs_table(*tissue);
         let tissues: Vec<TissueVariant> = TissueVariant::ALL.into_iter().filter(needed).collect();
         if !tissues.is_empty() {
-            self.progress.say("controller tables");
+            self.begins("controller tables");
         }
         let computed = parallel::map(tissues.len(), self.options.threads, |i| self.compute_table(tissues[i]));
         let computed: Vec<EncodedTable> = computed.into_iter().collect::<Result<_, _>>()?;
@@ -308,7 +337,7 @@ impl<'p> Comparison<'p> {
 
     /// `none` and `static` of all cases, on all threads: nothing in them runs in real time.
     fn uncontrolled(&self) -> Result<Vec<Uncontrolled>, SimError> {
-        self.progress.say("strategies without a controller");
+        self.begins("strategies without a controller");
         let jobs: Vec<(usize, Option<u32>, Strategy)> = self
             .cases
             .iter()
@@ -369,12 +398,8 @@ impl<'p> Comparison<'p> {
             dynamic: dynamic.map(&mut keep),
             dynamic_free_run: None,
         };
-        let free_run = match self.options.mode {
-            None => !case.is_mismatch && self.options.hardware == Hardware::Native,
-            Some(mode) => mode == RunMode::FreeRun,
-        };
-        if free_run {
-            self.progress.say(&format!("{}: dynamic, {}", case.tissue, RunMode::FreeRun));
+        if self.is_in_free_run(case) {
+            self.begins(&format!("{}: dynamic, {}", case.tissue, RunMode::FreeRun));
             let step = || self.progress.step();
             let insertion = self.insertion(case, case.label(Strategy::dynamic(RunMode::FreeRun)), &step);
             let controlled = insertion.controlled(&self.controller(table, RunMode::FreeRun, spectator))?;

@@ -1,5 +1,7 @@
 //! Who is told how far a long computation has come.
 
+use model_offline::output::terminal::LongRun;
+
 /// Somebody who wants to know how far a comparison has come.
 pub trait Progress: Sync {
     /// So many steps there will be.
@@ -13,6 +15,11 @@ pub trait Progress: Sync {
     /// What is being done from now on.
     fn say(&self, what: &str) {
         let _ = what;
+    }
+
+    /// As far as is known, what is being done will take so long, and what comes then so long, s.
+    fn expect(&self, this_s: f64, then_s: f64) {
+        let _ = (this_s, then_s);
     }
 }
 
@@ -33,5 +40,23 @@ impl Progress for indicatif::ProgressBar {
 
     fn say(&self, what: &str) {
         self.set_message(what.to_owned());
+    }
+}
+
+impl Progress for LongRun {
+    fn begin(&self, steps: u64) {
+        self.bar.set_length(steps);
+    }
+
+    fn step(&self) {
+        self.bar.inc(1);
+    }
+
+    fn say(&self, what: &str) {
+        self.bar.set_message(what.to_owned());
+    }
+
+    fn expect(&self, this_s: f64, then_s: f64) {
+        self.left.expect(this_s, then_s);
     }
 }
