@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use assert_cmd::Command as Checked;
+use host_sim::bench::result::RunResult;
+use model_offline::output::field_picture::Field;
+use model_offline::output::result_file::{Which, read_body};
 
 fn host_sim() -> Checked {
     Checked::new(env!("CARGO_BIN_EXE_host-sim"))
@@ -112,6 +115,24 @@ fn check_schema(folder: &Path) {
     python("jsonschema", folder, program);
 }
 
+/// What `model-offline draw` makes pictures of: every strategy's body, at the depth that is asked for, with every field.
+fn check_bodies(report: &Path) {
+    let result = report.join("result.json");
+    let whole: RunResult = serde_json::from_slice(&std::fs::read(&result).unwrap()).unwrap();
+    for (strategy, found) in whole.cases[0].strategies.iter().map(|(strategy, found)| (strategy.to_string(), found)) {
+        for frame in &found.frames {
+            let which = Which { strategy: Some(strategy.clone()), depth: Some(frame.depth), ..Which::default() };
+            let body = read_body(&result, &which).unwrap();
+            assert_eq!((body.depth, &body.nodes, &body.strain), (frame.depth, &frame.nodes, &frame.strain));
+            assert_eq!((body.paddle, &body.units), (found.paddle, &whole.units));
+            let fields = Field::ALL.map(|(_, field)| field.values(&body).unwrap());
+            assert!(fields.iter().all(|values| values.len() == whole.geometry.nodes.len()));
+        }
+    }
+    let error = read_body(&result, &Which { strategy: Some("dynamic-free-run".to_owned()), ..Which::default() });
+    assert!(error.unwrap_err().to_string().contains("case 1 has no dynamic-free-run"));
+}
+
 #[test]
 fn a_run_can_be_opened_elsewhere() {
     let folder = tempfile::tempdir().unwrap();
@@ -120,6 +141,7 @@ fn a_run_can_be_opened_elsewhere() {
     check_series(&report);
     check_mcap(folder.path(), &report, rows);
     check_vtu(&report);
+    check_bodies(&report);
     check_schema(folder.path());
 }
 

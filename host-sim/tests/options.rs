@@ -58,7 +58,7 @@ const HOST_SIM: [(&str, &str); 17] = [
 const MODEL_OFFLINE: [(&str, &str); 16] = [
     ("place", "paper --quiet --json OUT/a.json"),
     ("check", "paper --json OUT/a.json"),
-    ("draw", "paper -o OUT/a.svg"),
+    ("draw", "IN/report/result.json -o OUT/a.svg"),
     ("solve", "paper --paddle 3 --depth 0.01 --json OUT/a.json"),
     ("table", "paper --paddle 3 -o OUT/a.table"),
     ("stability", "paper --quick --out OUT/stability"),

@@ -690,8 +690,8 @@ fn draw_writes_a_whole_picture_or_nothing() {
     assert_eq!(whole, scene_picture::svg(&Scene::parse(BLOCK, "block").unwrap()));
     // Other endings, the scene itself, a folder that is not there, a folder: refused, and what is there stays as it is.
     for (output, reason) in [
-        (folder.path().join("a.png"), "pictures are written as SVG"),
-        (folder.path().join("a.svg.gz"), "pictures are written as SVG"),
+        (folder.path().join("a.gif"), "pictures are written as .svg, .png or .pdf"),
+        (folder.path().join("a.svg.gz"), "pictures are written as .svg, .png or .pdf"),
         (folder.path().join("absent/a.svg"), "nothing can be written in its directory"),
         (folder.path().to_owned(), "a directory is in its place"),
     ] {

@@ -1,24 +1,12 @@
 //! Scene, model and placement study in the words of the result.
 
-use model_offline::geometry::Point2;
-use model_offline::model::TissueModel;
 use model_offline::placement::{PlacementStudy, StaticStudy};
 use model_offline::scene::Scene;
 
-use super::result::{
-    Geometry, NoPaddlePlacement, PaddleGeometry, PaddlePlacement, PlacementResult, SimulationSettings,
-};
+use super::result::{NoPaddlePlacement, PaddlePlacement, PlacementResult, SimulationSettings};
 use super::study_failure::StudyFailure;
 use crate::world::simulation::Simulation;
 use model_offline::scene::TissueVariant;
-
-fn point(point: &Point2) -> [f64; 2] {
-    [point.x, point.y]
-}
-
-fn path(points: &[Point2]) -> Vec<[f64; 2]> {
-    points.iter().map(point).collect()
-}
 
 /// Settings of the simulation.
 pub fn settings(scene: &Scene, simulation: &Simulation, table_knows_the_world: bool) -> SimulationSettings {
@@ -43,28 +31,6 @@ pub fn settings(scene: &Scene, simulation: &Simulation, table_knows_the_world: b
         paddle_gain: actuator.gain,
         paddle_max_rate: actuator.max_rate,
         paddle_max_displacement: scene.actuator.max_displacement,
-    }
-}
-
-/// The scene at rest; inclusions are those of the scene file, whatever tissue is simulated.
-pub fn geometry(scene: &Scene, model: &TissueModel) -> Geometry {
-    Geometry {
-        outline: path(scene.outline.vertices()),
-        immobile: scene.immobile.iter().map(|part| path(part)).collect(),
-        needle_contact: path(&scene.needle.contact),
-        needle_axis: point(&scene.needle.axis),
-        orthogonal: point(&scene.needle.orthogonal()),
-        target: point(&scene.target),
-        paddles: scene
-            .paddles
-            .iter()
-            .map(|paddle| PaddleGeometry {
-                index: paddle.index,
-                segment: [point(&paddle.segment[0]), point(&paddle.segment[1])],
-            })
-            .collect(),
-        inclusions: scene.inclusions.iter().map(|inclusion| path(inclusion.outline.vertices())).collect(),
-        nodes: path(model.positions()),
     }
 }
 

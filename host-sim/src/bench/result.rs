@@ -4,6 +4,7 @@
 
 use firmware::{Faults, Mode};
 use model_offline::discretization::Integration;
+pub use model_offline::output::{Geometry, PaddleGeometry};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -131,38 +132,6 @@ impl SimulationSettings {
             if self.table_knows_the_world { "tables know of it what a table can" } else { "tables do not know it" };
         format!("{}; {knows}", self.world.join(", "))
     }
-}
-
-/// The undeformed scene.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct Geometry {
-    /// The body's outline.
-    pub outline: Vec<[f64; 2]>,
-    /// Immobile parts of the boundary.
-    pub immobile: Vec<Vec<[f64; 2]>>,
-    /// Tissue that moves with the needle.
-    pub needle_contact: Vec<[f64; 2]>,
-    /// Unit direction of insertion.
-    pub needle_axis: [f64; 2],
-    /// Unit direction orthogonal to it.
-    pub orthogonal: [f64; 2],
-    /// Target at rest.
-    pub target: [f64; 2],
-    /// Paddle positions.
-    pub paddles: Vec<PaddleGeometry>,
-    /// Inclusions of the tissue `inclusion`.
-    pub inclusions: Vec<Vec<[f64; 2]>>,
-    /// Nodes at rest.
-    pub nodes: Vec<[f64; 2]>,
-}
-
-/// A paddle position.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PaddleGeometry {
-    /// Its index in the scene.
-    pub index: u32,
-    /// Its two ends.
-    pub segment: [[f64; 2]; 2],
 }
 
 /// The placement study of one tissue.

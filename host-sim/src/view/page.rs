@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use super::shared::{Shared, ViewState};
-use crate::report::page::mesh;
 use crate::runtime::names;
+use model_offline::output::surface::triangles;
 
 /// One file: no network but the events of its own address.
 pub(super) const PAGE: &str = include_str!("page.html");
@@ -28,7 +28,7 @@ pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
         "mode": state.mode.map(|mode| mode.to_string()),
         "unit": scene.length_unit,
         "outline": outline,
-        "triangles": mesh(&nodes, &outline),
+        "triangles": triangles(&nodes, &outline),
         "nodes": nodes,
         "immobile": scene.immobile.iter().map(|part| path(part)).collect::<Vec<_>>(),
         "inclusions": scene.inclusions.iter().map(|i| path(i.outline.vertices())).collect::<Vec<_>>(),

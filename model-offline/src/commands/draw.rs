@@ -1,10 +1,11 @@
-//! `model-offline draw`: a scene as a picture.
+//! `model-offline draw`: a scene, or a result, as a picture.
 
 use super::check::warned;
 use super::common::SceneArgs;
 use super::error::CliError;
-use model_offline::output;
-use model_offline::output::{check_outputs, scene_picture};
+use model_offline::output::field_picture::{self, Field};
+use model_offline::output::result_file::{Which, read_body};
+use model_offline::output::{PictureFormat, check_outputs, scene_picture, write_picture};
 use std::path::PathBuf;
 
 /// Options of `draw`.
@@ -12,25 +13,61 @@ use std::path::PathBuf;
 pub(super) struct DrawArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Where to write the picture: a .svg file.
+    /// Where to write the picture: a .svg, .png or .pdf file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// What the colours of a result show; a result is a .json file of `solve --json` or `host-sim run` in place of a scene.
+    #[arg(long, value_parser = field)]
+    field: Option<Field>,
+    /// Number of the case of a result of `host-sim run` [default: 1]
+    #[arg(long, value_name = "N")]
+    case: Option<usize>,
+    /// Strategy of that case [default: dynamic]
+    #[arg(long, value_parser = ["none", "static", "dynamic", "dynamic-free-run"])]
+    strategy: Option<String>,
+    /// The state nearest to this needle depth, length units [default: the deepest]
+    #[arg(long, value_name = "LENGTH")]
+    depth: Option<f64>,
+}
+
+fn field(word: &str) -> Result<Field, String> {
+    let found = Field::ALL.iter().find(|(name, _)| *name == word);
+    let names = || Field::ALL.map(|(name, _)| name).join(", ");
+    found.map(|(_, field)| *field).ok_or_else(|| format!("one of {}", names()))
 }
 
 pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
-    let extension = args.output.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    if extension.is_some_and(|extension| extension != "svg") {
+    PictureFormat::of(&args.output)?;
+    let is_result = args.scene.scene.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
+    if is_result {
+        return draw_result(args);
+    }
+    if args.field.is_some() || args.case.is_some() || args.strategy.is_some() || args.depth.is_some() {
         return Err(CliError::usage(
-            format!("--output {}: pictures are written as SVG", args.output.display()),
-            format!(
-                "-o {}; browsers, Inkscape and rsvg-convert make other formats of it",
-                args.output.with_extension("svg").display()
-            ),
+            "--field, --case, --strategy and --depth are for results, and a scene at rest has none",
+            "draw DIR/result.json of `host-sim run`, or what `solve SCENE --depth D --json FILE` writes",
         ));
     }
     let scene = args.scene.read_any()?;
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
-    output::write_whole(&args.output, scene_picture::svg(&scene).as_bytes())?;
+    write_picture(&args.output, &scene_picture::svg(&scene))?;
     eprint!("{}", warned(&scene.told_warnings()));
     Ok(())
+}
+
+fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
+    let result = &args.scene.scene;
+    check_outputs(&[result], &[("--output", Some(&args.output))])?;
+    let which = Which { case: args.case, strategy: args.strategy.clone(), depth: args.depth };
+    let body = read_body(result, &which)?;
+    let field = args.field.unwrap_or(Field::Size);
+    let Some(values) = field.values(&body) else {
+        let there: Vec<&str> =
+            Field::ALL.iter().filter(|(_, field)| field.values(&body).is_some()).map(|(name, _)| *name).collect();
+        return Err(CliError::usage(
+            format!("{}: it does not have this field", result.display()),
+            format!("--field {}; tissue that relaxes has no stress that a displacement tells", there.join(" or ")),
+        ));
+    };
+    Ok(write_picture(&args.output, &field_picture::svg(&body, field, &values))?)
 }

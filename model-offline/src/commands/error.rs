@@ -3,7 +3,8 @@
 use super::json;
 use model_offline::model::ModelError;
 use model_offline::needle::NeedleError;
-use model_offline::output::{OutputError, OutputRefused};
+use model_offline::output::result_file::ResultError;
+use model_offline::output::{OutputError, OutputRefused, PictureError};
 use model_offline::scene::{LimitError, Scene, SceneError};
 use model_offline::solver::equilibrium::Failure;
 use model_offline::study::effects::EffectsError;
@@ -69,6 +70,14 @@ pub(crate) enum CliError {
     /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
+    /// A picture could not be made or written.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Picture(#[from] PictureError),
+    /// A result cannot be drawn.
+    #[error(transparent)]
+    #[diagnostic(transparent)]
+    Result(#[from] ResultError),
 }
 
 impl From<TableBuildError> for CliError {
@@ -122,7 +131,7 @@ impl CliError {
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
             Self::Model(error) if error.is_usage() => 2,
             Self::Table(TableBuildError::Knots(_)) => 2,
-            Self::Needle(NeedleError::HeldWeakly) => 2,
+            Self::Needle(NeedleError::HeldWeakly) | Self::Picture(PictureError::Format { .. }) | Self::Result(_) => 2,
             _ => 1,
         }
     }
@@ -135,7 +144,8 @@ impl CliError {
             Self::Needle(_) => "no-shaft-forces".into(),
             Self::World(_) => "no-insertion".into(),
             Self::Table(_) => "no-table".into(),
-            Self::Output(_) => "not-written".into(),
+            Self::Output(_) | Self::Picture(_) => "not-written".into(),
+            Self::Result(_) => "bad-input".into(),
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => "bad-input".into(),
         }
     }

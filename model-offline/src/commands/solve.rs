@@ -8,7 +8,7 @@ use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
 use model_offline::output;
 use model_offline::output::vtu::{self, Shown};
-use model_offline::output::{State, body, check_outputs, has_stress};
+use model_offline::output::{Geometry, NodalFields, State, body, check_outputs, has_stress};
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
@@ -246,6 +246,7 @@ fn write(
     let jacobian = args.paddle.map(|_| solved.jacobian()).transpose()?;
     let nodal = model.nodal_displacements(solved.coefficients()).map_err(ModelError::from)?;
     let point = |p: &Vector2<f64>| [p.x, p.y];
+    let fields = NodalFields::new(model, solved.coefficients());
     let mut document = serde_json::json!({
         "scene": scene.name, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
         "integration": scene.discretization.method.integration,
@@ -257,6 +258,8 @@ fn write(
         "newton_iterations": solved.equilibrium().effort().iterations,
         "node_positions": model.positions().iter().map(point).collect::<Vec<_>>(),
         "node_displacements": nodal.iter().map(point).collect::<Vec<_>>(),
+        "units": [&scene.length_unit, &scene.stress_unit], "geometry": Geometry::new(scene, model.positions()),
+        "strain": fields.strain, "von_mises": fields.von_mises,
         "failure": null,
     });
     if let (serde_json::Value::Object(needle), Some(document)) =

@@ -3,13 +3,20 @@
 pub mod body;
 pub mod chart;
 pub mod csv;
+pub mod field_picture;
+mod geometry;
+mod picture_file;
 mod preflight;
+pub mod result_file;
 pub mod scene_picture;
 mod state;
+pub mod surface;
 pub mod table_text;
 pub mod terminal;
 pub mod vtu;
 
+pub use geometry::{Geometry, PaddleGeometry};
+pub use picture_file::{PictureError, PictureFormat, write_picture};
 pub use preflight::{OutputRefused, RefusalReason, check_outputs};
 pub use state::{NodalFields, State, has_stress};
 

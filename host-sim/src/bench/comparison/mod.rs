@@ -12,6 +12,7 @@ use std::time::Instant;
 use firmware::Controller;
 use firmware::contract::Table;
 use model_offline::model::{ModelError, TissueModel};
+use model_offline::output::Geometry;
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
 use model_offline::placement::study::steps;
@@ -480,7 +481,7 @@ impl<'p> Comparison<'p> {
             mode: self.options.mode.unwrap_or(RunMode::Lockstep),
             seed: self.simulation.seed,
             settings: describe::settings(&self.scene, &self.simulation, self.options.table_knows_the_world),
-            geometry: describe::geometry(&self.scene, &self.studied[0].study.model),
+            geometry: Geometry::new(&self.scene, self.studied[0].study.model.positions()),
             placements: self.placements(),
             cases,
             wall_s: self.started.elapsed().as_secs_f64(),

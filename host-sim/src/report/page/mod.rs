@@ -17,7 +17,6 @@ mod timing;
 mod view;
 
 pub use self::attachments::Attachments;
-pub(crate) use self::view::mesh;
 
 #[cfg(test)]
 mod tests;

@@ -8,6 +8,7 @@ use serde::Serialize;
 use model_offline::output::chart::number::{in_unit, number};
 use model_offline::output::chart::style::band;
 use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
+use model_offline::output::surface;
 
 use super::embed::inline;
 use super::view::{PlaneView, along, inside, middle};
@@ -140,7 +141,7 @@ impl Surface {
             .filter(|displacement| displacement.is_finite())
             .fold(0.0, f64::max);
         Self {
-            triangles: super::view::triangles(geometry),
+            triangles: surface::triangles(&geometry.nodes, &geometry.outline),
             boundary: super::view::boundary(geometry, view.extent),
             view,
             largest: largest.max(f64::MIN_POSITIVE),

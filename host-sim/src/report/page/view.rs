@@ -1,7 +1,8 @@
 //! The plane of the scene on paper, and the body's nodes as a surface.
 
 use model_offline::output::chart::{Plane, Px};
-use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
+use model_offline::output::surface::edges;
+pub(super) use model_offline::output::surface::{inside, middle};
 
 use crate::bench::result::{Geometry, RunResult};
 
@@ -86,60 +87,9 @@ impl Bounds {
     }
 }
 
-/// Mean of points.
-pub(super) fn middle(points: &[[f64; 2]]) -> [f64; 2] {
-    [0, 1].map(|i| points.iter().map(|point| point[i]).sum::<f64>() / points.len().max(1) as f64)
-}
-
 /// A point some way along a direction.
 pub(super) fn along(from: [f64; 2], direction: [f64; 2], way: f64) -> [f64; 2] {
     [from[0] + direction[0] * way, from[1] + direction[1] * way]
-}
-
-/// Whether a point is inside of a polygon.
-pub(super) fn inside(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
-    edges(polygon)
-        .filter(|([ax, ay], [bx, by])| (ay > &y) != (by > &y) && x < ax + (y - ay) / (by - ay) * (bx - ax))
-        .count()
-        % 2
-        == 1
-}
-
-fn edges(polygon: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
-    polygon.iter().copied().zip(polygon.iter().copied().cycle().skip(1))
-}
-
-struct Site {
-    position: Point2<f64>,
-    index: usize,
-}
-
-impl HasPosition for Site {
-    type Scalar = f64;
-    fn position(&self) -> Point2<f64> {
-        self.position
-    }
-}
-
-/// Triangles between nodes that cover the body; none when they cannot be formed.
-pub(super) fn triangles(geometry: &Geometry) -> Vec<[usize; 3]> {
-    mesh(&geometry.nodes, &geometry.outline)
-}
-
-/// The same for nodes in an outline.
-pub(crate) fn mesh(nodes: &[[f64; 2]], outline: &[[f64; 2]]) -> Vec<[usize; 3]> {
-    let sites = nodes.iter().enumerate();
-    let sites = sites.map(|(index, [x, y])| Site { position: Point2::new(*x, *y), index }).collect();
-    let Ok(triangulation) = DelaunayTriangulation::<Site>::bulk_load(sites) else {
-        return Vec::new();
-    };
-    let smallest = 1e-6 * triangulation.inner_faces().map(|face| face.area()).fold(0.0, f64::max);
-    triangulation
-        .inner_faces()
-        .filter(|face| face.area() > smallest)
-        .map(|face| face.vertices().map(|vertex| vertex.data().index))
-        .filter(|corners| inside(outline, middle(&corners.map(|corner| nodes[corner]))))
-        .collect()
 }
 
 /// Nodes on the outline, in its order.

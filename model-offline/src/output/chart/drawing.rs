@@ -91,7 +91,8 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
 /// A text in lines that are at most this wide; a single word may be wider.
 pub(super) fn wrap(text: &str, width: f64, size: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
+    // What may not be parted, as a number and its power of ten, is one word.
+    for word in text.split([' ', '\n']).filter(|word| !word.is_empty()) {
         match lines.last_mut() {
             Some(line) if text_width(&format!("{line} {word}"), size) <= width => {
                 line.push(' ');

@@ -1,0 +1,219 @@
+//! Results read again to be drawn: what `model-offline solve --json` and `host-sim run` wrote.
+
+use super::geometry::Geometry;
+use serde::Deserialize;
+use std::path::{Path, PathBuf};
+
+/// A body in a state, as a result has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultBody {
+    /// What it is: scene, tissue, paddle.
+    pub name: String,
+    /// Units of length and stress; "1" where a scene names none.
+    pub units: [String; 2],
+    /// The scene at rest.
+    pub geometry: Geometry,
+    /// Needle depth, length.
+    pub depth: f64,
+    /// The paddle that is attached.
+    pub paddle: Option<u32>,
+    /// Nodes there.
+    pub nodes: Vec<[f64; 2]>,
+    /// Norm of the Green–Lagrange strain at every node; empty in results of older versions.
+    pub strain: Vec<f64>,
+    /// Von Mises stress at every node, stress; empty where the displacement does not tell it.
+    pub von_mises: Vec<f64>,
+}
+
+/// Which of a result's states is wanted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Which {
+    /// Number of the case in a comparison, from 1 on; none: the first one.
+    pub case: Option<usize>,
+    /// `none`, `static`, `dynamic` or `dynamic-free-run`; none: the first of `dynamic`, `dynamic-free-run`, `static` and `none`
+    /// that the case has.
+    pub strategy: Option<String>,
+    /// The depth, length; none: the deepest state.
+    pub depth: Option<f64>,
+}
+
+/// Why a result cannot be drawn.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+pub enum ResultError {
+    /// It cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no result.
+    #[error("{}: neither a result of `model-offline solve --json` nor of `host-sim run`: {reason}", path.display())]
+    #[diagnostic(help(
+        "a comparison's is DIR/result.json; results of `solve` of older versions have no geometry: solve again"
+    ))]
+    NotAResult {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// What is asked for is not in it.
+    #[error("{}: {what}", path.display())]
+    #[diagnostic(help("{help}"))]
+    NotInIt {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        what: String,
+        /// What there is.
+        help: String,
+    },
+}
+
+/// As `solve` writes it, of this as much as is drawn.
+#[derive(Debug, Deserialize)]
+struct Solved {
+    scene: String,
+    tissue: String,
+    units: [String; 2],
+    geometry: Geometry,
+    paddle: Option<u32>,
+    depth: f64,
+    node_displacements: Vec<[f64; 2]>,
+    strain: Vec<f64>,
+    von_mises: Option<Vec<f64>>,
+}
+
+/// As `run` writes it.
+#[derive(Debug, Deserialize)]
+struct Compared {
+    scene: String,
+    units: [String; 2],
+    geometry: Geometry,
+    cases: Vec<Case>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Case {
+    tissue: String,
+    table_tissue: String,
+    strategies: serde_json::Map<String, serde_json::Value>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Strategy {
+    paddle: Option<u32>,
+    frames: Vec<Frame>,
+}
+
+#[derive(Debug, Deserialize)]
+struct Frame {
+    depth: f64,
+    nodes: Vec<[f64; 2]>,
+    #[serde(default)]
+    strain: Vec<f64>,
+    #[serde(default)]
+    von_mises: Vec<f64>,
+}
+
+/// Strategies in the order in which they are looked for.
+const STRATEGIES: [&str; 4] = ["dynamic", "dynamic-free-run", "static", "none"];
+
+/// Reads one state of a result.
+///
+/// # Errors
+/// [`ResultError`].
+pub fn read_body(path: &Path, which: &Which) -> Result<ResultBody, ResultError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ResultError::Read { path: path.to_owned(), source })?;
+    let no_result =
+        |error: serde_json::Error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() };
+    let value: serde_json::Value = serde_json::from_str(&text).map_err(no_result)?;
+    let is_compared = value.get("cases").is_some();
+    let body = if is_compared {
+        compared(path, serde_json::from_value(value).map_err(no_result)?, which)?
+    } else {
+        solved(path, serde_json::from_value(value).map_err(no_result)?, which)?
+    };
+    let nodes = body.geometry.nodes.len();
+    let fits = |values: &[f64]| values.is_empty() || values.len() == nodes;
+    if body.nodes.len() != nodes || !fits(&body.strain) || !fits(&body.von_mises) {
+        let reason = format!("not every one of its {nodes} nodes has a place and a value");
+        return Err(ResultError::NotAResult { path: path.to_owned(), reason });
+    }
+    Ok(body)
+}
+
+fn solved(path: &Path, solved: Solved, which: &Which) -> Result<ResultBody, ResultError> {
+    if *which != Which::default() {
+        return Err(ResultError::NotInIt {
+            path: path.to_owned(),
+            what: "a result of `solve` has one state".to_owned(),
+            help: "leave --case, --strategy and --depth out".to_owned(),
+        });
+    }
+    let Solved { scene, tissue, units, geometry, paddle, depth, node_displacements, strain, von_mises } = solved;
+    let moved = geometry.nodes.iter().zip(&node_displacements).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]);
+    Ok(ResultBody {
+        name: format!("{scene}, {tissue}, {}", attached(paddle)),
+        nodes: moved.collect(),
+        von_mises: von_mises.unwrap_or_default(),
+        units,
+        geometry,
+        depth,
+        paddle,
+        strain,
+    })
+}
+
+fn attached(paddle: Option<u32>) -> String {
+    paddle.map_or_else(|| "no paddle".to_owned(), |index| format!("paddle {index}"))
+}
+
+fn compared(path: &Path, mut compared: Compared, which: &Which) -> Result<ResultBody, ResultError> {
+    let missing = |what: String, help: String| ResultError::NotInIt { path: path.to_owned(), what, help };
+    let (number, count) = (which.case.unwrap_or(1), compared.cases.len());
+    if !(1..=count).contains(&number) {
+        let names = compared.cases.iter().zip(1..).map(|(case, k)| format!("{k}: {}", case.name()));
+        return Err(missing(format!("it has no case {number}"), names.collect::<Vec<_>>().join("; ")));
+    }
+    let case = compared.cases.swap_remove(number - 1);
+    let get = |name: &str| case.strategies.get(&name.replace('-', "_")).filter(|strategy| !strategy.is_null());
+    let there: Vec<&str> = STRATEGIES.into_iter().filter(|name| get(name).is_some()).collect();
+    let wanted = which.strategy.as_deref().or(there.first().copied()).unwrap_or("any strategy");
+    let found =
+        get(wanted).cloned().ok_or_else(|| missing(format!("case {number} has no {wanted}"), there.join(", ")))?;
+    let found: Strategy = serde_json::from_value(found)
+        .map_err(|error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() })?;
+    if case.tissue == crate::scene::TissueVariant::Homogeneous.name() {
+        compared.geometry.inclusions.clear();
+    }
+    let depths = || found.frames.iter().map(|frame| frame.depth);
+    let deepest = depths().fold(f64::NEG_INFINITY, f64::max);
+    let depth = which.depth.unwrap_or(deepest);
+    let nearest = found.frames.into_iter().min_by(|a, b| (a.depth - depth).abs().total_cmp(&(b.depth - depth).abs()));
+    let Some(Frame { depth, nodes, strain, von_mises }) = nearest else {
+        return Err(missing(format!("case {number}, {wanted}, has no states"), there.join(", ")));
+    };
+    Ok(ResultBody {
+        name: format!("{}, {}, {}, {}", compared.scene, case.name(), wanted.replace('-', " "), attached(found.paddle)),
+        units: compared.units,
+        geometry: compared.geometry,
+        depth,
+        paddle: found.paddle,
+        nodes,
+        strain,
+        von_mises,
+    })
+}
+
+impl Case {
+    fn name(&self) -> String {
+        if self.tissue == self.table_tissue {
+            self.tissue.clone()
+        } else {
+            format!("{} (table: {})", self.tissue, self.table_tissue)
+        }
+    }
+}

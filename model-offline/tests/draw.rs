@@ -1,0 +1,92 @@
+//! Results as pictures: every field in every format, and what is refused.
+
+use assert_cmd::Command;
+use std::path::{Path, PathBuf};
+
+fn model_offline() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_model-offline"))
+}
+
+/// A result of `solve` on the paper's scene.
+fn solved(folder: &Path, arguments: &[&str]) -> PathBuf {
+    let result = folder.join("solved.json");
+    model_offline()
+        .args(["solve", "paper", "--depth", "0.05", "--spacing", "0.1", "--quiet", "--json"])
+        .arg(&result)
+        .args(arguments)
+        .assert()
+        .success();
+    result
+}
+
+fn refused(result: &Path, arguments: &[&str]) -> String {
+    let out = result.with_file_name("refused.svg");
+    let assert = model_offline().arg("draw").arg(result).arg("-o").arg(&out).args(arguments).assert().code(2);
+    assert!(!out.exists());
+    String::from_utf8_lossy(&assert.get_output().stderr)
+        .replace(['\n', '│'], " ")
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ")
+}
+
+#[test]
+fn every_field_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = solved(folder.path(), &["--paddle", "2", "--paddle-displacement", "0.0,-0.02"]);
+    for field in ["size", "orthogonal", "strain", "von-mises"] {
+        let out = folder.path().join(format!("{field}.svg"));
+        model_offline().arg("draw").arg(&result).args(["--field", field, "-o"]).arg(&out).assert().success();
+        let svg = std::fs::read_to_string(&out).unwrap();
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let of = |class: &str| document.descendants().filter(|node| node.attribute("class") == Some(class)).count();
+        assert!((0..10).all(|band| of(&format!("f{band}")) > 0), "{field}: a colour is missing");
+        assert!(svg.contains("paper, inclusion, paddle 2: depth 0.05") && of("paddle best") == 1);
+    }
+    for (name, begins) in [("a.png", b"\x89PNG\r\n\x1a\n".as_slice()), ("a.pdf", b"%PDF-".as_slice())] {
+        let out = folder.path().join(name);
+        model_offline().arg("draw").arg(&result).arg("-o").arg(&out).assert().success();
+        let bytes = std::fs::read(&out).unwrap();
+        assert!(bytes.starts_with(begins) && bytes.len() > 10_000, "{name}: {} bytes", bytes.len());
+        // A scene becomes the same formats.
+        model_offline().args(["draw", "paper", "-o"]).arg(&out).assert().success();
+        assert!(std::fs::read(&out).unwrap().starts_with(begins));
+    }
+    // Words are in the page as text.
+    let page = std::fs::read(folder.path().join("a.pdf")).unwrap();
+    assert!(page.windows(5).any(|bytes| bytes == b"/Font"));
+}
+
+#[test]
+fn what_is_no_result_or_not_in_it_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = solved(folder.path(), &[]);
+    assert!(refused(&result, &["--case", "2"]).contains("has one state"));
+    assert!(refused(&result, &["--field", "temperature"]).contains("one of size, orthogonal, strain, von-mises"));
+    assert!(refused(Path::new(&folder.path().join("absent.json")), &[]).contains("cannot read"));
+    let value: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&result).unwrap()).unwrap();
+    let with = |change: &dyn Fn(&mut serde_json::Value)| {
+        let mut value = value.clone();
+        change(&mut value);
+        let file = folder.path().join("changed.json");
+        std::fs::write(&file, value.to_string()).unwrap();
+        file
+    };
+    assert!(refused(&with(&|v| v["geometry"] = serde_json::Value::Null), &[]).contains("neither a result of"));
+    assert!(refused(&with(&|v| *v = 3.into()), &[]).contains("neither a result of"));
+    let short = with(&|v| v["node_displacements"].as_array_mut().unwrap().truncate(5));
+    assert!(refused(&short, &[]).contains("nodes has a place"));
+    let short = with(&|v| v["strain"].as_array_mut().unwrap().truncate(5));
+    assert!(refused(&short, &["--field", "strain"]).contains("nodes has a place"));
+    let without = with(&|v| v["von_mises"] = serde_json::Value::Null);
+    assert!(refused(&without, &["--field", "von-mises"]).contains("--field size or orthogonal or strain"));
+    assert!(refused(&with(&|v| v["cases"] = serde_json::json!([])), &[]).contains("has no case 1"));
+    // Nothing that a file says is drawn out of it.
+    let far = with(&|v| v["node_displacements"][0] = serde_json::json!([1e308, -1e308]));
+    let out = folder.path().join("far.svg");
+    model_offline().arg("draw").arg(&far).arg("-o").arg(&out).assert().success();
+    let svg = std::fs::read_to_string(&out).unwrap();
+    assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    // A scene at rest has no fields.
+    assert!(refused(Path::new("paper"), &["--field", "strain"]).contains("a scene at rest has none"));
+}
