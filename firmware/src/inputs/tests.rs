@@ -227,6 +227,15 @@ fn a_depth_jumps_by_what_speed_and_resolution_explain() {
 }
 
 #[test]
+fn the_ends_of_what_is_plausible_are_plausible() {
+    let table = table();
+    let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
+    let (least, most) = runtime.plausible_depth;
+    let first = |depth: f64| checks_of(&runtime).needle(&at(MS, [depth, 0.0]), None, &NeedleMonitor::default()).is_ok();
+    assert_eq!([least.next_down(), least, most, most.next_up()].map(first), [false, true, true, false]);
+}
+
+#[test]
 fn a_depth_may_jump_by_the_limit_itself() {
     let table = table();
     let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();

@@ -725,6 +725,24 @@ mod tests {
         }
     }
 
+    /// A signal that stands exactly in the middle on its way up has risen once, and one that has moved by a step exactly has
+    /// not turned.
+    #[test]
+    fn a_rise_through_the_middle_is_one() {
+        let belief = BreathBelief { share: 1.0, step: 0.25 };
+        let mut swing = Swing::default();
+        let breath = [0.0, 1.0, 0.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 1.0];
+        let rises = breath.map(|measured| swing.watch(&belief, measured, 0.5));
+        let periods: std::vec::Vec<Option<f64>> = rises.into_iter().flatten().map(|rise| rise.period).collect();
+        assert_eq!(periods, [None, Some(2.0)]);
+        let mut still = Swing::default();
+        still.watch(&belief, 0.0, 0.5);
+        still.watch(&belief, 0.25, 0.5);
+        assert_eq!(still.rises, None);
+        still.watch(&belief, 0.25 + 1e-9, 0.5);
+        assert_eq!(still.rises, Some(true));
+    }
+
     /// A breath that is held ends the prediction; what is left is followed.
     #[test]
     fn a_held_breath_ends_it() {

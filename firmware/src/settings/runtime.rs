@@ -230,6 +230,7 @@ mod tests {
         close(runtime.paddle_resolution, 0.0001);
         close(runtime.plausible_speed, 1.0);
         close(runtime.depth_range(), 0.1);
+        close(Runtime { table_depth: (1.0, 3.0), ..runtime }.depth_range(), 2.0);
         close(runtime.plausible_depth.0, -0.1);
         close(runtime.plausible_depth.1, 0.2);
         close(runtime.unseen_motion(0.01), 0.1 * (0.01 + 0.005));
@@ -244,6 +245,20 @@ mod tests {
         assert_eq!(runtime.seen(faults), faults);
         let switched = Runtime { off: Faults::FROZEN | Faults::OVERRUN, ..runtime };
         assert_eq!(switched.seen(faults), Faults::INNOVATION);
+    }
+
+    #[test]
+    fn a_refusal_says_what_to_do() {
+        let good = Settings::new(MS, 20 * MS, 20 * MS);
+        for (settings, words) in [
+            (Settings { loop_period_ns: 0, ..good }, "loop period must be above 0"),
+            (Settings { target_period_ns: MS / 2, ..good }, "raise the loop rate"),
+            (Settings { target_latency_ns: 10_000 * MS, ..good }, "lower the latency"),
+            (Settings { target_noise: f64::NAN, ..good }, "must be"),
+        ] {
+            let refusal = Runtime::new(&table(), &settings).unwrap_err();
+            assert!(std::format!("{refusal}").contains(words), "{refusal}");
+        }
     }
 
     #[test]

@@ -23,6 +23,19 @@ fn a_start_moves_nothing_and_restarts_where_the_paddle_is() {
     panic!("never reached RUN");
 }
 
+/// Whoever placed the paddle beside its path had a reason: a sensor that shows next to nothing does not take it from there.
+#[test]
+fn a_paddle_beside_its_path_stays_there_until_the_target_says_otherwise() {
+    let table = table();
+    let mut closed = Loop::new(&table, &Settings { target_noise: 10.0, ..settings() });
+    let beside = Vector2::new(0.004, 0.001);
+    (closed.plant.paddle, closed.plant.speed) = (beside, 0.0);
+    closed.run(1000);
+    assert_eq!(closed.state.mode(), Mode::Run);
+    let command = Vector2::from(closed.last.unwrap().displacement);
+    assert!((command - beside).norm() < 0.02 * beside.norm(), "{command:?}");
+}
+
 #[test]
 fn the_ends_of_the_table_are_still_inside_of_it() {
     let table = table();

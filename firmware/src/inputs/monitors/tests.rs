@@ -212,6 +212,11 @@ fn divergence_needs_growth_and_corrections() {
     assert_eq!(trips(&slow, 0.0), None);
     let fast: Vec<f64> = (0..60).map(|i| floor * 1.1f64.powi(i)).collect();
     assert!(trips(&fast, 0.0).is_some());
+    let after = |samples: usize| {
+        let between = std::iter::repeat_n(1.9 * floor, samples - 1);
+        trips(&std::iter::once(1.1 * floor).chain(between).chain([2.3 * floor]).collect::<Vec<f64>>(), 0.0)
+    };
+    assert_eq!((after(12), after(13)), (Some(12), None), "the last sample of a window, and the first of the next");
     // With a needle that moves the lag counts: slope·speed·(d + 1/g)·T = 0.102·0.1·5·0.02.
     let lag = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt() * 0.1 * 5.0 * 0.02;
     assert!(lag > 2.0 * floor);

@@ -351,6 +351,59 @@ fn the_watchdog_is_not_tested_and_nothing_rearmed_in_run() {
 }
 
 #[test]
+fn the_watchdog_can_be_tested_and_a_run_rearmed_in_safe() {
+    let bytes = encoded(&table());
+    let mut requests = loading(&bytes, ClockSource::Frames);
+    let run = insertion::<f64>(200);
+    requests.extend(run.iter().flat_map(|(inputs, _)| requests_of(inputs)));
+    // Nothing but time goes on: too long for anybody who controls.
+    requests.extend((200..2000).map(|tick| Request::Time { tick, time_ns: tick * MS }));
+    requests.extend([Request::Rearm, Request::Time { tick: 2000, time_ns: 2000 * MS }, Request::TestWatchdog]);
+    let mut bench = Bench::default();
+    let replies = answers::<f64>(&mut bench, &requests);
+    let states = replies.iter().filter_map(|reply| match reply {
+        Reply::Command { command, .. } => Some(command.state),
+        _ => None,
+    });
+    let states: Vec<u32> = states.collect();
+    assert_eq!(states[states.len() - 2..], [Mode::Safe as u32, Mode::Hold as u32]);
+    assert!(!bench.hung && replies.contains(&Reply::Refused(Refusal::Order)), "not in SAFE any more");
+    let safe: Vec<Request<'_>> = requests.into_iter().filter(|request| *request != Request::Rearm).collect();
+    answers::<f64>(&mut bench, &safe);
+    assert!(bench.hung);
+}
+
+/// Every piece of a table is answered with how much of it is there.
+#[test]
+fn pieces_of_a_table_are_counted() {
+    let bytes = encoded(&table());
+    let taken: Vec<usize> = answers::<f64>(&mut Bench::default(), &loading(&bytes, ClockSource::Frames))
+        .iter()
+        .filter_map(|reply| if let Reply::Taken { bytes } = reply { Some(*bytes as usize) } else { None })
+        .collect();
+    let ends: Vec<usize> = (TABLE_CHUNK_BYTES..bytes.len()).step_by(TABLE_CHUNK_BYTES).chain([bytes.len()]).collect();
+    assert_eq!(taken, ends);
+}
+
+/// What a step took is the difference of two looks at the counter, also where it has begun again in between.
+#[test]
+fn the_counts_of_a_step_are_those_between_two_looks() {
+    let bytes = encoded(&table());
+    for counter in [0, COUNTER_MASK - 12_345] {
+        let mut requests = loading(&bytes, ClockSource::Frames);
+        requests.extend(insertion::<f64>(300).iter().flat_map(|(inputs, _)| requests_of(inputs)));
+        let mut bench = Bench { counter, speed: 700, ..Bench::default() };
+        let replies = answers::<f64>(&mut bench, &requests);
+        let counts = replies.iter().filter_map(|reply| match reply {
+            Reply::Command { counts, .. } => Some(*counts),
+            _ => None,
+        });
+        let counts: Vec<u32> = counts.collect();
+        assert!(counts.len() == 300 && counts.iter().all(|counts| *counts == 700), "from {counter}: {counts:?}");
+    }
+}
+
+#[test]
 fn a_host_that_knows_the_run_ends_it() {
     let bytes = encoded(&table());
     let mut requests = loading(&bytes, ClockSource::Frames);
