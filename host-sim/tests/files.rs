@@ -40,8 +40,22 @@ fn check_exports(folder: &Path, report: &Path) -> usize {
     let again = folder.join("again.mcap");
     let csv = folder.join("again.csv");
     let recording = report.join("inclusion-dynamic.rec");
-    host_sim().arg("export").arg(&recording).arg("--mcap").arg(&again).arg("--csv").arg(&csv).assert().success();
-    assert!(std::fs::read(&again).unwrap() == std::fs::read(report.join("inclusion-dynamic.mcap")).unwrap());
+    let export = |scene: &[&str], mcap: &Path| {
+        let mut export = host_sim();
+        export.arg("export").arg(&recording).arg("--mcap").arg(mcap).arg("--csv").arg(&csv).args(scene);
+        export.assert()
+    };
+    export(&["--scene", "paper"], &again).success();
+    let whole = std::fs::read(&again).unwrap();
+    assert!(whole == std::fs::read(report.join("inclusion-dynamic.mcap")).unwrap());
+    // Without the scene there is nothing to be seen, and all the rest; another scene is none.
+    let blind = folder.join("blind.mcap");
+    export(&[], &blind).success();
+    assert!(std::fs::read(&blind).unwrap().len() < whole.len());
+    let other = folder.join("other.mcap");
+    let refused = export(&["--scene", "breast"], &other).code(2);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("not the scene that was recorded"));
+    assert!(!other.exists());
     let text = std::fs::read_to_string(&csv).unwrap();
     let times: Vec<f64> = text.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
     assert!(times.len() > 800 && times.windows(2).all(|pair| pair[0] < pair[1]), "{} rows", times.len());
@@ -67,13 +81,18 @@ fn check_series(report: &Path) {
 fn check_mcap(folder: &Path, report: &Path, rows: usize) {
     let program = "import json\nfrom mcap.reader import make_reader\n\
          r = make_reader(open('inclusion-dynamic.mcap', 'rb'), validate_crcs=True)\n\
-         n, last, worst = 0, 0, 0.0\n\
+         n, last, worst, names, ids = 0, 0, 0.0, {}, set()\n\
          for schema, channel, message in r.iter_messages():\n\
          \x20   assert schema.encoding == 'jsonschema' and channel.message_encoding == 'json'\n\
          \x20   body = json.loads(message.data)\n\
          \x20   assert set(json.loads(schema.data)['properties']) == set(body), body\n\
          \x20   n += 1\n\
+         \x20   names[schema.name] = names.get(schema.name, 0) + 1\n\
+         \x20   if channel.topic == '/scene': ids |= {e['id'] for e in body['entities']}\n\
          \x20   if channel.topic == '/truth': worst = max(worst, abs(body['orthogonal_error']))\n\
+         assert ids == {'body at rest', 'target at rest', 'target', 'paddle', 'needle'}, ids\n\
+         assert names['foxglove.FrameTransform'] == 1 and names['foxglove.Log'] >= 2, names\n\
+         assert 25 <= names['foxglove.SceneUpdate'] <= 40, names\n\
          print(n, worst)\n";
     let Some(said) = python("mcap", report, program) else { return };
     let (count, worst) = said.trim().split_once(' ').unwrap();

@@ -49,7 +49,7 @@ const HOST_SIM: [(&str, &str); 17] = [
     ("rearm", "1"),
     ("replay", "IN/paper.rec"),
     ("board", "IN/paper.rec"),
-    ("export", "IN/paper.rec --csv OUT/a.csv"),
+    ("export", "IN/paper.rec --mcap OUT/a.mcap --csv OUT/a.csv"),
     ("schema", ""),
     ("completions", "bash"),
     ("man", "OUT/man"),

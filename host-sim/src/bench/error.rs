@@ -92,6 +92,13 @@ pub enum SimError {
         /// Name of the simulated scene.
         scene: String,
     },
+    /// A scene is not that of a recording.
+    #[error("{}: this is not the scene that was recorded, with or without its inclusions", scene.display())]
+    #[diagnostic(help("give the scene as it was simulated, effects of --world included, or leave --scene out"))]
+    NotTheRecordings {
+        /// The scene.
+        scene: PathBuf,
+    },
     /// A file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),
@@ -189,6 +196,7 @@ impl SimError {
             | Self::OutOfRange(_)
             | Self::Refused(_)
             | Self::OtherScene { .. }
+            | Self::NotTheRecordings { .. }
             | Self::Sensor(_)
             | Self::Usage(_)
             | Self::NoInclusion { .. }

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
+use host_sim::record::export::foxglove::Stage;
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::{Recording, Salvaged};
 
 use model_offline::output::check_outputs;
+use model_offline::scene::{Scene, TissueVariant};
 
 /// Options of `export`.
 #[derive(Args, Clone, Debug)]
@@ -21,6 +23,9 @@ pub(crate) struct ExportArgs {
     /// Write a table with a time column, for PlotJuggler and spreadsheets
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
+    /// The recording's scene, a file or the name of a bundled scene: MCAP then has what is to be seen, too
+    #[arg(long, value_name = "FILE", requires = "mcap")]
+    pub(crate) scene: Option<PathBuf>,
     /// Export the ticks before the damage of a recording that is damaged or cut off
     #[arg(long)]
     pub(crate) salvage: bool,
@@ -31,14 +36,17 @@ pub(crate) struct ExportArgs {
 /// # Errors
 /// [`SimError::Record`], [`SimError::File`].
 pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
-    check_outputs(&[&args.recording], &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
+    let inputs: Vec<&Path> = args.scene.iter().chain([&args.recording]).map(PathBuf::as_path).collect();
+    check_outputs(&inputs, &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
     let Salvaged { recording, damage } =
         if args.salvage { Recording::salvage(&args.recording)? } else { Recording::read(&args.recording)?.into() };
     let table = firmware::contract::decode::<f64, 2>(&recording.header.table)
         .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
     let mut said: Vec<String> = damage.map(|damage| format!("damaged: {damage}")).into_iter().collect();
     if let Some(path) = &args.mcap {
-        let bytes = mcap::encode(&recording, table.orthogonal.into(), mcap::NeedleForces::default())?;
+        let stage = args.scene.as_deref().map(|scene| stage(scene, &recording, table.paddle.index)).transpose()?;
+        let known = mcap::Known { stage: stage.as_ref(), ..mcap::Known::default() };
+        let bytes = mcap::encode(&recording, table.orthogonal.into(), known)?;
         said.push(written(path, &bytes)?);
     }
     if let Some(path) = &args.csv {
@@ -46,6 +54,15 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
     }
     println!("{} ticks, {}\n{}", recording.records.len(), recording.header.mode, said.join("\n"));
     Ok(())
+}
+
+/// The scene of a recording, with or without its inclusions.
+fn stage(path: &Path, recording: &Recording, paddle: u32) -> Result<Stage, SimError> {
+    let scene = Scene::read(path)?;
+    let is_its = |scene: &Scene| scene.hash() == recording.header.scene_hash;
+    let simulated = TissueVariant::ALL.map(|tissue| tissue.of(&scene)).into_iter().find(is_its);
+    let simulated = simulated.ok_or_else(|| SimError::NotTheRecordings { scene: path.to_owned() })?;
+    Ok(Stage::new(&simulated, paddle))
 }
 
 fn written(path: &Path, bytes: &[u8]) -> Result<String, SimError> {

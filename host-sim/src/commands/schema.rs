@@ -24,7 +24,7 @@ pub(crate) fn schema(subject: Subject) -> serde_json::Value {
         Subject::Result => schema_for!(RunResult).to_value(),
         Subject::Timing => schema_for!(TimingResult).to_value(),
         Subject::Mcap => {
-            mcap::schemas().into_iter().map(|(topic, schema)| (topic.to_owned(), schema.to_value())).collect()
+            mcap::schemas().into_iter().map(|(topic, _, schema)| (topic.to_owned(), schema.to_value())).collect()
         }
     }
 }

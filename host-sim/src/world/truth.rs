@@ -3,7 +3,7 @@
 use model_offline::needle::NeedleReading;
 
 /// The true state of the world at a tick.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Truth {
     /// Tick of the plant.
     pub tick: u64,

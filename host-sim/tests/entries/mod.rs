@@ -34,7 +34,7 @@ pub(crate) fn recording(bytes: &[u8]) {
         let table = csv::recording(&recording, &nalgebra::Vector2::x(), "mm");
         let lines = table.iter().filter(|byte| **byte == b'\n').count();
         assert_eq!(lines, recording.records.len() + 1);
-        assert!(mcap::encode(&recording, [1.0, 0.0], mcap::NeedleForces::default()).is_ok());
+        assert!(mcap::encode(&recording, [1.0, 0.0], mcap::Known::default()).is_ok());
     }
 }
 

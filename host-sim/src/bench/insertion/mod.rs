@@ -18,6 +18,7 @@ use super::strategy::Strategy;
 use crate::bench::error::SimError;
 use crate::exchange::{Departure, PlantPorts, Space};
 use crate::record::error::FileError;
+use crate::record::export::foxglove::Stage;
 use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
 use crate::record::recording::{Record, Recording, RecordingHeader};
@@ -306,8 +307,11 @@ impl<'a> SimulatedInsertion<'a> {
         if extras.mcap {
             let name = label.file("mcap");
             let needle = mcap::NeedleForces { started_ns, moments: plant.world().tissue.needle() };
-            let bytes = mcap::encode(recording, controller.table.orthogonal.into(), needle)?;
+            let stage = Stage::new(model.scene(), controller.table.paddle.index);
+            let known = mcap::Known { needle, stage: Some(&stage) };
+            let bytes = mcap::encode(recording, controller.table.orthogonal.into(), known)?;
             artifacts.push(Artifact { name, bytes });
+            artifacts.push(Artifact { name: label.file("foxglove.json"), bytes: stage.layout_file() });
         }
         if extras.vtu {
             let paddle = controller.table.paddle.index;

@@ -1,4 +1,4 @@
-//! A recording as [MCAP](https://mcap.dev): six topics of JSON messages, each with its JSON Schema.
+//! A recording as [MCAP](https://mcap.dev): nine topics of JSON messages, each with its JSON Schema, compressed.
 //!
 //! | topic | one message per | log time |
 //! |---|---|---|
@@ -6,6 +6,8 @@
 //! | `/command` | tick of the controller | tick |
 //! | `/truth` | tick of the plant | tick |
 //! | `/needle_forces` | moment of a needle that slips; of a run, not of a recording alone | that moment |
+//! | `/scene`, `/tf` | what is to be seen, in [Foxglove's schemas](super::foxglove): at rest once, what moves 30 times a second; where the scene is known | tick of the plant |
+//! | `/log` | change of the controller's mode or faults, in Foxglove's schema | tick |
 //!
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
 //! free-run. A metadata record `stillpoint` says which, with seed and hashes.
@@ -24,6 +26,7 @@ use schemars::{JsonSchema, schema_for};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::foxglove::{self, FrameTransform, Log, SceneUpdate, Stage};
 use crate::record::recording::Recording;
 use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::time::mode::RunMode;
@@ -121,6 +124,15 @@ pub struct NeedleForcesMessage {
     pub shaft: Vec<StationState>,
 }
 
+/// What is known of a run, and not of its recording alone.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Known<'k> {
+    /// What its needle met on its way.
+    pub needle: NeedleForces<'k>,
+    /// Its scene.
+    pub stage: Option<&'k Stage>,
+}
+
 /// What a needle met on its way.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NeedleForces<'n> {
@@ -136,17 +148,23 @@ impl NeedleForces<'_> {
     }
 }
 
-/// Topic and schema of every kind of message.
-pub fn schemas() -> [(&'static str, schemars::Schema); 6] {
+/// Topic, name of the schema and schema of every kind of message.
+pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 9] {
     [
-        ("/needle", schema_for!(NeedleMessage)),
-        ("/target", schema_for!(TargetMessage)),
-        ("/paddle", schema_for!(PaddleMessage)),
-        ("/command", schema_for!(CommandMessage)),
-        ("/truth", schema_for!(TruthMessage)),
-        ("/needle_forces", schema_for!(NeedleForcesMessage)),
+        ("/needle", "stillpoint.NeedleMessage", schema_for!(NeedleMessage)),
+        ("/target", "stillpoint.TargetMessage", schema_for!(TargetMessage)),
+        ("/paddle", "stillpoint.PaddleMessage", schema_for!(PaddleMessage)),
+        ("/command", "stillpoint.CommandMessage", schema_for!(CommandMessage)),
+        ("/truth", "stillpoint.TruthMessage", schema_for!(TruthMessage)),
+        ("/needle_forces", "stillpoint.NeedleForcesMessage", schema_for!(NeedleForcesMessage)),
+        ("/scene", "foxglove.SceneUpdate", schema_for!(SceneUpdate)),
+        ("/tf", "foxglove.FrameTransform", schema_for!(FrameTransform)),
+        ("/log", "foxglove.Log", schema_for!(Log)),
     ]
 }
+
+/// From one picture of what moves to the next, ns.
+const PICTURES_EVERY_NS: u64 = 1_000_000_000 / 30;
 
 fn seconds(time_ns: u64) -> f64 {
     time_ns as f64 * 1e-9
@@ -160,11 +178,10 @@ struct Topics(BTreeMap<&'static str, (Arc<Channel<'static>>, u32)>);
 
 impl Topics {
     fn new() -> Self {
-        let channels = schemas().into_iter().enumerate().map(|(i, (topic, schema))| {
-            let name = schema.as_value()["title"].as_str().unwrap_or("Message").to_owned();
+        let channels = schemas().into_iter().enumerate().map(|(i, (topic, name, schema))| {
             let schema = Schema {
                 id: i as u16 + 1,
-                name: format!("stillpoint.{name}"),
+                name: name.to_owned(),
                 encoding: "jsonschema".to_owned(),
                 data: Cow::Owned(schema.as_value().to_string().into_bytes()),
             };
@@ -257,22 +274,73 @@ impl Topics {
     }
 }
 
-/// The recording as an MCAP file; `orthogonal` is n. What the needle met is known of a run, not of a recording.
+/// What the controller said last: mode and faults.
+type Said = Option<(u32, u64)>;
+
+impl Topics {
+    /// A line where the controller's mode or faults are others than before.
+    fn write_change(&mut self, writer: &mut Output, said: &mut Said, tick: &ControllerTick) -> Result<(), McapError> {
+        let (command, time_ns) = (&tick.command, tick.inputs.time_ns);
+        let now = (command.state, command.faults);
+        if said.replace(now) == Some(now) {
+            return Ok(());
+        }
+        let mode = Mode::from_wire(command.state);
+        let level = match mode {
+            Some(Mode::Safe) | None => 4,
+            Some(Mode::Hold) if command.faults != 0 => 3,
+            Some(_) => 2,
+        };
+        let faults = Faults::from_bits(command.faults).to_string();
+        let line = format!("{}: {faults}", mode.map_or("?", Mode::name));
+        self.write(writer, "/log", [time_ns; 2], &Log::of_controller(time_ns, level, line))
+    }
+
+    /// What is to be seen at a tick; `shown` is the time of the last picture.
+    fn write_picture(
+        &mut self,
+        writer: &mut Output,
+        stage: &Stage,
+        shown: &mut Option<u64>,
+        truth: &Truth,
+    ) -> Result<(), McapError> {
+        let time_ns = truth.time_ns;
+        match *shown {
+            None => {
+                self.write(writer, "/tf", [time_ns; 2], &foxglove::frame(time_ns))?;
+                self.write(writer, "/scene", [time_ns; 2], &stage.at_rest(time_ns))?;
+            }
+            Some(shown) if time_ns < shown + PICTURES_EVERY_NS => return Ok(()),
+            Some(_) => {}
+        }
+        *shown = Some(time_ns);
+        self.write(writer, "/scene", [time_ns; 2], &stage.at_tick(truth))
+    }
+}
+
+/// The recording as an MCAP file; `orthogonal` is n.
 ///
 /// # Errors
 /// [`McapError`] of the writer.
-pub fn encode(recording: &Recording, orthogonal: [f64; 2], needle: NeedleForces<'_>) -> Result<Vec<u8>, McapError> {
-    let options = ::mcap::WriteOptions::new().compression(None).profile("").library("host-sim");
+pub fn encode(recording: &Recording, orthogonal: [f64; 2], known: Known<'_>) -> Result<Vec<u8>, McapError> {
+    let needle = known.needle;
+    let compression = Some(::mcap::Compression::Lz4);
+    let options = ::mcap::WriteOptions::new().compression(compression).profile("").library("host-sim");
     let mut writer = options.create(Cursor::new(Vec::new()))?;
     let mut topics = Topics::new();
+    let (mut said, mut shown) = (None, None);
     let mut moments = needle.moments.iter().map(|moment| (needle.time_ns(moment), &moment.reading)).peekable();
     for record in &recording.records {
         while let Some((time_ns, reading)) = moments.next_if(|(time_ns, _)| *time_ns <= record.tick.inputs.time_ns) {
             topics.write_forces(&mut writer, time_ns, reading)?;
         }
         topics.write_tick(&mut writer, &record.tick)?;
+        topics.write_change(&mut writer, &mut said, &record.tick)?;
         if let Some(truth) = &record.truth {
             topics.write_truth(&mut writer, truth, orthogonal)?;
+            if let Some(stage) = known.stage {
+                topics.write_picture(&mut writer, stage, &mut shown, truth)?;
+            }
         }
     }
     for (time_ns, reading) in moments {
