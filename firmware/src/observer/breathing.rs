@@ -757,19 +757,22 @@ mod tests {
     /// What is foretold goes into the level as it ends, with the doubt that this brings: the estimate goes on from where it was.
     #[test]
     fn the_end_of_a_breath_is_no_jump() {
-        for held_at_s in [21.0, 22.0, 23.0] {
-            let held = |time_s: f64| lujan(3.0, 4.0, f64::min(time_s, held_at_s));
-            let belief = belief(0.1);
+        for (held_at_s, unit) in [(21.0, 1.0), (22.0, 1.0), (23.0, 1.0), (22.0, 0.01)] {
+            let held = |time_s: f64| lujan(3.0 * unit, 4.0, f64::min(time_s, held_at_s));
+            let belief = Belief::new(0.1 * unit, 0.2 * unit, 12.0, 10.0 * unit, 0.1).with_breathing(ULTRASOUND_S);
             let mut observer = having_seen(&belief, held_at_s, held, 5);
             let mut noise = Noise(11);
             let (mut before, mut was_uncertain) = (0.0, 0.0);
             while observer.predicts_breaths() {
                 before = observer.at(0.0) + observer.ahead(ULTRASOUND_S);
                 was_uncertain = observer.level_variance;
-                observer.update(&belief, held(held_at_s) + 0.1 * noise.next(), 0.0, ULTRASOUND_S);
+                observer.update(&belief, held(held_at_s) + 0.1 * unit * noise.next(), 0.0, ULTRASOUND_S);
             }
-            assert!((observer.at(0.0) - before).abs() < 0.1, "{held_at_s} s: {before} {}", observer.at(0.0));
-            assert!(observer.level_variance > was_uncertain, "{held_at_s} s");
+            let jump = (observer.at(0.0) - before).abs();
+            assert!(jump < 0.1 * unit, "{held_at_s} s: {before} {}", observer.at(0.0));
+            // By no more than what the whole breath was.
+            let more = observer.level_variance - was_uncertain;
+            assert!(more > 0.0 && more < (3.0 * unit).powi(2), "{held_at_s} s: {more}");
         }
     }
 

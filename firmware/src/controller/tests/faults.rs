@@ -27,13 +27,15 @@ fn a_start_moves_nothing_and_restarts_where_the_paddle_is() {
 #[test]
 fn a_paddle_beside_its_path_stays_there_until_the_target_says_otherwise() {
     let table = table();
-    let mut closed = Loop::new(&table, &Settings { target_noise: 10.0, ..settings() });
-    let beside = Vector2::new(0.004, 0.001);
-    (closed.plant.paddle, closed.plant.speed) = (beside, 0.0);
-    closed.run(1000);
-    assert_eq!(closed.state.mode(), Mode::Run);
-    let command = Vector2::from(closed.last.unwrap().displacement);
-    assert!((command - beside).norm() < 0.02 * beside.norm(), "{command:?}");
+    for depth in [0.0, 0.05] {
+        let beside = table.locate(depth).unwrap().paddle_path() + Vector2::new(0.004, 0.001);
+        let mut closed = Loop::new(&table, &Settings { target_noise: 10.0, ..settings() });
+        (closed.plant.paddle, closed.plant.depth, closed.plant.speed) = (beside, depth, 0.0);
+        closed.run(1000);
+        assert_eq!(closed.state.mode(), Mode::Run);
+        let command = Vector2::from(closed.last.unwrap().displacement);
+        assert!((command - beside).norm() < 1e-4, "{depth}: {command:?} {beside:?}");
+    }
 }
 
 #[test]
