@@ -57,6 +57,7 @@ fn check_exports(folder: &Path, report: &Path) -> usize {
     assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("not the scene that was recorded"));
     assert!(!other.exists());
     let text = std::fs::read_to_string(&csv).unwrap();
+    assert!(text == std::fs::read_to_string(report.join("inclusion-dynamic.csv")).unwrap(), "one schema, one file");
     let times: Vec<f64> = text.lines().skip(1).map(|line| line.split(',').next().unwrap().parse().unwrap()).collect();
     assert!(times.len() > 800 && times.windows(2).all(|pair| pair[0] < pair[1]), "{} rows", times.len());
     let columns = text.lines().next().unwrap().split(',').count();

@@ -5,10 +5,12 @@ use model_offline::output::csv::table;
 use nalgebra::Vector2;
 
 use crate::record::recording::{Record, Recording};
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::world::truth::{NeedleMoment, Truth};
 
-/// What the plant saw of an insertion: one line per tick of the plant. `{}` is the unit of length.
-const INSERTION: [&str; 16] = [
+/// Columns of the time series of a run and of a recording; `{}` is the unit of length. Empty where there is nothing: samples that
+/// have not arrived, a truth that nobody told, commands before the paddle's place is known.
+const SERIES: [&str; 18] = [
     "time [s]",
     "tick [1]",
     "true_depth [{}]",
@@ -17,20 +19,6 @@ const INSERTION: [&str; 16] = [
     "true_orthogonal_error [{}]",
     "true_paddle_x [{}]",
     "true_paddle_y [{}]",
-    "command_x [{}]",
-    "command_y [{}]",
-    "measured_target_x [{}]",
-    "measured_target_y [{}]",
-    "measured_paddle_x [{}]",
-    "measured_paddle_y [{}]",
-    "state [name]",
-    "faults [names]",
-];
-
-/// What is in a recording: one line per tick of the controller.
-const RECORDING: [&str; 18] = [
-    "time [s]",
-    "tick [1]",
     "measured_depth [{}]",
     "measured_needle_velocity [{}/s]",
     "measured_target_x [{}]",
@@ -41,12 +29,6 @@ const RECORDING: [&str; 18] = [
     "command_y [{}]",
     "state [name]",
     "faults [names]",
-    "true_depth [{}]",
-    "true_target_x [{}]",
-    "true_target_y [{}]",
-    "true_orthogonal_error [{}]",
-    "true_paddle_x [{}]",
-    "true_paddle_y [{}]",
 ];
 
 /// What a needle that slips met: one line per moment. `{}` is the unit of length, `{f}` that of force per thickness.
@@ -90,64 +72,49 @@ fn columns<const N: usize>(columns: [&str; N], length: &str) -> [String; N] {
     columns.map(|column| column.replace("{}", length))
 }
 
-/// The truth along an insertion, with what the controller saw and said where there was one. `orthogonal` is n, `length`
-/// the unit of lengths.
+/// A line of [`SERIES`] at a time since the first tick, s; `orthogonal` is n.
+fn line(
+    time_s: f64,
+    number: u64,
+    truth: Option<&Truth>,
+    tick: Option<&ControllerTick>,
+    orthogonal: &Vector2<f64>,
+) -> [String; 18] {
+    let inputs = tick.map(|tick| &tick.inputs);
+    let command = tick.map(|tick| &tick.command);
+    let [tx, ty] = pair(truth.map(|truth| truth.target));
+    let [tpx, tpy] = pair(truth.map(|truth| truth.paddle));
+    let error = truth.map(|truth| text(Vector2::from(truth.target).dot(orthogonal))).unwrap_or_default();
+    let true_depth = truth.map(|truth| text(truth.depth)).unwrap_or_default();
+    let needle = inputs.and_then(|inputs| inputs.needle);
+    let [depth, velocity] = pair(needle.map(|sample| [sample.depth, sample.velocity]));
+    let [mx, my] = pair(inputs.and_then(|inputs| inputs.target).map(|sample| sample.displacement));
+    let [mpx, mpy] = pair(inputs.and_then(|inputs| inputs.paddle).map(|sample| sample.displacement));
+    let [cx, cy] = pair(command.filter(|command| command.is_valid()).map(|command| command.displacement));
+    let [state, faults] = command.map_or_else(Default::default, |command| verdict(command.state, command.faults));
+    let time = format!("{time_s:.6}");
+    let number = text(number);
+    [time, number, true_depth, tx, ty, error, tpx, tpy, depth, velocity, mx, my, mpx, mpy, cx, cy, state, faults]
+}
+
+/// One line per tick of the plant, with what the controller saw and said where there was one. `orthogonal` is n, `length` the
+/// unit of lengths.
 pub fn insertion(truths: &[Truth], records: &[Record], orthogonal: &Vector2<f64>, length: &str) -> Vec<u8> {
     let start_ns = truths.first().map_or(0, |truth| truth.time_ns);
-    table(columns(INSERTION, length), truths, |truth| {
-        let tick = records
-            .binary_search_by_key(&truth.tick, |record| record.tick.inputs.tick)
-            .ok()
-            .map(|found| &records[found].tick);
-        let [x, y] = truth.target.map(text);
-        let [px, py] = truth.paddle.map(text);
-        let [cx, cy] = pair(tick.map(|tick| tick.command).filter(|c| c.is_valid()).map(|c| c.displacement));
-        let [mx, my] = pair(tick.and_then(|tick| tick.inputs.target).map(|target| target.displacement));
-        let [mpx, mpy] = pair(tick.and_then(|tick| tick.inputs.paddle).map(|paddle| paddle.displacement));
-        let [state, faults] =
-            tick.map_or_else(Default::default, |tick| verdict(tick.command.state, tick.command.faults));
-        let error = text(Vector2::from(truth.target).dot(orthogonal));
-        let time = format!("{:.6}", seconds_since(truth.time_ns, start_ns));
-        let (tick, depth) = (text(truth.tick), text(truth.depth));
-        [time, tick, depth, x, y, error, px, py, cx, cy, mx, my, mpx, mpy, state, faults]
+    table(columns(SERIES, length), truths, |truth| {
+        let tick = records.binary_search_by_key(&truth.tick, |record| record.tick.inputs.tick).ok();
+        let tick = tick.and_then(|found| records.get(found)).map(|record| &record.tick);
+        line(seconds_since(truth.time_ns, start_ns), truth.tick, Some(truth), tick, orthogonal)
     })
 }
 
-/// One line per tick of the controller; empty where nothing arrived. `orthogonal` is n, `length` the unit of lengths.
+/// One line per tick of the controller. `orthogonal` is n, `length` the unit of lengths.
 pub fn recording(recording: &Recording, orthogonal: &Vector2<f64>, length: &str) -> Vec<u8> {
     let start_ns = zero_ns(&recording.records);
-    table(columns(RECORDING, length), &recording.records, |record| {
-        let (inputs, command) = (&record.tick.inputs, &record.tick.command);
-        let [depth, velocity] = pair(inputs.needle.map(|sample| [sample.depth, sample.velocity]));
-        let [tx, ty] = pair(inputs.target.map(|sample| sample.displacement));
-        let [px, py] = pair(inputs.paddle.map(|sample| sample.displacement));
-        let [cx, cy] = pair(command.is_valid().then_some(command.displacement));
-        let [state, faults] = verdict(command.state, command.faults);
-        let true_depth = record.truth.map(|truth| text(truth.depth)).unwrap_or_default();
-        let [true_x, true_y] = pair(record.truth.map(|truth| truth.target));
-        let error = record.truth.map(|truth| text(Vector2::from(truth.target).dot(orthogonal))).unwrap_or_default();
-        let [true_px, true_py] = pair(record.truth.map(|truth| truth.paddle));
-        let time = format!("{:.6}", seconds_since(inputs.time_ns, start_ns));
-        [
-            time,
-            text(inputs.tick),
-            depth,
-            velocity,
-            tx,
-            ty,
-            px,
-            py,
-            cx,
-            cy,
-            state,
-            faults,
-            true_depth,
-            true_x,
-            true_y,
-            error,
-            true_px,
-            true_py,
-        ]
+    table(columns(SERIES, length), &recording.records, |record| {
+        let inputs = &record.tick.inputs;
+        let time_s = seconds_since(inputs.time_ns, start_ns);
+        line(time_s, inputs.tick, record.truth.as_ref(), Some(&record.tick), orthogonal)
     })
 }
 
@@ -230,7 +197,6 @@ mod tests {
 
     use super::*;
     use crate::record::recording::RecordingHeader;
-    use crate::runtime::accounting::tick::ControllerTick;
     use crate::runtime::time::mode::RunMode;
 
     fn record(tick: u64, time_ns: u64, truth_ns: Option<u64>) -> Record {
@@ -257,19 +223,47 @@ mod tests {
         let truths: Vec<_> = records.iter().filter_map(|record| record.truth).collect();
         let plant = lines(&insertion(&truths, &records, &Vector2::x(), "mm"));
         let controller = recorded(records);
-        for (column, name) in plant[0].iter().enumerate() {
-            assert!(name.contains('[') && name.ends_with(']'), "{name} has no unit");
-            let same = controller[0].iter().position(|other| other == name).unwrap();
-            for line in 1..plant.len() {
-                assert_eq!(plant[line][column], controller[line][same], "{name}");
-            }
-        }
+        assert_eq!(plant, controller, "in lockstep one is the other");
+        assert!(plant[0].iter().all(|name| name.contains('[') && name.ends_with(']')), "{:?}", plant[0]);
         // In free-run the controller's tick comes half a period after the plant's: same zero.
         let later = recorded(vec![record(0, at(0) + 500_000, Some(at(0)))]);
         assert_eq!(later[1][0], "0.000500");
-        let shared = plant[0].iter().filter(|name| controller[0].contains(name)).count();
-        assert_eq!(shared, 16, "{:?} {:?}", plant[0], controller[0]);
-        assert!(controller[0].iter().all(|name| name.contains('[')));
+        assert_eq!(later[0], plant[0]);
+    }
+
+    /// Every column has what its name says, and what is not there is empty.
+    #[test]
+    fn columns_are_what_they_are_called() {
+        use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
+        let mut whole = record(7, 1_000_000, Some(1_000_000));
+        whole.tick.inputs.needle = Some(NeedleSample { depth: 0.51, velocity: 0.2, ..NeedleSample::default() });
+        whole.tick.inputs.target = Some(TargetSample { displacement: [1.1, 2.1], ..TargetSample::default() });
+        whole.tick.inputs.paddle = Some(PaddleSample { displacement: [3.1, 4.1], ..PaddleSample::default() });
+        whole.tick.command.displacement = [5.0, 6.0];
+        whole.tick.command.flags = firmware::contract::frames::COMMAND_VALID;
+        let said = recorded(vec![record(6, 0, None), whole]);
+        let value = |line: usize, name: &str| {
+            let column = said[0].iter().position(|column| column.split(' ').next() == Some(name)).unwrap();
+            said[line][column].as_str()
+        };
+        for (name, expected) in [
+            ("time", "0.001000"),
+            ("tick", "7"),
+            ("true_depth", "0.5"),
+            ("true_target_y", "2"),
+            ("true_orthogonal_error", "1"),
+            ("true_paddle_x", "3"),
+            ("measured_depth", "0.51"),
+            ("measured_needle_velocity", "0.2"),
+            ("measured_target_x", "1.1"),
+            ("measured_paddle_y", "4.1"),
+            ("command_x", "5"),
+            ("command_y", "6"),
+        ] {
+            assert_eq!(value(2, name), expected, "{name}");
+            let known = ["time", "tick"].contains(&name);
+            assert_eq!(value(1, name).is_empty(), !known, "{name}");
+        }
     }
 
     #[test]
