@@ -41,7 +41,7 @@ fn every_field_in_every_format() {
         let document = roxmltree::Document::parse(&svg).unwrap();
         let of = |class: &str| document.descendants().filter(|node| node.attribute("class") == Some(class)).count();
         assert!((0..10).all(|band| of(&format!("f{band}")) > 0), "{field}: a colour is missing");
-        assert!(svg.contains("paper, inclusion, paddle 2: depth 0.05") && of("paddle best") == 1);
+        assert!(svg.contains("paper, inclusion, paddle 2: depth\u{a0}0.05") && of("paddle best") == 1);
     }
     for (name, begins) in [("a.png", b"\x89PNG\r\n\x1a\n".as_slice()), ("a.pdf", b"%PDF-".as_slice())] {
         let out = folder.path().join(name);
@@ -87,6 +87,26 @@ fn what_is_no_result_or_not_in_it_is_refused() {
     let without = with(&|v| v["von_mises"] = serde_json::Value::Null);
     assert!(refused(&without, &["--field", "von-mises"]).contains("--field size or orthogonal or strain"));
     assert!(refused(&with(&|v| v["cases"] = serde_json::json!([])), &[]).contains("has no case 1"));
+    assert!(refused(&with(&|v| v["geometry"]["outline"] = serde_json::json!([])), &[]).contains("outline is no area"));
+    let flat = with(&|v| v["geometry"]["outline"] = serde_json::json!([[0, 0], [1, 0], [2, 0]]));
+    assert!(refused(&flat, &[]).contains("outline is no area"));
+    let still = with(&|v| v["geometry"]["needle_axis"] = serde_json::json!([0, 0]));
+    assert!(refused(&still, &[]).contains("no unit vector"));
+    let alike = with(&|v| {
+        let nodes = v["geometry"]["nodes"].as_array_mut().unwrap();
+        nodes.iter_mut().for_each(|node| *node = serde_json::json!([0.5, 0.5]));
+    });
+    assert!(refused(&alike, &[]).contains("no triangles"));
+    assert!(refused(&with(&|v| v["paddle"] = 99.into()), &[]).contains("paddle is none"));
+    let long = with(&|v| v["geometry"]["immobile"] = serde_json::json!([vec![[0.0, 0.0]; 20_001]]));
+    assert!(refused(&long, &[]).contains("more than 20,000 points"));
+    assert!(refused(&result, &["--depth", "nan"]).contains("--depth is NaN"));
+    assert!(refused(&result, &["--without-inclusion"]).contains("is for scenes"));
+    for name in ["noext", ".png", "a.PNG.gz"] {
+        let out = folder.path().join(name);
+        model_offline().arg("draw").arg(&result).arg("-o").arg(&out).assert().code(2);
+        assert!(!out.exists(), "{name}");
+    }
     // Nothing that a file says is drawn out of it.
     let far = with(&|v| v["node_displacements"][0] = serde_json::json!([1e308, -1e308]));
     let out = folder.path().join("far.svg");

@@ -37,6 +37,11 @@ impl SceneArgs {
         Ok(scene)
     }
 
+    /// Whether the inclusions are to be left out.
+    pub(super) fn leaves_out_inclusions(&self) -> bool {
+        self.without_inclusion
+    }
+
     /// The scene as its file has it.
     pub(super) fn read_any(&self) -> Result<Scene, CliError> {
         let scene = Scene::read(&self.scene)?;

@@ -37,6 +37,7 @@ fn field(word: &str) -> Result<Field, String> {
 }
 
 pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
+    check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
     PictureFormat::of(&args.output)?;
     let is_result = args.scene.scene.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("json"));
     if is_result {
@@ -49,7 +50,6 @@ pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
         ));
     }
     let scene = args.scene.read_any()?;
-    check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
     write_picture(&args.output, &scene_picture::svg(&scene))?;
     eprint!("{}", warned(&scene.told_warnings()));
     Ok(())
@@ -57,7 +57,15 @@ pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
 
 fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
     let result = &args.scene.scene;
-    check_outputs(&[result], &[("--output", Some(&args.output))])?;
+    if args.scene.leaves_out_inclusions() {
+        return Err(CliError::usage(
+            "--without-inclusion is for scenes: a result is of the tissue that it is of",
+            "give --case for another one, or solve without the inclusion",
+        ));
+    }
+    if let Some(depth) = args.depth.filter(|depth| !depth.is_finite()) {
+        return Err(CliError::usage(format!("--depth is {depth}"), "give a length"));
+    }
     let which = Which { case: args.case, strategy: args.strategy.clone(), depth: args.depth };
     let body = read_body(result, &which)?;
     let field = args.field.unwrap_or(Field::Size);

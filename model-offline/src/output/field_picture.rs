@@ -13,6 +13,8 @@ const MARGIN: f64 = 0.06;
 const OUTSIDE: f64 = 0.16;
 /// Distance of the strokes of what is held, the same.
 const STROKES: f64 = 0.03;
+/// Part of the longer side by which the immobile part moves that is no rounding.
+const MOVES: f64 = 1e-3;
 /// Part of the nodes whose values are beyond the scale of a field that is without bound at the rim of a contact.
 const BEYOND: f64 = 0.02;
 
@@ -69,7 +71,7 @@ impl Field {
             Self::Strain | Self::VonMises => (BEYOND * sorted.len() as f64) as usize,
         };
         let last = sorted.len().saturating_sub(1 + beyond);
-        sorted.get(last).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE)
+        sorted.get(last).copied().unwrap_or(0.0)
     }
 }
 
@@ -81,17 +83,18 @@ pub fn svg(body: &ResultBody, field: Field, values: &[f64]) -> String {
     let largest = values.iter().copied().fold(0.0, f64::max);
     let caption = format!(
         "To scale. Black: immobile; blue: paddle; grey: needle; dashed: outline at rest, and \
-         inclusions; ring: target at rest, dot: now. Largest value at a node: {}.",
-        plain(largest)
+         inclusions; ring: target at rest, dot: now. Largest value at a node:\u{a0}{}.{}",
+        plain(largest),
+        if picture.breathes() { " The immobile part moves as the patient breathes." } else { "" }
     );
-    let title = format!("{}: depth {}", body.name, with_unit(body.depth, &body.units[0]));
+    let title = format!("{}: depth\u{a0}{}", body.name, with_unit(body.depth, &body.units[0]));
     let width = drawn.size[0];
     let bar = colour_bar(width, &field.label(&body.units), scale);
     sheet(&title, &[heading(&title, &caption, width), drawn, bar], 1).file()
 }
 
 fn with_unit(value: f64, unit: &str) -> String {
-    if unit == "1" { plain(value) } else { format!("{} {unit}", plain(value)) }
+    if unit == "1" { plain(value) } else { format!("{}\u{a0}{unit}", plain(value)) }
 }
 
 /// A triangle cut where its value, linear between its corners, passes from one colour to the next; 1 is where they end.
@@ -132,7 +135,6 @@ struct Picture<'a> {
     plane: Plane,
     /// Longer side of the body, length.
     extent: f64,
-    outline: Vec<Px>,
 }
 
 impl<'a> Picture<'a> {
@@ -154,7 +156,18 @@ impl<'a> Picture<'a> {
         let margin = MARGIN * extent;
         let plane = Plane::new(low.map(|low| low - margin), high.map(|high| high + margin), WIDTH);
         let triangles = triangles(&geometry.nodes, &geometry.outline);
-        Self { body, triangles, plane, extent, outline: plane.path(&geometry.outline) }
+        Self { body, triangles, plane, extent }
+    }
+
+    /// Whether what the scene holds has moved.
+    fn breathes(&self) -> bool {
+        let geometry = &self.body.geometry;
+        let motion = Motion { rest: &geometry.nodes, moved: &self.body.nodes, triangles: &self.triangles };
+        let far = |point: &[f64; 2]| {
+            let now = motion.of(*point);
+            (now[0] - point[0]).hypot(now[1] - point[1]) > MOVES * self.extent
+        };
+        geometry.immobile.iter().flatten().any(far)
     }
 
     fn draw(&self, drawing: &mut Drawing, values: &[f64], scale: f64) {
@@ -162,16 +175,24 @@ impl<'a> Picture<'a> {
         let nodes = plane.path(&body.nodes);
         drawing.open_group("field");
         for corners in &self.triangles {
-            in_bands(drawing, &corners.map(|corner| (nodes[corner], values[corner] / scale)));
+            in_bands(
+                drawing,
+                &corners.map(|corner| (nodes[corner], if scale > 0.0 { values[corner] / scale } else { 0.0 })),
+            );
         }
         drawing.close_group();
         let motion = Motion { rest: &geometry.nodes, moved: &body.nodes, triangles: &self.triangles };
         let moved = |points: &[[f64; 2]]| plane.path(&points.iter().map(|p| motion.of(*p)).collect::<Vec<_>>());
-        drawing.polygon("rest", &self.outline);
-        geometry.inclusions.iter().for_each(|inclusion| drawing.polygon("rim", &moved(inclusion)));
+        drawing.polygon("rest", &plane.path(&geometry.outline));
+        for inclusion in &geometry.inclusions {
+            let rim = moved(inclusion);
+            drawing.polygon("under", &rim);
+            drawing.polygon("rim", &rim);
+        }
+        // It moves where the patient does.
+        let outline = moved(&geometry.outline);
         for part in &geometry.immobile {
-            let in_outline = |[x, y]: Px| inside(&self.outline, [x, y]);
-            drawing.held(&plane.path(part), plane.length(STROKES * self.extent), in_outline);
+            drawing.held(&moved(part), plane.length(STROKES * self.extent), |point| inside(&outline, point));
         }
         self.needle(drawing);
         if let Some(paddle) = geometry.paddles.iter().find(|paddle| Some(paddle.index) == body.paddle) {
@@ -190,6 +211,7 @@ impl<'a> Picture<'a> {
         let geometry = &self.body.geometry;
         let contact = middle(&geometry.needle_contact);
         let at = |way: f64| self.plane.at([0, 1].map(|k| contact[k] + way * geometry.needle_axis[k]));
+        drawing.line("under", at(self.body.depth - OUTSIDE * self.extent), at(self.body.depth));
         drawing.needle(at(self.body.depth - OUTSIDE * self.extent), at(self.body.depth));
     }
 }
@@ -268,6 +290,6 @@ mod tests {
         assert_eq!(Field::Strain.scale(&strain), 0.1);
         let picture = svg(&body, Field::Strain, &strain);
         assert!(picture.contains(&plain(123.0)), "the whole is told");
-        assert!(picture.contains("depth 2 mm") && svg(&body, Field::Size, &[0.0; 121]).contains("[mm]"));
+        assert!(picture.contains("depth\u{a0}2\u{a0}mm") && svg(&body, Field::Size, &[0.0; 121]).contains("[mm]"));
     }
 }

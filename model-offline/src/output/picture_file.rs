@@ -56,10 +56,10 @@ impl PictureFormat {
     pub fn of(path: &Path) -> Result<Self, PictureError> {
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
-            Some("svg") | None => Ok(Self::Svg),
+            Some("svg") => Ok(Self::Svg),
             Some("png") => Ok(Self::Png),
             Some("pdf") => Ok(Self::Pdf),
-            Some(_) => Err(PictureError::Format { path: path.to_owned() }),
+            _ => Err(PictureError::Format { path: path.to_owned() }),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Results read again to be drawn: what `model-offline solve --json` and `host-sim run` wrote.
 
 use super::geometry::Geometry;
+use super::surface::triangles;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -136,6 +137,8 @@ pub fn read_body(path: &Path, which: &Which) -> Result<ResultBody, ResultError> 
     } else {
         solved(path, serde_json::from_value(value).map_err(no_result)?, which)?
     };
+    let no_result = |reason: &str| ResultError::NotAResult { path: path.to_owned(), reason: reason.to_owned() };
+    check(&body).map_err(no_result)?;
     let nodes = body.geometry.nodes.len();
     let fits = |values: &[f64]| values.is_empty() || values.len() == nodes;
     if body.nodes.len() != nodes || !fits(&body.strain) || !fits(&body.von_mises) {
@@ -143,6 +146,40 @@ pub fn read_body(path: &Path, which: &Which) -> Result<ResultBody, ResultError> 
         return Err(ResultError::NotAResult { path: path.to_owned(), reason });
     }
     Ok(body)
+}
+
+/// Points of a scene that are drawn; larger ones are no scenes of ours.
+const MOST_POINTS: usize = 20_000;
+/// How far the needle's direction may be from a unit vector.
+const UNIT: f64 = 1e-6;
+
+/// Whether there is something to draw.
+fn check(body: &ResultBody) -> Result<(), &'static str> {
+    let geometry = &body.geometry;
+    let paths =
+        geometry.immobile.iter().chain(&geometry.inclusions).chain([&geometry.outline, &geometry.needle_contact]);
+    let points: Vec<&[f64; 2]> = paths.flatten().chain([&geometry.target]).collect();
+    let low = |k: usize| geometry.outline.iter().map(|p| p[k]).fold(f64::INFINITY, f64::min);
+    let high = |k: usize| geometry.outline.iter().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max);
+    let sides = [0, 1].map(|k| high(k) - low(k));
+    let is_area = |[x, y]: [f64; 2]| x > 1e-9 * y && y > 1e-9 * x && (x * y).is_normal();
+    let [ax, ay] = geometry.needle_axis;
+    if points.len() > MOST_POINTS {
+        return Err("its scene has more than 20,000 points");
+    }
+    if geometry.outline.len() < 3 || !is_area(sides) {
+        return Err("its outline is no area");
+    }
+    if (ax.hypot(ay) - 1.0).abs() > UNIT {
+        return Err("its needle's axis is no unit vector");
+    }
+    if triangles(&geometry.nodes, &geometry.outline).is_empty() {
+        return Err("its nodes form no triangles");
+    }
+    if body.paddle.is_some_and(|index| geometry.paddles.iter().all(|paddle| paddle.index != index)) {
+        return Err("its paddle is none of its scene");
+    }
+    Ok(())
 }
 
 fn solved(path: &Path, solved: Solved, which: &Which) -> Result<ResultBody, ResultError> {

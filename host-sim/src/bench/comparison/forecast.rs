@@ -30,7 +30,7 @@ struct Jobs {
 const ELASTIC: Jobs = Jobs { study: 0.2, table: 1.0, uncontrolled: 0.6, controlled: 0.87 };
 
 /// Of tissue and needles that have a past: they are solved for at more moments.
-const WITH_A_PAST: Jobs = Jobs { study: 0.2, table: 1.0, uncontrolled: 1.4, controlled: 4.0 };
+const WITH_A_PAST: Jobs = Jobs { study: 0.2, table: 1.0, uncontrolled: 1.4, controlled: 3.2 };
 
 /// What beginning and ending the two processes of a free-run take beside its duration, s.
 const AROUND_FREE_RUN_S: f64 = 1.2;

@@ -146,6 +146,10 @@ impl LinePrimitive {
     }
 }
 
+/// Of what there is none in these scenes.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct Nothing {}
+
 /// `foxglove.SceneEntity`: something to be seen. What is not used is there, too: readers look at all of it.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SceneEntity {
@@ -154,15 +158,15 @@ pub struct SceneEntity {
     id: String,
     lifetime: Time,
     frame_locked: bool,
-    metadata: Vec<Value>,
+    metadata: Vec<Nothing>,
     arrows: Vec<ArrowPrimitive>,
-    cubes: Vec<Value>,
+    cubes: Vec<Nothing>,
     spheres: Vec<SpherePrimitive>,
-    cylinders: Vec<Value>,
+    cylinders: Vec<Nothing>,
     lines: Vec<LinePrimitive>,
-    triangles: Vec<Value>,
-    texts: Vec<Value>,
-    models: Vec<Value>,
+    triangles: Vec<Nothing>,
+    texts: Vec<Nothing>,
+    models: Vec<Nothing>,
 }
 
 impl SceneEntity {
@@ -189,7 +193,7 @@ impl SceneEntity {
 /// `foxglove.SceneUpdate`: what is to be seen from now on.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct SceneUpdate {
-    deletions: Vec<Value>,
+    deletions: Vec<Nothing>,
     entities: Vec<SceneEntity>,
 }
 
@@ -345,12 +349,12 @@ impl Stage {
             "configById": {
                 "3D!scene": {
                     "cameraState": {
-                        "perspective": false, "distance": 1.4 * extent, "phi": 0.0, "thetaOffset": 90.0,
+                        "perspective": false, "distance": 1.4 * extent, "phi": 0.0, "thetaOffset": 0.0,
                         "targetOffset": [middle[0], middle[1], 0.0], "target": [0.0, 0.0, 0.0],
                         "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": 1e-3 * extent, "far": 1e3 * extent,
                     },
                     "followMode": "follow-none", "followTf": FRAME, "scene": {}, "transforms": {}, "layers": {},
-                    "topics": {"/scene": {"visible": true}},
+                    "topics": {"/scene": {"visible": true}, "/scene/rest": {"visible": true}},
                 },
                 "Plot!error": plot("Orthogonal error", &["/truth.orthogonal_error"]),
                 "Plot!paddle": plot("Paddle", &["/paddle.x", "/paddle.y", "/command.x", "/command.y"]),

@@ -1,4 +1,4 @@
-//! A recording as [MCAP](https://mcap.dev): nine topics of JSON messages, each with its JSON Schema, compressed.
+//! A recording as [MCAP](https://mcap.dev): ten topics of JSON messages, each with its JSON Schema, compressed.
 //!
 //! | topic | one message per | log time |
 //! |---|---|---|
@@ -6,7 +6,7 @@
 //! | `/command` | tick of the controller | tick |
 //! | `/truth` | tick of the plant | tick |
 //! | `/needle_forces` | moment of a needle that slips; of a run, not of a recording alone | that moment |
-//! | `/scene`, `/tf` | what is to be seen, in [Foxglove's schemas](super::foxglove): at rest once, what moves 30 times a second; where the scene is known | tick of the plant |
+//! | `/scene/rest`, `/scene`, `/tf` | what is to be seen, in [Foxglove's schemas](super::foxglove): at rest once, what moves 30 times a second; where the scene is known | tick of the plant |
 //! | `/log` | change of the controller's mode or faults, in Foxglove's schema | tick |
 //!
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
@@ -22,7 +22,8 @@ use ::mcap::{Channel, McapError, Message, Schema, Writer};
 use firmware::{Faults, Mode};
 use model_offline::needle::{NeedleReading, StationState};
 use model_offline::output::table_text::hex;
-use schemars::{JsonSchema, schema_for};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -82,9 +83,11 @@ pub struct CommandMessage {
     pub state: String,
     /// Faults present, by name.
     pub faults: String,
-    /// Commanded displacement along x, length; none before the paddle's place is known.
+    /// Commanded displacement along x, length; missing before the paddle's place is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub x: Option<f64>,
     /// Commanded displacement along y, length.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub y: Option<f64>,
 }
 
@@ -118,7 +121,8 @@ pub struct NeedleForcesMessage {
     pub tip_force: f64,
     /// Friction all along the shaft.
     pub friction: f64,
-    /// Length of tissue that the tip has passed, length; none while the skin holds.
+    /// Length of tissue that the tip has passed, length; missing while the skin holds.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub cut_length: Option<f64>,
     /// The shaft from the entry to the tip: arc length, slip, friction and normal force per length.
     pub shaft: Vec<StationState>,
@@ -148,18 +152,39 @@ impl NeedleForces<'_> {
     }
 }
 
+/// A schema as Foxglove and Lichtblick read them: nothing defined elsewhere, one type for everything, and every item described.
+fn schema_of<T: JsonSchema>() -> schemars::Schema {
+    fn plain(value: &mut serde_json::Value) {
+        if let serde_json::Value::Object(object) = value {
+            // What may be missing has the type that it has when it is there.
+            if let Some(serde_json::Value::Array(types)) = object.get("type") {
+                let there = types.iter().find(|name| *name != "null").cloned();
+                object.extend(there.map(|name| ("type".to_owned(), name)));
+            }
+            object.values_mut().for_each(plain);
+        } else if let serde_json::Value::Array(items) = value {
+            items.iter_mut().for_each(plain);
+        }
+    }
+    let generator = SchemaSettings::default().with(|settings| settings.inline_subschemas = true).into_generator();
+    let mut schema = generator.into_root_schema_for::<T>().to_value();
+    plain(&mut schema);
+    schemars::Schema::try_from(schema).unwrap_or_default()
+}
+
 /// Topic, name of the schema and schema of every kind of message.
-pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 9] {
+pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 10] {
     [
-        ("/needle", "stillpoint.NeedleMessage", schema_for!(NeedleMessage)),
-        ("/target", "stillpoint.TargetMessage", schema_for!(TargetMessage)),
-        ("/paddle", "stillpoint.PaddleMessage", schema_for!(PaddleMessage)),
-        ("/command", "stillpoint.CommandMessage", schema_for!(CommandMessage)),
-        ("/truth", "stillpoint.TruthMessage", schema_for!(TruthMessage)),
-        ("/needle_forces", "stillpoint.NeedleForcesMessage", schema_for!(NeedleForcesMessage)),
-        ("/scene", "foxglove.SceneUpdate", schema_for!(SceneUpdate)),
-        ("/tf", "foxglove.FrameTransform", schema_for!(FrameTransform)),
-        ("/log", "foxglove.Log", schema_for!(Log)),
+        ("/needle", "stillpoint.NeedleMessage", schema_of::<NeedleMessage>()),
+        ("/target", "stillpoint.TargetMessage", schema_of::<TargetMessage>()),
+        ("/paddle", "stillpoint.PaddleMessage", schema_of::<PaddleMessage>()),
+        ("/command", "stillpoint.CommandMessage", schema_of::<CommandMessage>()),
+        ("/truth", "stillpoint.TruthMessage", schema_of::<TruthMessage>()),
+        ("/needle_forces", "stillpoint.NeedleForcesMessage", schema_of::<NeedleForcesMessage>()),
+        ("/scene/rest", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
+        ("/scene", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
+        ("/tf", "foxglove.FrameTransform", schema_of::<FrameTransform>()),
+        ("/log", "foxglove.Log", schema_of::<Log>()),
     ]
 }
 
@@ -308,7 +333,7 @@ impl Topics {
         match *shown {
             None => {
                 self.write(writer, "/tf", [time_ns; 2], &foxglove::frame(time_ns))?;
-                self.write(writer, "/scene", [time_ns; 2], &stage.at_rest(time_ns))?;
+                self.write(writer, "/scene/rest", [time_ns; 2], &stage.at_rest(time_ns))?;
             }
             Some(shown) if time_ns < shown + PICTURES_EVERY_NS => return Ok(()),
             Some(_) => {}
@@ -367,4 +392,34 @@ fn facts(recording: &Recording) -> BTreeMap<String, String> {
     ]
     .map(|(key, value)| (key.to_owned(), value))
     .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    /// What their readers throw at: references, several types, items of no type (lichtblick-suite/lichtblick,
+    /// packages/mcap-support/src/parseJsonSchema.ts).
+    fn assert_readable(schema: &Value, what: &str) {
+        let object = schema.as_object().unwrap_or_else(|| panic!("{what}: {schema}"));
+        assert!(!object.contains_key("$ref") && !object.contains_key("$defs"), "{what}: {schema}");
+        match object.get("type").and_then(Value::as_str) {
+            Some("object") => {
+                let properties = object.get("properties").and_then(Value::as_object).into_iter().flatten();
+                properties.for_each(|(name, schema)| assert_readable(schema, &format!("{what}.{name}")));
+            }
+            Some("array") => assert_readable(&object["items"], &format!("{what}[]")),
+            Some("boolean" | "string" | "number" | "integer") => {}
+            other => panic!("{what} is {other:?}"),
+        }
+    }
+
+    #[test]
+    fn schemas_are_read_by_those_who_show_them() {
+        for (topic, name, schema) in schemas() {
+            assert_readable(schema.as_value(), topic);
+            assert!(name.starts_with("stillpoint.") || name.starts_with("foxglove."));
+        }
+    }
 }

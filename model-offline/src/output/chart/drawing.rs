@@ -68,8 +68,9 @@ pub enum Marker {
 
 /// Text in XML, content or attribute.
 pub fn escape(text: &str) -> String {
-    // Control characters are no XML at all.
-    text.chars().filter(|letter| !letter.is_control()).fold(String::with_capacity(text.len()), |mut escaped, letter| {
+    // Control characters are no XML at all, nor are these two.
+    let is_xml = |letter: &char| !letter.is_control() && !['\u{fffe}', '\u{ffff}'].contains(letter);
+    text.chars().filter(is_xml).fold(String::with_capacity(text.len()), |mut escaped, letter| {
         match letter {
             '&' => escaped.push_str("&amp;"),
             '<' => escaped.push_str("&lt;"),
