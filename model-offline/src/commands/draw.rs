@@ -63,8 +63,8 @@ fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
             "give --case for another one, or solve without the inclusion",
         ));
     }
-    if let Some(depth) = args.depth.filter(|depth| !depth.is_finite()) {
-        return Err(CliError::usage(format!("--depth is {depth}"), "give a length"));
+    if let Some(depth) = args.depth.filter(|depth| !depth.is_finite() || *depth < 0.0) {
+        return Err(CliError::usage(format!("--depth is {depth}"), "give a depth of 0 or more"));
     }
     let which = Which { case: args.case, strategy: args.strategy.clone(), depth: args.depth };
     let body = read_body(result, &which)?;

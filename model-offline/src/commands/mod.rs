@@ -173,9 +173,10 @@ mod tests {
     use std::path::Path;
 
     /// How each command that takes numbers is called with everything that it needs; outputs are in `OUT`.
-    const CALLS: [(&str, &str); 10] = [
+    const CALLS: [(&str, &str); 11] = [
         ("place", "paper"),
         ("check", "paper"),
+        ("draw", "result.json -o OUT/a.svg"),
         ("solve", "paper --paddle 3 --depth 0.01"),
         ("table", "paper -o OUT/a.table"),
         ("stability", "paper --out OUT/stability"),
