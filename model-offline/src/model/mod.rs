@@ -7,7 +7,7 @@ mod tissue;
 
 pub use derivatives::Derivatives;
 pub use error::{BoundaryPart, ModelError, ModelFailure};
-pub use graded::graded_model;
+pub use graded::{graded_model, sized_model};
 
 use self::tissue::{Mixing, tissue_of};
 use crate::discretization::boundary::BoundaryPoint;

@@ -2,23 +2,30 @@
 //!
 //! The error of a model is estimated against an *independent* method: quadratic triangles refined where the answers ask
 //! for it, with an error that nested meshes certify (see the module `goal_oriented`). Nodes of other methods are graded
-//! towards the singular points, level by level, until their distance to that, with what it leaves open, is within the
-//! tolerance. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
+//! towards the singular points; where their distance to that, with what it leaves open, is not within the tolerance, they are
+//! set as close as the triangles' solution says that the answers need them (see the module `curvature`), and closer, level by
+//! level. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
 
+use super::curvature::spacing_for;
 use super::goal_oriented::Refinement;
 use super::reference::Reference;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Integration, Resolution};
-use crate::model::{ModelError, TissueModel, graded_model};
+use crate::model::{ModelError, TissueModel, graded_model, sized_model};
 use crate::scene::Scene;
 use serde::Serialize;
 
 /// From this tolerance on, refinement starts at the coarsest level; below it, the coarsest levels could only agree by
 /// accident.
 const LOOSE: f64 = 0.03;
-/// Levels by which refinement goes on at most in one go.
-const LONGEST_SKIP: i32 = 2;
+/// What sized nodes aim at when they are set again, over what the estimate says would do; and what is aimed at, at least and
+/// at most, over what was before: nodes grow up to fourfold at once.
+const SAFETY: f64 = 0.7;
+const SMALLEST_STEP: f64 = 0.25;
+const LARGEST_STEP: f64 = 0.8;
+/// What is aimed at when that takes too many nodes, over what was.
+const EASE: f64 = 1.1;
 /// Share of the tolerance that the reference may leave open.
 const REFERENCE_SHARE: f64 = 0.25;
 /// The same where an accepted model's errors drown in it.
@@ -115,13 +122,20 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut reference = Reference::sharpened(&mut refinement, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
     let mut level = first_level(tolerance);
-    let mut tried = level - 1;
+    let (mut aim, mut aimed) = (tolerance, f64::INFINITY);
     while level <= MAX_LEVEL {
-        let model = match graded_model(scene, method, level) {
+        let built = match (best, refinement.present()) {
+            // Gradings know no better where nodes are needed; the answers do.
+            (Some(_), Some((mesh, certified))) => {
+                sized_model(scene, method, level, |slope| spacing_for(aim, mesh, certified, slope))
+            }
+            _ => graded_model(scene, method, level),
+        };
+        let model = match built {
             Ok(model) => model,
-            // Levels were skipped on the way here: the finest that can be afforded is among them.
-            Err(ModelError::TooManyNodes { .. }) if level > tried + 1 => {
-                level -= 1;
+            // The finest that can be afforded is between this and what was tried.
+            Err(ModelError::TooManyNodes { .. }) if aim * EASE < LARGEST_STEP * aimed => {
+                aim *= EASE;
                 continue;
             }
             Err(ModelError::TooManyNodes { .. }) => break,
@@ -145,10 +159,12 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
             }
             return Ok(Judged { model, estimate: Some(estimate), reference: Some(reference) });
         }
-        tried = level;
-        // A level halves the error at best, so those that could not reach the tolerance are not tried; but what the
-        // coarsest levels leave says little about the finer ones.
-        level += ((estimate.worst() / tolerance).log2().floor() as i32).clamp(1, LONGEST_SKIP);
+        level += 1;
+        if best.is_some() {
+            // The sized nodes fell short.
+            aimed = aim;
+            aim *= (SAFETY * tolerance / estimate.worst()).clamp(SMALLEST_STEP, LARGEST_STEP);
+        }
         if best.is_none_or(|b| estimate.worst() < b.worst()) {
             best = Some(estimate);
         }

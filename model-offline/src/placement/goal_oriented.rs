@@ -14,7 +14,7 @@
 use super::rest::{Fields, Loads, RestResponse, for_each_paddle, response_of};
 use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::{Integration, Method, Planar};
-use crate::geometry::Point2;
+use crate::geometry::{Point2, cross};
 use crate::material::Material;
 use crate::mechanics::Tissue;
 use crate::mechanics::assembly::displacement_gradient;
@@ -49,6 +49,8 @@ pub(super) struct Certified {
     pub open_displacement: f64,
     /// Nodes of the fine model.
     pub nodes: usize,
+    /// Fields of the coarse model, paddle by paddle.
+    pub fields: Vec<Fields>,
 }
 
 impl Certified {
@@ -68,6 +70,11 @@ pub(super) struct Refinement {
 }
 
 impl Refinement {
+    /// The present mesh and what it says.
+    pub(super) fn present(&self) -> Option<(&Triangulation, &Certified)> {
+        self.last.as_ref().map(|(certified, _)| (&self.mesh, certified))
+    }
+
     /// The coarsest mesh, not solved yet.
     ///
     /// # Errors
@@ -175,7 +182,7 @@ impl Pair {
             Ok(())
         })?;
         let nodes = self.fine.nodes();
-        Ok((Certified { model: self.coarse, responses, limit, open, open_displacement, nodes }, parts))
+        Ok((Certified { model: self.coarse, responses, limit, open, open_displacement, nodes, fields: coarse }, parts))
     }
 
     /// Stiffness of the fine triangles at rest, between flat displacement gradients.
@@ -225,7 +232,7 @@ impl Pair {
 
 /// What is prescribed and where it is looked at, as weights on the fields (paddle x, y, needle, target x, y): the
 /// controllability measure ‖b‖, whose relative change is `−(J⁻ᵀ b)ᵀ ∂J b / ‖b‖²`, and the needle's two displacements.
-fn pairs(response: &RestResponse, largest: f64) -> [([f64; 5], [f64; 5]); 3] {
+pub(super) fn pairs(response: &RestResponse, largest: f64) -> [([f64; 5], [f64; 5]); 3] {
     let b = response.best_direction.unwrap_or_default();
     let w = response
         .jacobian
@@ -262,7 +269,7 @@ fn left_open(coarse: &RestResponse, fine: &RestResponse) -> f64 {
 
 /// Displacement gradients of every field at the corners of every triangle: they are linear, and the integration points
 /// have barycentric coordinates (2/3, 1/6, 1/6).
-fn corner_gradients(model: &TissueModel, fields: &Fields) -> [Vec<[Matrix2<f64>; 3]>; 5] {
+pub(super) fn corner_gradients(model: &TissueModel, fields: &Fields) -> [Vec<[Matrix2<f64>; 3]>; 5] {
     let rule = model.rule();
     std::array::from_fn(|f| {
         (0..model.cells().len())
@@ -283,7 +290,6 @@ fn point_of(model: &TissueModel, q: usize) -> Point2 {
 }
 
 fn barycentric(corners: &[Point2], x: Point2) -> [f64; 3] {
-    use crate::geometry::cross;
     let twice = cross(corners[1] - corners[0], corners[2] - corners[0]);
     std::array::from_fn(|k| cross(corners[(k + 1) % 3] - x, corners[(k + 2) % 3] - x) / twice)
 }

@@ -5,6 +5,7 @@ pub mod accuracy;
 pub mod adaptive;
 pub mod controllability;
 pub mod cross_check;
+mod curvature;
 mod goal_oriented;
 pub mod hindrance;
 pub mod reference;

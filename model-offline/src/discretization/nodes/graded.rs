@@ -6,6 +6,7 @@
 //! same number of nodes on every octave of r.
 
 use super::features::Features;
+use super::sizing::Sizing;
 use crate::geometry::{Location, Point2, Polygon, cross, distance_to_segment};
 use rstar::RTree;
 
@@ -71,10 +72,12 @@ impl Grading {
     }
 }
 
-/// What the spacing depends on: singular points with a factor on the finest spacing, and edges of inclusions.
+/// What the spacing depends on: singular points with a factor on the finest spacing, edges of inclusions, and what is wanted
+/// besides.
 struct Field<'a> {
     grading: &'a Grading,
     singular: Vec<(Point2, f64)>,
+    wanted: Option<&'a Sizing>,
     interfaces: Vec<(Point2, Point2)>,
     narrows: Vec<[(Point2, Point2); 2]>,
 }
@@ -88,7 +91,8 @@ impl Field<'_> {
         // The distances from two sides add up to the width between them, and grow away from there.
         let to = |(a, b): (Point2, Point2)| distance_to_segment(x, a, b);
         let narrows = self.narrows.iter().map(|[a, b]| narrow * (to(*a) + to(*b)));
-        points.chain(edges).chain(narrows).fold(coarsest, f64::min)
+        let wanted = self.wanted.map(|sizing| sizing.at(x));
+        points.chain(edges).chain(narrows).chain(wanted).fold(coarsest, f64::min)
     }
 }
 
@@ -138,6 +142,15 @@ fn singular_points(features: &Features) -> Vec<(Point2, f64)> {
 
 /// Generates graded nodes.
 pub fn graded_nodes(features: &Features, grading: &Grading) -> Vec<Point2> {
+    nodes(features, grading, None)
+}
+
+/// The same with nodes no farther apart than is `wanted`.
+pub fn sized_nodes(features: &Features, grading: &Grading, wanted: &Sizing) -> Vec<Point2> {
+    nodes(features, grading, Some(wanted))
+}
+
+fn nodes(features: &Features, grading: &Grading, wanted: Option<&Sizing>) -> Vec<Point2> {
     let outline = &features.outline;
     let tolerance = COINCIDENT * outline.size();
     let interfaces: Vec<(Point2, Point2)> = features.inclusions.iter().flat_map(Polygon::edges).collect();
@@ -145,7 +158,7 @@ pub fn graded_nodes(features: &Features, grading: &Grading) -> Vec<Point2> {
     // Along a shaft forces act as they do along the edge of an inclusion.
     let shaft = features.shaft.map(|[entry, tip]| (entry, tip));
     let interfaces = interfaces.into_iter().chain(shaft).collect();
-    let field = Field { grading, singular: singular_points(features), interfaces, narrows };
+    let field = Field { grading, singular: singular_points(features), wanted, interfaces, narrows };
 
     // Features first, then nodes along outline and needle contact between them.
     let mut positions: Vec<Point2> = Vec::new();

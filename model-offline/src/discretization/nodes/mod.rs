@@ -4,3 +4,4 @@ pub mod bisection;
 pub mod features;
 pub mod graded;
 pub mod lattice;
+pub mod sizing;
