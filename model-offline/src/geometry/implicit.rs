@@ -1,0 +1,113 @@
+//! Bodies in space given implicitly: where a function, the level, is negative; and the smooth sheets that their surfaces are
+//! made of.
+
+use super::point::Point;
+use std::fmt::Debug;
+
+/// A body given by a function that is negative inside of it.
+pub trait Implicit: Debug + Send + Sync {
+    /// Negative inside, 0 on the boundary, near which it is about the signed distance (Lipschitz constant about 1);
+    /// length units.
+    fn level(&self, x: &Point<3>) -> f64;
+
+    /// The gradient of the level; no unit. By default central differences.
+    fn gradient(&self, x: &Point<3>) -> Point<3> {
+        let size = self.bounds().map_or_else(|| x.norm().max(1.0), |(low, high)| (high - low).norm());
+        let step = 1e-6 * size;
+        Point::from_fn(|k, _| {
+            let mut forth = *x;
+            let mut back = *x;
+            forth[k] += step;
+            back[k] -= step;
+            (self.level(&forth) - self.level(&back)) / (2.0 * step)
+        })
+    }
+
+    /// Opposite corners of a box that holds the body, length units; none if the body has no end.
+    fn bounds(&self) -> Option<(Point<3>, Point<3>)>;
+
+    /// The smooth pieces that the surface is made of; by default the surface is smooth.
+    fn sheets(&self) -> Vec<Sheet<'_>>;
+
+    /// The plane of a flat region, which as a patch catches only what lies in that plane.
+    fn carrier(&self) -> Option<Sheet<'_>> {
+        None
+    }
+
+    /// The level that decides what a patch holds of a surface; length units. In the plane of a flat region it is the
+    /// level within that plane, elsewhere it is positive.
+    fn patch_level(&self, x: &Point<3>) -> f64 {
+        self.level(x)
+    }
+
+    /// Whether a point belongs to the patch. Its rim does.
+    fn holds(&self, x: &Point<3>, tolerance: f64) -> bool {
+        self.patch_level(x) <= tolerance
+    }
+}
+
+/// A smooth surface without edges: where its level vanishes. Sharp edges of a body are where two sheets vanish.
+#[derive(Debug, Clone, Copy)]
+pub enum Sheet<'a> {
+    /// The plane normal·x = offset.
+    Plane {
+        /// Unit normal, outwards.
+        normal: Point<3>,
+        /// Signed distance of the origin from the plane, times −1; length units.
+        offset: f64,
+    },
+    /// An endless circular tube.
+    Tube {
+        /// A point of the axis, length units.
+        from: Point<3>,
+        /// Unit vector along the axis.
+        axis: Point<3>,
+        /// Length units.
+        radius: f64,
+    },
+    /// The surface of a body without edges.
+    Smooth(&'a dyn Implicit),
+}
+
+impl Sheet<'_> {
+    /// Negative inside, zero on the sheet, a signed distance near it; length units.
+    pub fn level(&self, x: &Point<3>) -> f64 {
+        match self {
+            Self::Plane { normal, offset } => normal.dot(x) - offset,
+            Self::Tube { from, axis, radius } => across(x - from, axis).norm() - radius,
+            Self::Smooth(body) => body.level(x),
+        }
+    }
+
+    /// The gradient of the level; no unit.
+    pub fn gradient(&self, x: &Point<3>) -> Point<3> {
+        match self {
+            Self::Plane { normal, .. } => *normal,
+            Self::Tube { from, axis, .. } => {
+                across(x - from, axis).try_normalize(0.0).unwrap_or_else(|| perpendicular(axis))
+            }
+            Self::Smooth(body) => body.gradient(x),
+        }
+    }
+
+    /// Whether both are one plane, on whichever side, to within `tolerance` (length units, near the origin).
+    pub fn is_same_plane(&self, other: &Sheet<'_>, tolerance: f64) -> bool {
+        let (Self::Plane { normal, offset }, Sheet::Plane { normal: n, offset: o }) = (self, other) else {
+            return false;
+        };
+        let sign = normal.dot(n).signum();
+        (normal - n * sign).norm() < 1e-12 && (offset - o * sign).abs() <= tolerance
+    }
+}
+
+/// The part of `v` across the unit vector `axis`.
+fn across(v: Point<3>, axis: &Point<3>) -> Point<3> {
+    v - axis * axis.dot(&v)
+}
+
+/// Some unit vector across `axis`.
+fn perpendicular(axis: &Point<3>) -> Point<3> {
+    let mut unit = Point::<3>::zeros();
+    unit[axis.iamin()] = 1.0;
+    across(unit, axis).normalize()
+}
