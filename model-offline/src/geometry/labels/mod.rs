@@ -1,0 +1,97 @@
+//! Segmented images: a label per voxel, from NIfTI-1 or NRRD, and the bodies that labels make.
+//!
+//! World coordinates are millimetres to the right, to the front and upwards (RAS), as NIfTI has them; NRRD files of
+//! 3D Slicer go to the left and to the back (LPS) and are turned, so that the same segmentation is at the same place.
+
+mod body;
+mod error;
+mod smooth;
+#[cfg(test)]
+mod synthetic;
+mod transform;
+
+pub use body::LabelBody;
+pub use error::LabelError;
+#[cfg(test)]
+pub(crate) use synthetic::synthetic_breast;
+
+use crate::geometry::point::Point;
+use nalgebra::{Matrix3, Matrix4};
+use std::collections::BTreeMap;
+
+/// So many voxels at most: 512 in every direction, 256 MiB.
+pub const MOST_VOXELS: u64 = 1 << 27;
+
+/// A label per voxel, and where voxels are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Labels {
+    /// Number of voxels along each axis.
+    pub size: [usize; 3],
+    /// From indices of voxels, (0, 0, 0) the middle of the first one, to millimetres (RAS).
+    pub to_world: Matrix4<f64>,
+    /// Labels, the first axis fastest: voxel (i, j, k) is at `i + size[0] * (j + size[1] * k)`.
+    pub data: Vec<u16>,
+    /// Names of labels, where the file has them.
+    pub names: BTreeMap<u16, String>,
+}
+
+/// How much there is of a label.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelCount {
+    /// The label.
+    pub label: u16,
+    /// Its name, where the file has one.
+    pub name: Option<String>,
+    /// Number of voxels.
+    pub voxels: usize,
+    /// Their volume in mm³.
+    pub volume: f64,
+}
+
+impl Labels {
+    /// Volume of a voxel in mm³.
+    pub fn voxel_volume(&self) -> f64 {
+        self.axes().determinant().abs()
+    }
+
+    /// Steps of the three axes in mm, a column each.
+    pub(crate) fn axes(&self) -> Matrix3<f64> {
+        self.to_world.fixed_view::<3, 3>(0, 0).into_owned()
+    }
+
+    /// The label of a voxel; 0 beside the image.
+    pub fn at(&self, voxel: [i64; 3]) -> u16 {
+        let mut place = 0;
+        for axis in [2, 1, 0] {
+            match usize::try_from(voxel[axis]) {
+                Ok(i) if i < self.size[axis] => place = place * self.size[axis] + i,
+                _ => return 0,
+            }
+        }
+        self.data.get(place).copied().unwrap_or(0)
+    }
+
+    /// Where the middle of a voxel is, in mm (RAS).
+    pub fn world(&self, voxel: [f64; 3]) -> Point<3> {
+        let [i, j, k] = voxel;
+        (self.to_world * nalgebra::Vector4::new(i, j, k, 1.0)).xyz()
+    }
+
+    /// Every label but 0 with its voxels and its volume, in the order of their numbers.
+    pub fn counts(&self) -> Vec<LabelCount> {
+        let mut counts: BTreeMap<u16, usize> = BTreeMap::new();
+        for same in self.data.chunk_by(|a, b| a == b) {
+            *counts.entry(same[0]).or_default() += same.len();
+        }
+        counts.remove(&0);
+        let volume = self.voxel_volume();
+        let count = |(label, voxels): (u16, usize)| {
+            let name = self.names.get(&label).cloned();
+            LabelCount { label, name, voxels, volume: voxels as f64 * volume }
+        };
+        counts.into_iter().map(count).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;
