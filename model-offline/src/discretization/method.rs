@@ -38,13 +38,32 @@ choice! {
         FemT3,
         /// Quadratic triangles on the same nodes.
         FemT6,
+        /// Linear tetrahedra, in space.
+        FemT4,
+        /// Quadratic tetrahedra, in space.
+        FemT10,
     }
 }
 
 impl Integration {
+    /// The rules of the plane.
+    pub const PLANAR: &[Self] =
+        &[Self::Dni, Self::Scni, Self::ScniStabilised, Self::Mscni, Self::Nsni, Self::Gauss, Self::FemT3, Self::FemT6];
+    /// The rules of space.
+    pub const SPATIAL: &[Self] = &[Self::Dni, Self::Scni, Self::ScniStabilised, Self::Mscni, Self::FemT4, Self::FemT10];
+
     /// Whether it is a finite-element baseline: basis and support do not apply.
     pub fn is_element(self) -> bool {
-        matches!(self, Self::FemT3 | Self::FemT6)
+        matches!(self, Self::FemT3 | Self::FemT6 | Self::FemT4 | Self::FemT10)
+    }
+
+    /// The same in space, where nodal cells are the duals of tetrahedra and the farthest neighbour is that along the longest
+    /// edge: 1.2 leaves less error than 1.49 (block, 4,268 nodes: 7.0 against 8.6 %), with two thirds of the pairs.
+    pub fn default_support_in_space(self) -> f64 {
+        match self {
+            Self::ScniStabilised | Self::Mscni => 1.2,
+            _ => 2.0,
+        }
     }
 
     /// Whether it integrates over nodal cells.
@@ -132,8 +151,8 @@ impl Method {
     /// Basis of the displacement itself: that of quadratic triangles is quadratic whatever the shape functions' is.
     pub fn displacement_basis(&self) -> Basis {
         match self.integration {
-            Integration::FemT3 => Basis::Linear,
-            Integration::FemT6 => Basis::Quadratic,
+            Integration::FemT3 | Integration::FemT4 => Basis::Linear,
+            Integration::FemT6 | Integration::FemT10 => Basis::Quadratic,
             _ => self.basis,
         }
     }

@@ -8,15 +8,20 @@
 pub mod approximation;
 pub mod boundary;
 pub mod cells;
+pub mod meshing;
 pub mod method;
 pub mod nodes;
 pub mod planar;
 pub mod quadrature;
+pub mod spatial;
+pub mod tetrahedra;
 
 pub use approximation::node_cloud::NodeCloud;
 pub use approximation::shape_functions::{ShapeError, ShapeFunctions, Stencil, Wanted};
 pub use cells::nodal_cells::NodalCell;
+pub use meshing::TetMesh;
 pub use method::{Basis, Consistency, Discretization, Essential, Integration, Method, Resolution};
 pub use nodes::features::Features;
 pub use planar::{DiscretizationError, Planar};
 pub use quadrature::integration::Quadrature;
+pub use spatial::{Spatial, SpatialError};

@@ -20,6 +20,9 @@ pub enum DiscretizationError {
     /// The nodes cannot be triangulated.
     #[error(transparent)]
     Triangulation(#[from] TriangulationError),
+    /// A rule that is not there in the plane.
+    #[error("integration {0} is one of space: in the plane take fem-t3 or fem-t6")]
+    Spatial(Integration),
 }
 
 #[derive(Debug)]
@@ -50,6 +53,9 @@ impl Planar {
         spacing: Option<f64>,
         method: Method,
     ) -> Result<Self, DiscretizationError> {
+        if !Integration::PLANAR.contains(&method.integration) {
+            return Err(DiscretizationError::Spatial(method.integration));
+        }
         if method.integration.is_element() {
             let triangles = triangulate(&nodes, outline, inclusions)?;
             return Ok(Self::on_triangles(nodes, triangles, method));
@@ -79,7 +85,7 @@ impl Planar {
             Integration::Gauss => integration::gauss(&shape, &triangles, &cells, method.basis, method.consistency)?,
             Integration::ScniStabilised => subcells::scni_stabilised(&shape, &cells, subcells::STABILISATION)?,
             Integration::Mscni => subcells::modified_scni(&shape, &cells)?,
-            Integration::Scni | Integration::FemT3 | Integration::FemT6 => {
+            Integration::Scni | Integration::FemT3 | Integration::FemT6 | Integration::FemT4 | Integration::FemT10 => {
                 integration::stabilised_conforming_nodal(&shape, &cells)?
             }
         };
@@ -137,7 +143,9 @@ impl Planar {
             | Integration::ScniStabilised
             | Integration::Mscni
             | Integration::Nsni => &integration::GAUSS_2,
-            Integration::Gauss | Integration::FemT3 | Integration::FemT6 => &integration::GAUSS_3,
+            Integration::Gauss | Integration::FemT3 | Integration::FemT6 | Integration::FemT4 | Integration::FemT10 => {
+                &integration::GAUSS_3
+            }
         }
     }
 

@@ -7,7 +7,6 @@ use crate::placement::reference::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::scene::Scene;
 use std::time::Instant;
-use strum::VariantArray as _;
 
 /// What a discretization turned out to be worth.
 #[derive(Debug, Clone)]
@@ -81,7 +80,7 @@ pub fn families(scene: &Scene, extent: Extent) -> Vec<Vec<Discretization>> {
         [1.0, 0.5, 0.25, 0.125].iter().take(extent.choose(4, 2)).map(|s| Resolution::Spacing(base * s)).collect();
     let graded: Vec<Resolution> = (-2..=extent.choose(4, 1)).map(Resolution::Level).collect();
     let mut families = Vec::new();
-    for &integration in Integration::VARIANTS {
+    for &integration in Integration::PLANAR {
         let shapes: &[(Basis, f64)] = match (integration.is_element(), extent) {
             (true, _) => &[(Basis::Linear, 2.0)],
             (false, Extent::Quick) => &[(Basis::Linear, 1.5), (Basis::Linear, 2.0)],

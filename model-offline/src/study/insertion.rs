@@ -14,7 +14,6 @@ use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::Vector2;
 use std::convert::Infallible;
 use std::time::Instant;
-use strum::VariantArray as _;
 
 /// Barrier over the stiffness at rest that gives a law without a mesh limit at finite depth one (the paper's law loses
 /// stability the earlier, the finer its nodes are; with 0.3 of its stiffness every method reaches the whole depth at
@@ -123,7 +122,7 @@ pub(super) fn insertion_points(scene: &Scene, extent: Extent) -> Result<Insertio
         ],
     };
     let mut points = Vec::new();
-    for &integration in Integration::VARIANTS {
+    for &integration in Integration::PLANAR {
         for &nodes in nodes {
             let candidate = scene.discretization.with(nodes, Method::new(integration));
             for law in [Linearity::Nonlinear, Linearity::Linear] {

@@ -12,19 +12,18 @@ pub(super) fn look(integration: Integration) -> (Colour, Marker) {
         Integration::Mscni => (Colour::Ink, Marker::TriangleLeft),
         Integration::Nsni => (Colour::Purple, Marker::TriangleRight),
         Integration::Gauss => (Colour::Yellow, Marker::Pentagon),
-        Integration::FemT3 => (Colour::Green, Marker::Triangle),
-        Integration::FemT6 => (Colour::Vermillion, Marker::TriangleDown),
+        Integration::FemT3 | Integration::FemT4 => (Colour::Green, Marker::Triangle),
+        Integration::FemT6 | Integration::FemT10 => (Colour::Vermillion, Marker::TriangleDown),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use strum::VariantArray as _;
 
     #[test]
     fn no_two_methods_share_a_colour_or_a_shape() {
-        let all = Integration::VARIANTS;
+        let all = Integration::PLANAR;
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| look(*a).0 != look(*b).0 && look(*a).1 != look(*b).1), "{a}");
         }

@@ -31,12 +31,12 @@ fn shape_functions(model: &TissueModel) -> f64 {
     let nodes = model.nodes() as f64;
     // Points per node at which shape functions are evaluated.
     let points = match method.integration {
-        Integration::FemT3 | Integration::FemT6 => return PER_ELEMENT_NODE * nodes,
+        _ if method.integration.is_element() => return PER_ELEMENT_NODE * nodes,
         Integration::Dni => 1.0,
         Integration::Scni => 8.0,
         Integration::ScniStabilised | Integration::Mscni => 16.0,
         Integration::Nsni => 11.0,
-        Integration::Gauss => 15.0,
+        _ => 15.0,
     };
     let neighbours = (2.0 * method.support).powi(2);
     let basis = if method.basis == Basis::Quadratic { QUADRATIC } else { 1.0 };

@@ -23,9 +23,9 @@ fn empty_series(integration: Integration) -> Series {
     let (colour, marker) = look(integration);
     let dash = match integration {
         Integration::Dni => Dash::Dotted,
-        Integration::Nsni | Integration::Mscni | Integration::FemT3 => Dash::Dashed,
+        Integration::Nsni | Integration::Mscni | Integration::FemT3 | Integration::FemT4 => Dash::Dashed,
         Integration::Gauss => Dash::DashDot,
-        Integration::Scni | Integration::ScniStabilised | Integration::FemT6 => Dash::Solid,
+        Integration::Scni | Integration::ScniStabilised | Integration::FemT6 | Integration::FemT10 => Dash::Solid,
     };
     Series::scatter(name(integration), colour, marker, Vec::new()).joined(dash)
 }
@@ -57,7 +57,7 @@ fn by_integration(study: &Stability, place: Abscissa<'_>, height: fn(&Experiment
         }
         series
     };
-    Integration::VARIANTS.iter().map(of_rule).collect()
+    Integration::PLANAR.iter().map(of_rule).collect()
 }
 
 /// Mean over the rules of their values at the left and at the right end.
@@ -170,7 +170,7 @@ fn conclusion(study: &Stability) -> Option<String> {
         let own = base(&study.scene, integration, study.spacing);
         distinct.iter().find(|(experiment, _)| *experiment == own).map(|(_, outcome)| (integration, outcome.depth))
     };
-    let depths: Vec<(Integration, f64)> = Integration::VARIANTS.iter().filter_map(depth).collect();
+    let depths: Vec<(Integration, f64)> = Integration::PLANAR.iter().filter_map(depth).collect();
     let most = depths.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let least = depths.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let (most, least) = ((name(most.0), plain(most.1)), (name(least.0), plain(least.1)));

@@ -4,7 +4,6 @@ use super::plan::{Experiment, Parameter, Safeguards, Value};
 use super::{ExperimentResult, Stability};
 use crate::discretization::{Integration, Method};
 use std::fmt::Write as _;
-use strum::VariantArray as _;
 
 /// Depths within this share of the larger one count as the same.
 const SAME: f64 = 0.05;
@@ -137,13 +136,13 @@ pub fn summary(study: &Stability) -> String {
 /// Depths by integration rule and parameter.
 fn write_depths(study: &Stability, out: &mut String) {
     let _ = write!(out, "{:<26}", "depth reached");
-    for &integration in Integration::VARIANTS {
+    for &integration in Integration::PLANAR {
         let _ = write!(out, "{:>9}", integration.name());
     }
     out.push('\n');
     let mut line = |label: &str, pick: &dyn Fn(&super::Entry) -> bool| {
         let _ = write!(out, "{label:<26}");
-        for &integration in Integration::VARIANTS {
+        for &integration in Integration::PLANAR {
             let depths: Vec<f64> = study
                 .rows
                 .iter()

@@ -217,7 +217,7 @@ pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
     let Resolution::Spacing(spacing) = scene.discretization.resolution else { return Vec::new() };
     let factors = extent.choose(&[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25] as &[f64], &[2.0, 1.0, 0.5]);
     let mut entries = Vec::new();
-    for &integration in Integration::VARIANTS {
+    for &integration in Integration::PLANAR {
         for factor in factors {
             // 0.15, not 0.15000000000000002.
             let experiment = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
@@ -229,8 +229,7 @@ pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
             sweeps(scene, base(scene, integration, 0.5 * spacing), &Values::few(), &mut entries);
         }
     }
-    let key =
-        |e: &Entry| (e.parameter, Integration::VARIANTS.iter().position(|m| *m == e.experiment.method.integration));
+    let key = |e: &Entry| (e.parameter, Integration::PLANAR.iter().position(|m| *m == e.experiment.method.integration));
     entries.sort_by(|a, b| {
         key(a)
             .cmp(&key(b))

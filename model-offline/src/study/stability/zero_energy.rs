@@ -14,7 +14,6 @@ use crate::material::{Material as _, Tensor4};
 use crate::model::ModelError;
 use crate::scene::Scene;
 use nalgebra::{DMatrix, DVector, Matrix2};
-use strum::VariantArray as _;
 
 /// Eigenvalues below this share of the largest count as zero.
 const ZERO: f64 = 1e-10;
@@ -54,7 +53,7 @@ pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelErro
     [0.0, 0.4]
         .into_iter()
         .flat_map(|jitter| {
-            Integration::VARIANTS.iter().map(move |m| Experiment { jitter, ..plan::base(scene, *m, spacing) })
+            Integration::PLANAR.iter().map(move |m| Experiment { jitter, ..plan::base(scene, *m, spacing) })
         })
         .map(|experiment| measure_one(scene, &experiment))
         .collect()
