@@ -7,6 +7,7 @@ use model_offline::discretization::{Basis, Essential, Integration, Resolution};
 use model_offline::model::ModelError;
 use model_offline::output::terminal;
 use model_offline::parallel;
+use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::scene::{Scene, limits};
 use std::path::PathBuf;
 
@@ -14,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
     /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, breast-world, prostate, prostate-world,
-    /// tethered).
+    /// tethered; in space, for `place`: block, mound).
     pub(super) scene: PathBuf,
     /// Leave the inclusions out: homogeneous tissue.
     #[arg(long)]
@@ -35,6 +36,15 @@ impl SceneArgs {
             eprintln!("note: [motion] and deflection are left out here; `fit`, `compare` and `host-sim run` take them");
         }
         Ok(scene)
+    }
+
+    /// The scene, where it is one in space.
+    pub(super) fn read_in_space(&self) -> Result<Option<SpaceScene>, CliError> {
+        match AnyScene::read(&self.scene)? {
+            AnyScene::Planar(_) => Ok(None),
+            AnyScene::Space(scene) if self.without_inclusion => Ok(Some(scene.without_inclusions())),
+            AnyScene::Space(scene) => Ok(Some(*scene)),
+        }
     }
 
     /// Whether the inclusions are to be left out.
@@ -124,6 +134,29 @@ impl DiscretizationArgs {
         spec.method.basis = self.basis.unwrap_or(spec.method.basis);
         spec.essential = self.essential.unwrap_or(spec.essential);
         limits::check(&scene.discretization, &scene.outline)?;
+        Ok(scene)
+    }
+}
+
+impl DiscretizationArgs {
+    /// The scene in space with the flags in it, checked.
+    pub(super) fn over_space(&self, mut scene: SpaceScene) -> Result<SpaceScene, CliError> {
+        if self.essential.is_some_and(|essential| essential != Essential::Transformation) {
+            return Err(CliError::usage("--essential: Nitsche's method is planar", "leave --essential out"));
+        }
+        let spec = &mut scene.discretization;
+        spec.resolution = match (self.spacing, self.tolerance) {
+            (Some(spacing), _) => Resolution::Spacing(spacing),
+            (_, Some(tolerance)) => Resolution::Tolerance(tolerance),
+            _ => spec.resolution,
+        };
+        if let Some(integration) = self.integration.filter(|i| *i != spec.method.integration) {
+            spec.method.integration = integration;
+            spec.method.support = integration.default_support_in_space();
+        }
+        spec.method.support = self.support.unwrap_or(spec.method.support);
+        spec.method.basis = self.basis.unwrap_or(spec.method.basis);
+        scene.check_discretization()?;
         Ok(scene)
     }
 }

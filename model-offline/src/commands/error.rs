@@ -5,7 +5,7 @@ use model_offline::model::ModelError;
 use model_offline::needle::NeedleError;
 use model_offline::output::result_file::ResultError;
 use model_offline::output::{OutputError, OutputRefused, PictureError};
-use model_offline::scene::{LimitError, Scene, SceneError};
+use model_offline::scene::{LimitError, Scene, SceneError, TissueVariant};
 use model_offline::solver::equilibrium::Failure;
 use model_offline::study::effects::EffectsError;
 use model_offline::study::fit::FitError;
@@ -152,9 +152,14 @@ impl CliError {
 
     /// The error, told in the JSON too when a computation failed, so that a script sees the reason.
     pub(super) fn reported(self, file: Option<&Path>, scene: &Scene) -> Self {
+        self.reported_of(file, &scene.name, scene.tissue())
+    }
+
+    /// The same of a scene of this name and tissue.
+    pub(super) fn reported_of(self, file: Option<&Path>, scene: &str, tissue: TissueVariant) -> Self {
         if self.exit_code() == 1 && file.is_some() {
             let document = serde_json::json!({
-                "scene": scene.name, "tissue": scene.tissue(),
+                "scene": scene, "tissue": tissue,
                 "failure": {"reason": self.reason(), "detail": self.to_string()},
             });
             if let Err(output) = json::write_json(file, &document) {

@@ -14,6 +14,7 @@ mod materials;
 mod new;
 mod pareto;
 mod place;
+mod place_space;
 mod place_text;
 mod schema;
 mod solve;
@@ -92,8 +93,10 @@ enum Command {
     #[command(after_help = "Example:\n  model-offline materials --json materials.json")]
     Materials(materials::MaterialsArgs),
     /// JSON Schema of the scene file.
-    #[command(after_help = "Example:\n  model-offline schema > scene.schema.json")]
-    Schema,
+    #[command(
+        after_help = "Examples:\n  model-offline schema > scene.schema.json\n  model-offline schema --dimension 3 > space.schema.json"
+    )]
+    Schema(schema::SchemaArgs),
 }
 
 /// Runs a command.
@@ -117,7 +120,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
         Command::Completions(args) => completions::run(&args, &mut Cli::command()),
         Command::Man(args) => man::run(&args, Cli::command()),
         Command::Materials(args) => materials::run(&args),
-        Command::Schema => schema::run(),
+        Command::Schema(args) => schema::run(&args),
     }
 }
 

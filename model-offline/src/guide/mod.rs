@@ -21,5 +21,8 @@ pub mod trust_the_numbers {}
 #[doc = include_str!("how_it_works.md")]
 pub mod how_it_works {}
 
+#[doc = include_str!("three_dimensions.md")]
+pub mod three_dimensions {}
+
 #[doc = include_str!("change_a_material.md")]
 pub mod change_a_material {}

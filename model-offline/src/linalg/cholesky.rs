@@ -6,12 +6,14 @@ use crate::geometry::Point;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
-use faer::{Conj, MatMut, Par, Side};
+use faer::{Conj, Mat, MatMut, Par, Side};
 use std::sync::Arc;
 
 /// From this many nodes on, nodes are ordered and not unknowns: the same fill for a quarter of the time.
@@ -50,6 +52,21 @@ impl SymbolicFactor {
         Self { symbolic: Arc::new(symbolic) }
     }
 
+    /// The same with the nodes `retained` (ascending) eliminated last, in their order, so that the factor's last columns are
+    /// the factor of what is left when all others are condensed.
+    ///
+    /// # Panics
+    /// When memory for the analysis cannot be had.
+    pub fn retaining<const D: usize>(pattern: &Pattern, positions: &[Point<D>], retained: &[u32]) -> Self {
+        let nodes = order_retaining(pattern, positions, retained);
+        let forward: Vec<u32> = nodes.iter().flat_map(|i| (0..D as u32).map(move |k| i * D as u32 + k)).collect();
+        let params = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..Default::default()
+        };
+        Self { symbolic: Arc::new(analyse_with(pattern.symbolic(), &forward, params)) }
+    }
+
     /// Entries of a factor.
     pub fn entries(&self) -> usize {
         self.symbolic.len_val()
@@ -79,11 +96,29 @@ fn analyse(matrix: SymbolicSparseColMatRef<'_, u32>, ordering: SymmetricOrdering
 
 /// `forward[k]` is eliminated k-th.
 fn analyse_ordered(matrix: SymbolicSparseColMatRef<'_, u32>, forward: &[u32]) -> SymbolicCholesky<u32> {
+    analyse_with(matrix, forward, CholeskySymbolicParams::default())
+}
+
+fn analyse_with(
+    matrix: SymbolicSparseColMatRef<'_, u32>,
+    forward: &[u32],
+    params: CholeskySymbolicParams<'_>,
+) -> SymbolicCholesky<u32> {
     let mut inverse = vec![0_u32; forward.len()];
     for (place, &u) in forward.iter().enumerate() {
         inverse[u as usize] = place as u32;
     }
-    analyse(matrix, SymmetricOrdering::Custom(PermRef::new_checked(forward, &inverse, forward.len())))
+    let order = SymmetricOrdering::Custom(PermRef::new_checked(forward, &inverse, forward.len()));
+    factorize_symbolic_cholesky(matrix, Side::Lower, order, params).expect("memory for the symbolic factorisation")
+}
+
+/// An elimination order with the `retained` nodes last: the others by whichever order of theirs alone fills less.
+fn order_retaining<const D: usize>(pattern: &Pattern, positions: &[Point<D>], retained: &[u32]) -> Vec<u32> {
+    let condensed: Vec<u32> = (0..pattern.blocks() as u32).filter(|i| retained.binary_search(i).is_err()).collect();
+    let inner = pattern.restricted(&condensed);
+    let places: Vec<Point<D>> = condensed.iter().map(|&i| positions[i as usize]).collect();
+    let order = order_nodes(&inner, &places);
+    order.into_iter().map(|i| condensed[i as usize]).chain(retained.iter().copied()).collect()
 }
 
 /// The elimination order of the nodes that fills less.
@@ -169,6 +204,33 @@ impl SparseCholesky {
             )
             .map(|_| ())
             .map_err(|_| NotPositiveDefinite)
+    }
+
+    /// The last `count` rows and columns of the factor, dense and lower triangular, and the unknowns that they belong to: of
+    /// an analysis that [retains](SymbolicFactor::retaining) nodes, the factor of what is left when all others are condensed.
+    pub(super) fn last(&self, count: usize) -> (Mat<f64>, Vec<u32>) {
+        let first = self.symbolic.nrows() - count;
+        let order = self.symbolic.perm();
+        let unknown = |place: usize| order.map_or(place as u32, |order| order.arrays().0[place]);
+        let mut dense = Mat::zeros(count, count);
+        if let SymbolicCholeskyRaw::Supernodal(symbolic) = self.symbolic.raw() {
+            let factor = SupernodalLltRef::new(symbolic, &self.factor);
+            for s in 0..symbolic.n_supernodes() {
+                let node = factor.supernode(s);
+                let (start, values) = (node.start(), node.val());
+                if start + values.ncols() <= first {
+                    continue;
+                }
+                let own = start..start + values.ncols();
+                let rows: Vec<usize> = own.clone().chain(node.pattern().iter().map(|&r| r as usize)).collect();
+                for column in own.filter(|column| *column >= first) {
+                    for (k, &row) in rows.iter().enumerate().filter(|(_, row)| **row >= column) {
+                        dense[(row - first, column - first)] = values[(k, column - start)];
+                    }
+                }
+            }
+        }
+        (dense, (first..first + count).map(unknown).collect())
     }
 
     /// Solves in place for `columns` right-hand sides stored one after the other.

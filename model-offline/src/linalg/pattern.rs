@@ -119,6 +119,32 @@ impl Pattern {
         self.column_starts[u] as usize + u % self.dimension
     }
 
+    /// The pattern of some of the nodes (ascending), numbered by their places.
+    pub(super) fn restricted(&self, nodes: &[u32]) -> Self {
+        let mut place = vec![u32::MAX; self.blocks()];
+        nodes.iter().enumerate().for_each(|(k, &i)| place[i as usize] = k as u32);
+        let lists: Vec<Vec<u32>> = nodes
+            .iter()
+            .map(|&j| {
+                let rows = self.block_starts[j as usize] as usize..self.block_starts[j as usize + 1] as usize;
+                self.block_rows[rows].iter().map(|&i| place[i as usize]).filter(|&i| i != u32::MAX).collect()
+            })
+            .collect();
+        let (mut block_starts, mut block_rows) = (vec![0_u32], Vec::new());
+        for list in lists {
+            block_rows.extend(list);
+            block_starts.push(block_rows.len() as u32);
+        }
+        // Blocks of one unknown: what is looked at is the graph.
+        Self {
+            dimension: 1,
+            column_starts: block_starts.clone(),
+            row_indices: block_rows.clone(),
+            block_starts,
+            block_rows,
+        }
+    }
+
     /// The graph of nodes that share a block.
     pub(super) fn graph(&self) -> Graph {
         let nodes = self.block_starts.len() - 1;

@@ -1,6 +1,7 @@
 //! Why a scene cannot be modelled.
 
-use crate::discretization::{DiscretizationError, ShapeError};
+use crate::discretization::meshing::StuffingError;
+use crate::discretization::{DiscretizationError, ShapeError, SpatialError};
 use crate::material::MaterialError;
 use crate::scene::NoSuchPaddle;
 use crate::solver::equilibrium::{Failure, FailureReason};
@@ -11,6 +12,25 @@ pub enum ModelError {
     /// Shape functions do not exist somewhere.
     #[error(transparent)]
     Shape(#[from] ShapeError),
+    /// A body in space cannot be discretised.
+    #[error(transparent)]
+    Spatial(#[from] SpatialError),
+    /// A body in space cannot be meshed.
+    #[error("the body cannot be meshed: {0}")]
+    Mesh(#[from] StuffingError),
+    /// A region without any of the surface in it.
+    #[error("the region of the {0} catches no surface of the body: move it onto the surface, or make it larger")]
+    NothingCaught(BoundaryPart),
+    /// Two patches claim the same nodes.
+    #[error("the {part} touches the {other} at ({:.4}, {:.4}, {:.4}): tissue cannot follow both; move one of them or make it smaller", at[0], at[1], at[2])]
+    PatchesTouch {
+        /// One of them.
+        part: BoundaryPart,
+        /// The other.
+        other: BoundaryPart,
+        /// A point of both, length units.
+        at: [f64; 3],
+    },
     /// The body cannot be discretised.
     #[error(transparent)]
     Discretization(#[from] DiscretizationError),
@@ -116,7 +136,9 @@ impl ModelError {
     /// What kind of thing went wrong.
     pub fn kind(&self) -> ModelFailure {
         match self {
-            Self::Shape(_) | Self::Discretization(DiscretizationError::Shape(_)) => ModelFailure::SingularMomentMatrix,
+            Self::Shape(_)
+            | Self::Discretization(DiscretizationError::Shape(_))
+            | Self::Spatial(SpatialError::Shape(_)) => ModelFailure::SingularMomentMatrix,
             Self::Discretization(DiscretizationError::Triangulation(_)) => ModelFailure::NoTriangulation,
             Self::Solve(failure) => ModelFailure::Solve(failure.reason),
             Self::NothingConstrained(_) => ModelFailure::NothingConstrained,
@@ -137,6 +159,9 @@ impl ModelError {
                 | Self::ImposedWeakly
                 | Self::RelaxesHeldWeakly
                 | Self::NeedleSlips
+                | Self::PatchesTouch { .. }
+                | Self::NothingCaught(_)
+                | Self::Spatial(SpatialError::Planar(_))
                 | Self::Material(_)
         )
     }

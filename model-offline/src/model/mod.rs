@@ -3,6 +3,7 @@
 mod derivatives;
 mod error;
 mod graded;
+pub mod space;
 mod tissue;
 
 pub use derivatives::Derivatives;

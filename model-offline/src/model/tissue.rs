@@ -64,11 +64,11 @@ pub(super) fn tissue_of(scene: &Scene, cells: &[NodalCell], mixing: Mixing) -> T
 }
 
 /// A part of a cell that is made of one thing.
-struct Phase {
-    /// Share of the cell's area.
-    share: f64,
+pub(super) struct Phase {
+    /// Share of the cell's area, or volume.
+    pub(super) share: f64,
     /// Materials with the factors on their energies.
-    parts: Vec<(u32, f64)>,
+    pub(super) parts: Vec<(u32, f64)>,
 }
 
 impl Phase {
@@ -79,7 +79,7 @@ impl Phase {
 
 /// One evaluation per law: shares of the same material add up, all scaled so that the shear modulus at rest is the mean
 /// that was asked for.
-fn mixture(phases: &[Phase], shear: &[f64], mixing: Mixing) -> Vec<(u32, f64)> {
+pub(super) fn mixture(phases: &[Phase], shear: &[f64], mixing: Mixing) -> Vec<(u32, f64)> {
     let scale = match (mixing, phases.len()) {
         (Mixing::Surrounding, 2..) => mean_over_area(phases, shear),
         _ => 1.0,

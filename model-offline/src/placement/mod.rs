@@ -10,6 +10,7 @@ mod goal_oriented;
 pub mod hindrance;
 pub mod reference;
 pub mod rest;
+pub mod space;
 pub mod study;
 pub mod verdict;
 pub mod workflow;

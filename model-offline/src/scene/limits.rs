@@ -1,8 +1,8 @@
 //! Numbers of a discretization that no scene is modelled with.
 
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
-use crate::discretization::{Discretization, Resolution};
-use crate::geometry::Polygon;
+use crate::discretization::{Discretization, Integration, Resolution};
+use crate::geometry::{Point, Polygon};
 
 /// More nodes than this are refused before any memory is taken.
 const MAX_NODES: f64 = 2.0e6;
@@ -38,6 +38,12 @@ pub enum LimitError {
     /// A kernel support that does not work.
     #[error("support is {0}")]
     Support(f64),
+    /// A rule that is not there in the plane.
+    #[error("integration {0} is one of space, and this scene is planar")]
+    Spatial(Integration),
+    /// A rule that is not there in space.
+    #[error("integration {0} is planar, and this scene is in space")]
+    Planar(Integration),
 }
 
 impl LimitError {
@@ -50,6 +56,11 @@ impl LimitError {
             Self::Tolerance(_) => "give a relative error between 0.0001 and 0.5".to_owned(),
             Self::Level(_) => format!("give a refinement level between {MIN_LEVEL} and {MAX_LEVEL}"),
             Self::Support(_) => "give a kernel support between 1 and 6 spacings; 2 is usual".to_owned(),
+            Self::Planar(_) => {
+                let known: Vec<&str> = Integration::SPATIAL.iter().map(|i| i.name()).collect();
+                format!("take one of {}", known.join(", "))
+            }
+            Self::Spatial(_) => "take fem-t3 or fem-t6 in the plane".to_owned(),
         }
     }
 }
@@ -60,6 +71,7 @@ impl LimitError {
 /// [`LimitError`], the first number that is out of its range.
 pub fn check(discretization: &Discretization, outline: &Polygon) -> Result<(), LimitError> {
     check_resolution(discretization.resolution, outline)?;
+    check_planar(discretization.method.integration)?;
     check_support(discretization.method.support)
 }
 
@@ -87,12 +99,47 @@ fn check_spacing(h: f64, outline: &Polygon) -> Result<(), LimitError> {
     Ok(())
 }
 
+/// More cells than this are refused before any memory is taken.
+const MOST_CELLS: f64 = 2e7;
+
+/// Whether a body in space whose bounding box has these sides can be discretized so.
+///
+/// # Errors
+/// [`LimitError`], the first number that is out of its range.
+pub fn check_in_space(discretization: &Discretization, extent: Point<3>) -> Result<(), LimitError> {
+    match discretization.resolution {
+        Resolution::Spacing(h) if !(h.is_finite() && h > 0.0) => return Err(LimitError::Spacing(h)),
+        Resolution::Spacing(h) if h > 0.5 * extent.norm() => {
+            return Err(LimitError::TooCoarse { spacing: h, size: extent.norm() });
+        }
+        Resolution::Spacing(h) => {
+            let nodes = extent.iter().map(|side| side / h).product::<f64>();
+            if nodes > MOST_CELLS {
+                return Err(LimitError::TooManyNodes { spacing: h, nodes });
+            }
+        }
+        Resolution::Tolerance(t) => check_tolerance(t)?,
+        Resolution::Level(level) if (MIN_LEVEL..=MAX_LEVEL).contains(&level) => {}
+        Resolution::Level(level) => return Err(LimitError::Level(level)),
+    }
+    let integration = discretization.method.integration;
+    if !Integration::SPATIAL.contains(&integration) {
+        return Err(LimitError::Planar(integration));
+    }
+    check_support(discretization.method.support)
+}
+
 /// Whether a tolerance can be asked for.
 ///
 /// # Errors
 /// [`LimitError::Tolerance`].
 pub fn check_tolerance(t: f64) -> Result<(), LimitError> {
     if (1e-4..=0.5).contains(&t) { Ok(()) } else { Err(LimitError::Tolerance(t)) }
+}
+
+/// Whether a rule is there in the plane.
+pub(super) fn check_planar(integration: Integration) -> Result<(), LimitError> {
+    if Integration::PLANAR.contains(&integration) { Ok(()) } else { Err(LimitError::Spatial(integration)) }
 }
 
 /// Whether a kernel support can be used.

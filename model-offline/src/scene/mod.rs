@@ -10,6 +10,7 @@ mod motion;
 pub mod schema;
 mod sensor;
 mod shaft;
+pub mod space;
 pub mod starter;
 mod tissue;
 mod validate;
@@ -34,7 +35,7 @@ use sha2::{Digest, Sha256};
 use std::path::Path;
 
 /// The bundled scenes: name and text.
-pub const BUNDLED: [(&str, &str); 7] = [
+pub const BUNDLED: [(&str, &str); 9] = [
     ("paper", include_str!("../../scenes/paper.toml")),
     ("paper-hull", include_str!("../../scenes/paper-hull.toml")),
     ("breast", include_str!("../../scenes/breast.toml")),
@@ -42,6 +43,8 @@ pub const BUNDLED: [(&str, &str); 7] = [
     ("prostate", include_str!("../../scenes/prostate.toml")),
     ("prostate-world", include_str!("../../scenes/prostate-world.toml")),
     ("tethered", include_str!("../../scenes/tethered.toml")),
+    ("block", include_str!("../../scenes/block.toml")),
+    ("mound", include_str!("../../scenes/mound.toml")),
 ];
 
 /// Letters in which a name may differ from the one that it was meant for.

@@ -94,13 +94,26 @@ pub struct SceneFile {
     pub fit: Option<Located<FitSection>>,
 }
 
+/// The dimension that a scene's text says, and where, if it says one: what else may stand there depends on it.
+pub(super) fn dimension_of(text: &str) -> Option<Located<u32>> {
+    #[derive(Deserialize)]
+    struct Peek {
+        scene: Dimension,
+    }
+    #[derive(Deserialize)]
+    struct Dimension {
+        dimension: Located<u32>,
+    }
+    toml::from_str::<Peek>(text).ok().map(|peek| peek.scene.dimension)
+}
+
 /// Name, dimension and unit labels.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneSection {
     /// Name used in reports and in the table.
     pub name: String,
-    /// 2 = plane strain; 3 = solid (not available from a scene file yet).
+    /// 2 = plane strain; 3 = solid, whose scenes have another schema (`model-offline schema --dimension 3`).
     pub dimension: Located<u32>,
     /// Labels for reports; presets of sensors and materials are converted to them, no other number is.
     #[serde(default)]

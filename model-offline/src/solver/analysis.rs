@@ -33,6 +33,22 @@ impl Analysis {
         }
     }
 
+    /// The same with some nodes (ascending) eliminated last; see [`SymbolicFactor::retaining`].
+    pub fn retaining<'a, const D: usize>(
+        rule: &'a Quadrature<D>,
+        positions: &[Point<D>],
+        constrained: impl Iterator<Item = &'a [u32]> + Clone,
+        retained: &[u32],
+    ) -> Self {
+        let lists = (0..rule.len()).map(|q| rule.point(q).nodes).chain(constrained);
+        let pattern = Pattern::new(D, positions.len(), lists);
+        Self {
+            blocks: Arc::new(BlockPositions::new(rule, &pattern)),
+            symbolic: SymbolicFactor::retaining(&pattern, positions, retained),
+            pattern: Arc::new(pattern),
+        }
+    }
+
     /// The sparsity of the tangent.
     pub fn pattern(&self) -> &Pattern {
         &self.pattern

@@ -16,13 +16,15 @@
 
 use super::analysis::Analysis;
 use super::conjugate_gradients::{Breakdown, Stop, conjugate_gradients, dot};
-use crate::linalg::{NotPositiveDefinite, Pattern, SparseCholesky};
+use crate::linalg::{CondensedFactor, NotPositiveDefinite, Pattern, SparseCholesky};
 use crate::mechanics::ConstrainedRows;
 use std::sync::Arc;
 
 /// Penalty over the mean diagonal of the tangent. Large enough that two or three rounds of multipliers reach rounding
 /// error, small enough that the factor of K_ρ keeps its digits.
 const PENALTY: f64 = 1e4;
+/// The same where the factor alone must hold them.
+const TIGHT_PENALTY: f64 = 1e8;
 /// Rounds of multipliers; each costs one back-substitution.
 const MAX_ROUNDS: usize = 12;
 /// More iterations than this cost as much as a factorisation.
@@ -35,6 +37,8 @@ pub struct ConstrainedSolver<const D: usize> {
     cholesky: SparseCholesky,
     constrained: ConstrainedRows,
     penalty: f64,
+    /// Penalty over the mean diagonal of the first tangent.
+    stiffness_ratio: f64,
     /// Block positions of every pair (row ≥ column) of every constrained stencil.
     positions: Vec<u32>,
     matrix: Vec<f64>,
@@ -78,11 +82,24 @@ impl<const D: usize> ConstrainedSolver<D> {
             cholesky: SparseCholesky::new(&analysis.symbolic),
             constrained: ConstrainedRows::default(),
             penalty: 0.0,
+            stiffness_ratio: PENALTY,
             positions: Vec::new(),
             work: Work::default(),
         };
         solver.constrain(rows);
         solver
+    }
+
+    /// The same with a penalty that holds the constrained rows to rounding without rounds of multipliers, for what is asked of
+    /// the factor itself. It costs as many digits where constrained rows are no single unknowns.
+    #[must_use]
+    pub(crate) fn held_tight(self) -> Self {
+        Self { stiffness_ratio: TIGHT_PENALTY, ..self }
+    }
+
+    /// What the unknowns of `nodes` nodes that the analysis retains answer, all others following.
+    pub(crate) fn condensed(&self, nodes: usize) -> CondensedFactor {
+        CondensedFactor::new(&self.cholesky, self.pattern.unknowns(), nodes * D)
     }
 
     /// Constrains other rows from now on; the symbolic analysis is kept. The pattern must cover their stencils too.
@@ -136,7 +153,7 @@ impl<const D: usize> ConstrainedSolver<D> {
 
     /// Mean diagonal entry of the tangent at the first factorisation: force per displacement of a node.
     pub fn rest_stiffness(&self) -> f64 {
-        self.penalty / PENALTY
+        self.penalty / self.stiffness_ratio
     }
 
     fn mean_diagonal(&self) -> f64 {
@@ -146,7 +163,7 @@ impl<const D: usize> ConstrainedSolver<D> {
 
     fn penalise(&mut self) {
         if self.penalty == 0.0 {
-            self.penalty = PENALTY * self.mean_diagonal();
+            self.penalty = self.stiffness_ratio * self.mean_diagonal();
         }
         let mut next = 0;
         for b in 0..self.constrained.len() {

@@ -8,7 +8,7 @@ mod shaft;
 use self::boundary::Boundary;
 use super::error::{SceneError, Source};
 use super::limits::{self, LimitError};
-use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile};
+use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile, dimension_of};
 use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene, Shaft};
 use crate::discretization::{Discretization, Method, Resolution};
 use crate::geometry::{Point2, Polygon, distance_to_polyline, distance_to_segment};
@@ -26,6 +26,13 @@ pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
             0..0,
             "the scene file is empty",
             "start from a bundled scene: model-offline/scenes/paper.toml",
+        ));
+    }
+    if let Some(dimension) = dimension_of(source.text).filter(|dimension| *dimension.get() != 2) {
+        return Err(source.error(
+            dimension.span(),
+            format!("dimension {} is not available here", dimension.get()),
+            "use dimension = 2 (plane strain); of scenes with dimension = 3 there is `model-offline place`",
         ));
     }
     let file: SceneFile = toml::from_str(source.text).map_err(|error| {
@@ -53,13 +60,6 @@ struct Validator<'a> {
 impl Validator<'_> {
     fn scene(&self) -> Checked<Scene> {
         let file = self.file;
-        if *file.scene.dimension.get() != 2 {
-            return Err(self.error(
-                file.scene.dimension.span(),
-                format!("dimension {} is not available from a scene file", file.scene.dimension.get()),
-                "use dimension = 2 (plane strain)",
-            ));
-        }
         let outline = self.polygon(&file.domain.outline, "outline")?;
         let boundary = Boundary::new(&outline, file.domain.outline.get(), &file.scene.units.length);
         let immobile = self.immobile(&boundary)?;
@@ -397,6 +397,7 @@ impl Validator<'_> {
             (None, None, Some(level)) => self.resolution(Resolution::Level(*level.get()), level.span(), outline)?,
         };
         let integration = section.integration.unwrap_or_default();
+        limits::check_planar(integration).map_err(|error| self.limit(located.span(), error))?;
         let support = match &section.support {
             Some(located) => {
                 let support = self.positive(located, "support")?;

@@ -1,0 +1,159 @@
+//! `model-offline place` of a scene in space: singles and pairs.
+
+use super::common::RunArgs;
+use super::error::CliError;
+use super::json::write_json;
+use model_offline::number::{decimals, length, smallest_told};
+use model_offline::placement::space::SpaceStudy;
+use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
+use model_offline::scene::space::SpaceScene;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::OnceLock;
+
+/// What stands where there is no number.
+const NONE: &str = "–";
+/// Pairs that are listed; all are in the JSON.
+const LISTED: usize = 10;
+
+pub(super) fn run(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), CliError> {
+    if !run.quiet {
+        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    }
+    place(scene, json, run).map_err(|error| error.reported_of(json, &scene.name, scene.tissue()))
+}
+
+fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), CliError> {
+    let bar = OnceLock::new();
+    let begin = |steps: u64| {
+        bar.get_or_init(|| run.progress(steps));
+    };
+    let progress = || {
+        bar.get().into_iter().for_each(|bar| bar.inc(1));
+    };
+    let study = SpaceStudy::run(scene, run.threads(), &begin, &progress)?;
+    bar.get().into_iter().for_each(|bar| bar.finish_and_clear());
+    write_json(json, &document(&study))?;
+    if !run.quiet {
+        print!("{}", summary(&study));
+    }
+    Ok(())
+}
+
+fn document(study: &SpaceStudy) -> Value {
+    let (scene, placement) = (study.model.scene(), &study.placement);
+    let (mut paddles, mut pairs) = (json!(placement.paddles), json!(placement.pairs));
+    let results = paddles.as_array_mut().into_iter().flatten().chain(pairs.as_array_mut().into_iter().flatten());
+    for (i, result) in results.enumerate() {
+        let error = study.error_estimate.as_ref().and_then(|estimate| estimate.by_set.get(i));
+        result["error"] = json!({ "controllability_measure": error });
+    }
+    json!({
+        "scene": scene.name,
+        "dimension": 3,
+        "tissue": scene.tissue(),
+        "nodes": study.model.nodes(),
+        "dofs": study.model.dofs(),
+        "integration": scene.discretization.method.integration,
+        "wall_s": study.wall_s,
+        "error_estimate": study.error_estimate,
+        "static_nodes": placement.profile_nodes,
+        "paddles": paddles,
+        "pairs": pairs,
+        "no_paddle": placement.no_paddle,
+        "optimum": placement.optimum,
+        "optimum_single": placement.optimum_single,
+    })
+}
+
+/// The study on a screen.
+fn summary(study: &SpaceStudy) -> String {
+    let (scene, placement) = (study.model.scene(), &study.placement);
+    let singles = placement.paddles.iter().map(|p| (vec![p.index], &p.answer));
+    let pairs = placement.pairs.iter().map(|p| (p.paddles.to_vec(), &p.answer));
+    let all: Vec<(Vec<u32>, &SpaceAnswer)> = singles.chain(pairs).collect();
+    let studies = all.iter().map(|(_, answer)| &answer.static_study).chain([&placement.no_paddle.static_study]);
+    let digits = decimals(smallest_told(studies.map(|study| study.max_orthogonal)), 6);
+    let mut out = format!(
+        "{} · {} tissue · {} nodes · {:.1} s\n\n paddles   1/σ_min(NᵀJ)   ‖J⁺N‖       ±   max orthogonal (static)\n",
+        scene.name,
+        scene.tissue(),
+        study.model.nodes(),
+        study.wall_s
+    );
+    let errors = study.error_estimate.as_ref().map(|estimate| &estimate.by_set);
+    let mut order: Vec<usize> = (0..placement.paddles.len()).collect();
+    let mut of_pairs: Vec<usize> = (placement.paddles.len()..all.len()).collect();
+    of_pairs.sort_by(|&a, &b| all[a].1.controllability_measure.total_cmp(&all[b].1.controllability_measure));
+    let left = of_pairs.len().saturating_sub(LISTED);
+    order.extend(of_pairs.into_iter().take(LISTED));
+    for i in order {
+        let (paddles, answer) = &all[i];
+        let error = errors.and_then(|errors| errors.get(i)).map_or(NONE.to_owned(), |e| format!("{:.2} %", 100.0 * e));
+        let _ = writeln!(
+            out,
+            "{:>8}   {:>12}{} {:>8}  {error:>8}   {}",
+            named(paddles),
+            measure(answer.controllability_measure),
+            if [&placement.optimum.dynamic, &placement.optimum_single.dynamic].contains(&paddles) { '*' } else { ' ' },
+            measure(answer.controllability_full),
+            fixture(&answer.static_study, digits)
+        );
+    }
+    if left > 0 {
+        let _ = writeln!(out, "   ({left} more pairs in the JSON)");
+    }
+    let _ = writeln!(
+        out,
+        "    none   {NONE:>12}  {NONE:>8}  {NONE:>8}   {}",
+        fixture(&placement.no_paddle.static_study, digits)
+    );
+    let words = |paddles: &[u32]| if paddles.is_empty() { NONE.to_owned() } else { named(paddles) };
+    for (what, best) in [("single paddle", &placement.optimum_single), ("pair", &placement.optimum)] {
+        if what == "pair" && placement.pairs.is_empty() {
+            continue;
+        }
+        let _ = writeln!(
+            out,
+            "\nbest static {what}: {}; best dynamic {what}: {}",
+            words(&best.fixture),
+            words(&best.dynamic)
+        );
+    }
+    if let Some(line) = second_pays(study) {
+        let _ = writeln!(out, "{line}");
+    }
+    if placement.profile_nodes != study.model.nodes() {
+        let _ = writeln!(out, "the insertion was followed on {} nodes", placement.profile_nodes);
+    }
+    out
+}
+
+/// Whether the second paddle buys anything at rest.
+fn second_pays(study: &SpaceStudy) -> Option<String> {
+    let placement = &study.placement;
+    let least = |measures: &mut dyn Iterator<Item = f64>| measures.min_by(f64::total_cmp).filter(|m| m.is_finite());
+    let single = least(&mut placement.paddles.iter().map(|p| p.answer.controllability_measure))?;
+    let pair = least(&mut placement.pairs.iter().map(|p| p.answer.controllability_measure))?;
+    Some(format!(
+        "a second paddle shortens the way for the worst direction by {:.1} % ({single:.3} to {pair:.3})",
+        100.0 * (1.0 - pair / single)
+    ))
+}
+
+fn named(paddles: &[u32]) -> String {
+    paddles.iter().map(ToString::to_string).collect::<Vec<_>>().join(" + ")
+}
+
+fn measure(value: f64) -> String {
+    if value.is_finite() { format!("{value:.4}") } else { NONE.to_owned() }
+}
+
+fn fixture(study: &SpaceStatic, digits: usize) -> String {
+    let stopped = study
+        .failure
+        .as_ref()
+        .map_or(String::new(), |f| format!("  stopped at depth {}: {}", length(f.depth), f.reason));
+    format!("{:.digits$}{stopped}", study.max_orthogonal)
+}

@@ -1,0 +1,96 @@
+//! Static condensation: what a few retained unknowns answer to forces on them, all others following.
+//!
+//! With the retained unknowns S eliminated last, the last block L_S of the Cholesky factor satisfies `L_S L_Sᵀ = K_SS − K_SI
+//! K_II⁻¹ K_IS`, and `(K⁻¹)_SS = L_S⁻ᵀ L_S⁻¹`. Whatever is asked of K⁻¹ between retained unknowns then costs dense work on their
+//! number alone, however large the body is.
+
+use super::cholesky::SparseCholesky;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Mat, Par};
+
+/// The factor of the retained unknowns of a matrix.
+#[derive(Debug, Clone)]
+pub struct CondensedFactor {
+    factor: Mat<f64>,
+    /// Place of every unknown among the retained ones.
+    place: Vec<Option<u32>>,
+}
+
+/// A sparse functional of the unknowns: (unknown, weight).
+pub type Functional = Vec<(u32, f64)>;
+
+impl CondensedFactor {
+    /// The last `count` unknowns of a factor whose analysis [retains](super::SymbolicFactor::retaining) them.
+    pub fn new(cholesky: &SparseCholesky, unknowns: usize, count: usize) -> Self {
+        let (factor, retained) = cholesky.last(count);
+        let mut place = vec![None; unknowns];
+        retained.iter().enumerate().for_each(|(k, &u)| place[u as usize] = Some(k as u32));
+        Self { factor, place }
+    }
+
+    /// L_S⁻¹ F for functionals F of the retained unknowns, a column each: `f K⁻¹ g` is the product of their columns.
+    ///
+    /// # Panics
+    /// When a functional takes an unknown that is not retained.
+    pub fn half_solved(&self, functionals: &[Functional]) -> Mat<f64> {
+        let mut columns = Mat::zeros(self.factor.nrows(), functionals.len());
+        for (column, functional) in functionals.iter().enumerate() {
+            for &(unknown, weight) in functional {
+                let row = self.place[unknown as usize].expect("functionals of retained unknowns");
+                columns[(row as usize, column)] += weight;
+            }
+        }
+        solve_lower_triangular_in_place(self.factor.as_ref(), columns.as_mut(), Par::Seq);
+        columns
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point;
+    use crate::linalg::{Pattern, SymbolicFactor};
+
+    /// A grid of springs, three unknowns a node: (K⁻¹) between retained nodes by condensation and by whole solves.
+    #[test]
+    fn what_is_retained_answers_as_in_the_whole() {
+        let side = 9_u32;
+        let n = (side * side) as usize;
+        let positions: Vec<Point<3>> =
+            (0..n as u32).map(|i| Point::<3>::new(f64::from(i % side), f64::from(i / side), 0.0)).collect();
+        let lists: Vec<Vec<u32>> = (0..n as u32)
+            .flat_map(|i| {
+                let right = (i % side + 1 < side).then(|| vec![i, i + 1]);
+                let up = (i + side < n as u32).then(|| vec![i, i + side]);
+                right.into_iter().chain(up)
+            })
+            .collect();
+        let pattern = Pattern::new(3, n, lists.iter().map(Vec::as_slice));
+        let mut values = vec![0.0; pattern.entries()];
+        for list in &lists {
+            for (&i, &j, weight) in [(&list[0], &list[0], 1.0), (&list[1], &list[1], 1.0), (&list[1], &list[0], -1.0)] {
+                let (at, stride) = (pattern.block_position(i, j).unwrap(), pattern.column_length(j));
+                (0..3).for_each(|k| values[at + k * stride + k] += weight * f64::from(k as u32 + 1));
+            }
+        }
+        (0..3 * n).for_each(|u| values[pattern.diagonal_position(u)] += 0.05);
+        let retained = [3, 17, 18, 40, 80];
+        let symbolic = SymbolicFactor::retaining(&pattern, &positions, &retained);
+        let mut cholesky = SparseCholesky::new(&symbolic);
+        cholesky.factorise(&pattern, &values).unwrap();
+        let condensed = CondensedFactor::new(&cholesky, 3 * n, 3 * retained.len());
+        let functionals: Vec<Functional> =
+            vec![vec![(9, 1.0)], vec![(51, 0.5), (54, -2.0)], vec![(121, 1.0), (122, 1.0)], vec![(241, 3.0)]];
+        let half = condensed.half_solved(&functionals);
+        for (g, right) in functionals.iter().enumerate() {
+            let mut x = vec![0.0; 3 * n];
+            right.iter().for_each(|&(u, w)| x[u as usize] += w);
+            cholesky.solve(&mut x, 1);
+            for (f, left) in functionals.iter().enumerate() {
+                let whole: f64 = left.iter().map(|&(u, w)| w * x[u as usize]).sum();
+                let by_half: f64 = (0..half.nrows()).map(|r| half[(r, f)] * half[(r, g)]).sum();
+                assert!((whole - by_half).abs() < 1e-12, "{f} {g}: {whole} {by_half}");
+            }
+        }
+    }
+}

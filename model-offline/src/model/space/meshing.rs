@@ -1,0 +1,126 @@
+//! The mesh of a scene in space: small tetrahedra at the rims of patches, where the solution is singular, large ones elsewhere.
+
+use super::super::error::{BoundaryPart, ModelError};
+use crate::discretization::TetMesh;
+use crate::discretization::meshing::{Grading, Request, StuffingError, rim_points, stuff, surface_points};
+use crate::geometry::{Implicit, Point};
+use crate::scene::space::SpaceScene;
+
+/// How long edges are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeshSize {
+    /// At the rims of patches, over the width of the patch.
+    pub rim: f64,
+    /// On the surface of inclusions, over the width of the inclusion.
+    pub inclusion: f64,
+    /// At most, over the longest side of the body's bounding box.
+    pub coarsest: f64,
+    /// What they grow by per length of distance.
+    pub growth: f64,
+}
+
+/// Nodes of a mesh at most.
+const MOST_NODES: usize = 400_000;
+/// Points on rims and surfaces are this share of the size there apart.
+const SAMPLED: f64 = 0.5;
+/// Patches at an even spacing have at least this many edges across.
+const ACROSS: f64 = 3.0;
+
+impl MeshSize {
+    /// That of a refinement level: each halves the edges at the rims.
+    pub fn level(level: i32) -> Self {
+        let finer = 2.0_f64.powi(-level);
+        Self { rim: 0.4 * finer, inclusion: 0.8 * finer, coarsest: 0.2 * finer.sqrt(), growth: 0.5 }
+    }
+}
+
+/// A part of the scene that asks for its own size: points, and their extent.
+struct Asking {
+    points: Vec<Point<3>>,
+    width: f64,
+}
+
+impl Asking {
+    /// `points` at a spacing; width is the longest side of their bounding box.
+    fn new(points: impl Fn(f64) -> Vec<Point<3>>, first: f64, share: f64) -> Option<Self> {
+        let rough = points(first);
+        let width = width(&rough)?;
+        let spacing = SAMPLED * share * width;
+        Some(Self { points: if spacing < first { points(spacing) } else { rough }, width })
+    }
+}
+
+fn width(points: &[Point<3>]) -> Option<f64> {
+    let low = points.iter().copied().reduce(|a, b| a.inf(&b))?;
+    let high = points.iter().copied().reduce(|a, b| a.sup(&b))?;
+    Some((high - low).max()).filter(|width| *width > 0.0)
+}
+
+/// Meshes a scene.
+///
+/// # Errors
+/// [`ModelError`] where a patch catches no surface, or details are too small for the mesh.
+pub fn mesh(scene: &SpaceScene, size: &MeshSize) -> Result<TetMesh, ModelError> {
+    let body: &dyn Implicit = scene.body.as_ref();
+    let extent = extent(scene);
+    let mut grading = Grading::new(size.coarsest * extent, size.growth);
+    for region in patches(scene) {
+        let rim = |spacing: f64| rim_points(body, region, spacing);
+        if let Some(asking) = Asking::new(rim, 0.02 * extent, size.rim) {
+            grading = grading.with(&asking.points, size.rim * asking.width);
+        }
+    }
+    for inclusion in &scene.inclusions {
+        let surface = |spacing: f64| surface_points(body, inclusion.region.as_ref(), spacing);
+        if let Some(asking) = Asking::new(surface, 0.05 * extent, size.inclusion) {
+            grading = grading.with(&asking.points, size.inclusion * asking.width);
+        }
+    }
+    stuffed(scene, &|x| grading.size(x))
+}
+
+/// Meshes a scene evenly, but so that every patch and inclusion is seen.
+///
+/// # Errors
+/// [`ModelError`] where a patch catches no surface, or details are too small for the mesh.
+pub fn even_mesh(scene: &SpaceScene, spacing: f64) -> Result<TetMesh, ModelError> {
+    let (body, extent): (&dyn Implicit, f64) = (scene.body.as_ref(), extent(scene));
+    let mut grading = Grading::new(spacing, 1.0);
+    let rims = patches(scene).map(|region| Asking::new(|s| rim_points(body, region, s), 0.02 * extent, 0.2));
+    let surfaces = scene.inclusions.iter();
+    let surfaces = surfaces.map(|i| Asking::new(|s| surface_points(body, i.region.as_ref(), s), 0.05 * extent, 0.2));
+    for asking in rims.chain(surfaces).flatten() {
+        grading = grading.with(&asking.points, (asking.width / ACROSS).min(spacing));
+    }
+    stuffed(scene, &|x| grading.size(x))
+}
+
+fn extent(scene: &SpaceScene) -> f64 {
+    scene.body.bounds().map_or(1.0, |(low, high)| (high - low).max())
+}
+
+/// Regions of needle, paddles and immobile part.
+fn patches(scene: &SpaceScene) -> impl Iterator<Item = &dyn Implicit> {
+    let held = [&scene.needle.region].into_iter().chain(scene.paddles.iter().map(|p| &p.region));
+    held.chain(&scene.immobile).map(|region| region as &dyn Implicit)
+}
+
+fn stuffed(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<TetMesh, ModelError> {
+    let interfaces: Vec<&dyn Implicit> = scene.inclusions.iter().map(|i| i.region.as_ref()).collect();
+    let patches: Vec<&dyn Implicit> = patches(scene).collect();
+    let request = Request {
+        body: scene.body.as_ref(),
+        interfaces: &interfaces,
+        patches: &patches,
+        size,
+        most_nodes: MOST_NODES,
+        pinned: &[scene.target],
+    };
+    stuff(&request).map_err(|error| match error {
+        StuffingError::EmptyPatch { patch } => ModelError::NothingCaught(match patch.checked_sub(1) {
+            None => BoundaryPart::Needle,
+            Some(k) => scene.paddles.get(k).map_or(BoundaryPart::Immobile, |p| BoundaryPart::Paddle(p.index)),
+        }),
+        other => ModelError::Mesh(other),
+    })
+}

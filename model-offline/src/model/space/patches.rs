@@ -1,0 +1,77 @@
+//! What of a body's surface is held: patches of boundary triangles, their nodes and their rims.
+
+use crate::discretization::TetMesh;
+use crate::geometry::{Implicit, Point};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// A node this far outside of a region, over the size of the body, is in it but for rounding.
+const ROUNDING: f64 = 1e-8;
+/// The surface turns by no more than this where a patch ends in the middle of a face: cos 30°.
+const SMOOTH: f64 = 0.866;
+
+/// The boundary triangles of a body.
+#[derive(Debug)]
+pub(super) struct Surface<'m> {
+    mesh: &'m TetMesh,
+    triangles: Vec<[u32; 3]>,
+    size: f64,
+}
+
+impl<'m> Surface<'m> {
+    pub(super) fn new(mesh: &'m TetMesh, size: f64) -> Self {
+        Self { triangles: mesh.boundary(), mesh, size }
+    }
+
+    /// The triangles of a patch: all corners in the region, and the middle too.
+    pub(super) fn patch(&self, regions: &[&dyn Implicit]) -> Vec<[u32; 3]> {
+        let tolerance = ROUNDING * self.size;
+        let holds = |region: &&dyn Implicit, t: &[u32; 3]| {
+            let corners = t.map(|i| self.mesh.nodes[i as usize]);
+            let middle = corners.iter().sum::<Point<3>>() / 3.0;
+            corners.iter().all(|x| region.holds(x, tolerance)) && region.holds(&middle, tolerance)
+        };
+        self.triangles.iter().filter(|t| regions.iter().any(|region| holds(region, t))).copied().collect()
+    }
+
+    /// Edges where a patch ends and the surface goes on smoothly: there the solution is singular like √r.
+    pub(super) fn rim(&self, patch: &[[u32; 3]]) -> Vec<(u32, u32)> {
+        let inside: BTreeSet<[u32; 3]> = patch.iter().copied().collect();
+        let mut beside: BTreeMap<(u32, u32), Vec<&[u32; 3]>> = BTreeMap::new();
+        for t in &self.triangles {
+            for edge in edges(t) {
+                beside.entry(edge).or_default().push(t);
+            }
+        }
+        let smooth = |a: &[u32; 3], b: &[u32; 3]| self.normal(a).dot(&self.normal(b)) > SMOOTH;
+        let rim = beside.into_iter().filter(|(_, beside)| match beside[..] {
+            [a, b] => inside.contains(a) != inside.contains(b) && smooth(a, b),
+            _ => false,
+        });
+        rim.map(|(edge, _)| edge).collect()
+    }
+
+    /// All edges of the surface.
+    pub(super) fn edges(&self) -> BTreeSet<(u32, u32)> {
+        self.triangles.iter().flat_map(edges).collect()
+    }
+
+    fn normal(&self, t: &[u32; 3]) -> Point<3> {
+        let [a, b, c] = t.map(|i| self.mesh.nodes[i as usize]);
+        (b - a).cross(&(c - a)).normalize()
+    }
+}
+
+/// Corners of a patch, and of quadratic elements the middle nodes of its edges, ascending.
+pub(super) fn nodes_of(patch: &[[u32; 3]], middles: &BTreeMap<(u32, u32), u32>) -> Vec<u32> {
+    let corners = patch.iter().flatten().copied();
+    let between = patch.iter().flat_map(edges).filter_map(|edge| middles.get(&edge).copied());
+    corners.chain(between).collect::<BTreeSet<u32>>().into_iter().collect()
+}
+
+/// Edges of a triangle, the lower number first.
+pub(super) fn edges(t: &[u32; 3]) -> [(u32, u32); 3] {
+    [0, 1, 2].map(|k| {
+        let (a, b) = (t[k], t[(k + 1) % 3]);
+        (a.min(b), a.max(b))
+    })
+}

@@ -1,0 +1,10 @@
+//! Placement in space: single paddles and pairs, at rest and along the insertion.
+
+pub mod controllability;
+pub mod rest;
+pub mod study;
+pub mod workflow;
+
+pub use controllability::Controllability;
+pub use study::SpacePlacement;
+pub use workflow::{SpaceErrorEstimate, SpaceStudy};

@@ -1,0 +1,137 @@
+//! Responses at rest in space, of all paddles and pairs from one factorisation.
+//!
+//! The body is factorised with immobile part and needle held and no paddle attached, and what paddles and target take is
+//! condensed to the compliance C between the rows of all paddle nodes, G from them to the target, and u°, what the needle
+//! does to both per depth. Attaching paddles A is then dense work on their own rows: forces λ with `C_AA λ = E δ − u°_A` hold them
+//! at the translations δ, and the target moves by `u°_t + G_Aᵀ λ`. Rows in several attached patches follow the mean
+//! of their translations, which does not change the limit of the Jacobian: forces there do no work on it.
+
+use super::controllability::Controllability;
+use crate::mechanics::assembly::{AssemblyState, Medium, internal_force, tangent};
+use crate::mechanics::history::Prestress;
+use crate::model::ModelError;
+use crate::model::space::{Holder, SpaceModel};
+use crate::solver::constrained::{ConstrainedSolver, Unknowns};
+use crate::solver::equilibrium::{Failure, FailureReason};
+use faer::linalg::solvers::Solve as _;
+use faer::{Mat, Side};
+use nalgebra::{DMatrix, Vector3};
+use std::collections::BTreeMap;
+
+/// How the target answers to paddles and needle, at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpaceResponse {
+    /// Actuation Jacobian, needle held: rows target x, y, z, three columns per paddle.
+    pub jacobian: DMatrix<f64>,
+    /// d(target displacement)/d(depth), paddles held.
+    pub target_per_depth: Vector3<f64>,
+    /// What the Jacobian controls; none without a paddle.
+    pub controllability: Option<Controllability>,
+}
+
+/// The condensed body at rest: what answers for any set of attached paddles.
+#[derive(Debug)]
+pub struct CondensedRest<'m> {
+    model: &'m SpaceModel,
+    /// Place of a paddle node among all of them.
+    place: BTreeMap<u32, usize>,
+    /// Products of the half-solved rows: three per paddle node, then three of the target.
+    gram: Mat<f64>,
+    /// What the needle does per depth to the paddle nodes, and to the target.
+    per_depth: Vec<Vector3<f64>>,
+    target_per_depth: Vector3<f64>,
+}
+
+impl<'m> CondensedRest<'m> {
+    /// Assembles, factorises and condenses.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the tangent at rest is singular.
+    pub fn new(model: &'m SpaceModel) -> Result<Self, ModelError> {
+        let singular = |detail: String| Failure { reason: FailureReason::SingularTangent, reached: 0.0, detail };
+        let (analysis, retained) = model.condensing_analysis();
+        let (rule, unknowns) = (model.spatial().rule(), model.dofs());
+        let stabilisation = analysis.stabilisation(rule, model.tissue());
+        let prestress = Prestress::default();
+        let medium = Medium { rule, stabilisation: &stabilisation, tissue: model.tissue(), prestress: &prestress };
+        let (mut state, mut force) = (AssemblyState::default(), vec![0.0; unknowns]);
+        internal_force(medium, &vec![0.0; unknowns], &mut state, &mut force).map_err(|at| singular(at.to_string()))?;
+        let held = model.held_rows(&[]);
+        let mut solver = ConstrainedSolver::<3>::new(&analysis, held.rows.clone()).held_tight();
+        solver.assemble(|_, values| tangent(medium, &state, analysis.blocks(), values));
+        solver.factorise().map_err(|error| singular(error.to_string()))?;
+        let rate = held.values(model.scene().needle.axis, &[]);
+        let (mut field, mut multipliers) = (vec![0.0; unknowns], vec![0.0; rate.len()]);
+        solver.solve(&vec![0.0; unknowns], &rate, 1e-14, Unknowns { x: &mut field, multipliers: &mut multipliers });
+        let mut place = BTreeMap::new();
+        for paddle in 0..model.scene().paddles.len() {
+            for &node in model.paddle_nodes(paddle) {
+                let next = place.len();
+                place.entry(node).or_insert(next);
+            }
+        }
+        let mut nodes = vec![0; place.len()];
+        place.iter().for_each(|(&node, &at)| nodes[at] = node);
+        let rows: Vec<_> = nodes.iter().map(|&node| model.row(node)).chain([model.target_row()]).collect();
+        let functionals: Vec<Vec<(u32, f64)>> = rows
+            .iter()
+            .flat_map(|row| {
+                (0..3).map(|k| row.nodes.iter().zip(&row.values).map(|(&i, &value)| (3 * i + k, value)).collect())
+            })
+            .collect();
+        let half = solver.condensed(retained.len()).half_solved(&functionals);
+        Ok(Self {
+            per_depth: nodes.iter().map(|&node| model.row(node).interpolate(&field)).collect(),
+            target_per_depth: model.target_row().interpolate(&field),
+            gram: half.transpose() * &half,
+            model,
+            place,
+        })
+    }
+
+    /// The response with some paddles attached, by their places in the scene's list.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the paddles' compliance is singular.
+    pub fn response(&self, attached: &[usize]) -> Result<SpaceResponse, ModelError> {
+        if attached.is_empty() {
+            return Ok(SpaceResponse {
+                jacobian: DMatrix::zeros(3, 0),
+                target_per_depth: self.target_per_depth,
+                controllability: None,
+            });
+        }
+        let mut on: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (slot, &paddle) in attached.iter().enumerate() {
+            self.model.paddle_nodes(paddle).iter().for_each(|&node| on.entry(node).or_default().push(slot));
+        }
+        let holders: Vec<(usize, Holder)> =
+            on.into_iter().map(|(node, slots)| (self.place[&node], Holder::Paddles(slots))).collect();
+        let row = |r: usize| 3 * holders[r / 3].0 + r % 3;
+        let (count, rates) = (3 * holders.len(), 3 * attached.len());
+        let compliance = Mat::from_fn(count, count, |r, c| self.gram[(row(r), row(c))]);
+        // A column per translation of a paddle, and what the needle does.
+        let mut sides = Mat::from_fn(count, rates + 1, |r, c| match &holders[r / 3] {
+            (_, Holder::Paddles(slots)) if c < rates => {
+                let follows = slots.contains(&(c / 3)) && c % 3 == r % 3;
+                f64::from(u8::from(follows)) / slots.len() as f64
+            }
+            (place, _) => self.per_depth[*place][r % 3],
+        });
+        let factor = compliance.llt(Side::Lower).map_err(|_| Failure {
+            reason: FailureReason::SingularTangent,
+            reached: 0.0,
+            detail: "the compliance of the paddles is not positive definite".into(),
+        })?;
+        factor.solve_in_place(sides.as_mut());
+        let target = self.gram.nrows() - 3;
+        let answer =
+            |t: usize, c: usize| (0..count).map(|r| self.gram[(row(r), target + t)] * sides[(r, c)]).sum::<f64>();
+        let jacobian = DMatrix::from_fn(3, rates, &answer);
+        Ok(SpaceResponse {
+            target_per_depth: self.target_per_depth - Vector3::from_fn(|t, _| answer(t, rates)),
+            controllability: Some(Controllability::of(&jacobian, &self.model.scene().needle.orthogonal())),
+            jacobian,
+        })
+    }
+}

@@ -1,0 +1,260 @@
+//! The placement study in space: every paddle and every pair of them, static and dynamic.
+
+use super::controllability::Controllability;
+use super::rest::{CondensedRest, SpaceResponse};
+use crate::model::ModelError;
+use crate::model::space::SpaceModel;
+use crate::parallel;
+use crate::placement::study::StaticFailure;
+use crate::solver::equilibrium::{Failure, NewtonSettings};
+use nalgebra::{DMatrix, Vector3};
+use serde::Serialize;
+
+/// The insertion with static paddles: attached, and held still.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct SpaceStatic {
+    /// Needle depths, from the first increment.
+    pub depth: Vec<f64>,
+    /// Target displacement at these depths.
+    pub target_displacement: Vec<[f64; 3]>,
+    /// Length of its part orthogonal to the needle.
+    pub orthogonal: Vec<f64>,
+    /// Its part along the needle.
+    pub axial: Vec<f64>,
+    /// Largest orthogonal displacement.
+    pub max_orthogonal: f64,
+    /// How far the needle got.
+    pub reached_depth: f64,
+    /// Why it stopped there; none when it reached the full depth.
+    pub failure: Option<StaticFailure>,
+}
+
+/// What paddles do together, one or two of them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpaceAnswer {
+    /// Actuation Jacobian at zero depth, needle held: rows target x, y, z, three columns per paddle.
+    pub jacobian: Vec<Vec<f64>>,
+    /// Condition number of NᵀJ.
+    pub condition: f64,
+    /// 1/σ_min(NᵀJ), the target's motion along the needle left free; infinite (`null` in JSON) where the target cannot be
+    /// controlled.
+    pub controllability_measure: f64,
+    /// ‖J⁺N‖₂, no motion along the needle allowed; infinite (`null`) where that cannot be had.
+    pub controllability_full: f64,
+    /// 1/σ_max(NᵀJ): the same in the easiest direction.
+    pub controllability_easiest: f64,
+    /// Orthogonal direction in which `controllability_measure` is reached.
+    pub worst_direction: [f64; 3],
+    /// d(target displacement)/d(depth) at zero depth, paddles held.
+    pub target_per_depth: [f64; 3],
+    /// The insertion with these paddles static.
+    #[serde(rename = "static")]
+    pub static_study: SpaceStatic,
+}
+
+/// One paddle.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpacePaddleResult {
+    /// Paddle index, as in the scene.
+    pub index: u32,
+    /// What it does.
+    #[serde(flatten)]
+    pub answer: SpaceAnswer,
+}
+
+/// Two paddles.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpacePairResult {
+    /// Their indices, as in the scene.
+    pub paddles: [u32; 2],
+    /// What they do.
+    #[serde(flatten)]
+    pub answer: SpaceAnswer,
+}
+
+/// The insertion without a paddle: what every paddle is held against.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpaceNoPaddle {
+    /// d(target displacement)/d(depth) at zero depth.
+    pub target_per_depth: [f64; 3],
+    /// The insertion.
+    #[serde(rename = "static")]
+    pub static_study: SpaceStatic,
+}
+
+/// The best for each approach, by index.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SpaceOptimum {
+    /// Smallest largest orthogonal displacement.
+    #[serde(rename = "static")]
+    pub fixture: Vec<u32>,
+    /// Smallest controllability measure; empty where nothing controls the target.
+    pub dynamic: Vec<u32>,
+}
+
+/// A whole placement study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpacePlacement {
+    /// Results by paddle, in the scene's order.
+    pub paddles: Vec<SpacePaddleResult>,
+    /// Results by pair, in the scene's order.
+    pub pairs: Vec<SpacePairResult>,
+    /// The insertion without a paddle.
+    pub no_paddle: SpaceNoPaddle,
+    /// The best pairs; the best paddles where there are no pairs.
+    pub optimum: SpaceOptimum,
+    /// The best single paddles.
+    pub optimum_single: SpaceOptimum,
+    /// Nodes of the model on which the insertion was followed to depth.
+    pub profile_nodes: usize,
+}
+
+/// What is attached: nothing, one, or two, by place in the scene's list.
+fn all_sets(model: &SpaceModel) -> Vec<Vec<usize>> {
+    let scene = model.scene();
+    let singles = (0..scene.paddles.len()).map(|p| vec![p]);
+    singles.chain(scene.pairs.iter().map(|pair| pair.to_vec())).chain([Vec::new()]).collect()
+}
+
+/// Number of times [`place_in_space`] calls its progress function.
+pub fn steps(model: &SpaceModel) -> u64 {
+    all_sets(model).len() as u64 * u64::from(model.scene().needle.increments)
+}
+
+/// Responses of every paddle, then every pair, then without any, at rest.
+///
+/// # Errors
+/// [`ModelError`] when the body at rest cannot be solved.
+pub fn rest_responses(model: &SpaceModel) -> Result<Vec<SpaceResponse>, ModelError> {
+    let rest = CondensedRest::new(model)?;
+    all_sets(model).iter().map(|attached| rest.response(attached)).collect()
+}
+
+/// Studies every paddle and pair of the model's scene: at rest on the model itself (`rest`, from [`rest_responses`]), along
+/// the insertion with what the law's nonlinearity adds on `profile`.
+///
+/// # Errors
+/// [`ModelError`] when the body at rest cannot be solved. A static run that stops early and paddles that cannot control the
+/// target are results, not errors.
+pub fn place_in_space(
+    model: &SpaceModel,
+    rest: &[SpaceResponse],
+    profile: &SpaceModel,
+    threads: usize,
+    progress: &(dyn Fn() + Sync),
+) -> Result<SpacePlacement, ModelError> {
+    let (scene, sets) = (model.scene(), all_sets(model));
+    // The analysis is shared: made before threads ask for it at once.
+    profile.analysis();
+    let studies = parallel::map(sets.len(), threads, |s| follow(profile, &sets[s], rest[s].target_per_depth, progress));
+    let mut studies = studies.into_iter().collect::<Result<Vec<_>, _>>()?;
+    let without = studies.pop().unwrap_or_default();
+    let mut answers = rest.iter().zip(studies).map(|(rest, study)| answer(rest, study));
+    let paddles: Vec<SpacePaddleResult> = scene
+        .paddles
+        .iter()
+        .zip(answers.by_ref())
+        .map(|(paddle, answer)| SpacePaddleResult { index: paddle.index, answer })
+        .collect();
+    let pairs: Vec<SpacePairResult> = scene
+        .pairs
+        .iter()
+        .zip(answers)
+        .map(|(pair, answer)| SpacePairResult { paddles: pair.map(|p| scene.paddles[p].index), answer })
+        .collect();
+    let optimum_single = best(paddles.iter().map(|p| (vec![p.index], &p.answer)));
+    let optimum = match pairs.is_empty() {
+        true => optimum_single.clone(),
+        false => best(pairs.iter().map(|p| (p.paddles.to_vec(), &p.answer))),
+    };
+    let per_depth = rest.last().map_or_else(Vector3::zeros, |r| r.target_per_depth);
+    let no_paddle = SpaceNoPaddle { target_per_depth: per_depth.into(), static_study: without };
+    Ok(SpacePlacement { paddles, pairs, no_paddle, optimum, optimum_single, profile_nodes: profile.nodes() })
+}
+
+fn answer(rest: &SpaceResponse, static_study: SpaceStatic) -> SpaceAnswer {
+    let none = Controllability {
+        measure: f64::INFINITY,
+        full: f64::INFINITY,
+        easiest: f64::INFINITY,
+        worst_direction: Vector3::zeros(),
+        condition: f64::INFINITY,
+    };
+    let controls = rest.controllability.unwrap_or(none);
+    SpaceAnswer {
+        jacobian: rows(&rest.jacobian),
+        condition: controls.condition,
+        controllability_measure: controls.measure,
+        controllability_full: controls.full,
+        controllability_easiest: controls.easiest,
+        worst_direction: controls.worst_direction.into(),
+        target_per_depth: rest.target_per_depth.into(),
+        static_study,
+    }
+}
+
+fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    m.row_iter().map(|row| row.iter().copied().collect()).collect()
+}
+
+/// Follows the insertion at the scene's increments with some paddles attached and still, until it stops. What the profile
+/// model's own response at rest is off by does not matter: it says what the law's nonlinearity adds to `per_depth`, which is
+/// the target's displacement per depth on the model of the study.
+fn follow(
+    model: &SpaceModel,
+    attached: &[usize],
+    per_depth: Vector3<f64>,
+    progress: &(dyn Fn() + Sync),
+) -> Result<SpaceStatic, ModelError> {
+    let needle = &model.scene().needle;
+    // As on graded nodes in the plane: where the law loses its stability matters to an eighth of an increment.
+    let mut body = model.body(attached, NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() })?;
+    let still = vec![Vector3::zeros(); attached.len()];
+    let own = body.depth_sensitivity()?;
+    let mut study = SpaceStatic::default();
+    for increment in 1..=needle.increments {
+        progress();
+        let depth = needle.depth * f64::from(increment) / f64::from(needle.increments);
+        match body.drive(depth, &still) {
+            Ok(()) => {
+                let displacement = body.target_displacement() + (per_depth - own) * depth;
+                let axial = displacement.dot(&needle.axis);
+                let orthogonal = (displacement - needle.axis * axial).norm();
+                study.depth.push(depth);
+                study.target_displacement.push(displacement.into());
+                study.orthogonal.push(orthogonal);
+                study.axial.push(axial);
+                study.max_orthogonal = study.max_orthogonal.max(orthogonal);
+                study.reached_depth = depth;
+            }
+            Err(Failure { reason, detail, .. }) => {
+                study.reached_depth = body.depth();
+                study.failure = Some(StaticFailure { reason, depth: body.depth(), detail });
+                break;
+            }
+        }
+    }
+    Ok(study)
+}
+
+/// The best of some. Those that did not reach the depth rank below every one that did; where none did, they are compared over
+/// the depth that all reached, or at small depths.
+fn best<'a>(candidates: impl Iterator<Item = (Vec<u32>, &'a SpaceAnswer)>) -> SpaceOptimum {
+    let all: Vec<(Vec<u32>, &SpaceAnswer)> = candidates.collect();
+    let studies = || all.iter().map(|(_, answer)| &answer.static_study);
+    let complete = studies().any(|study| study.failure.is_none());
+    let common = studies().map(|study| study.depth.len()).min().unwrap_or(0);
+    let key = |answer: &SpaceAnswer| {
+        let study = &answer.static_study;
+        match &study.failure {
+            None => study.max_orthogonal,
+            Some(_) if complete => f64::INFINITY,
+            _ => study.orthogonal[..common].iter().fold(0.0, |m, x| f64::max(m, *x)),
+        }
+    };
+    let fixture = all.iter().min_by(|a, b| key(a.1).total_cmp(&key(b.1)));
+    let controlling = all.iter().filter(|(_, answer)| answer.controllability_measure.is_finite());
+    let dynamic = controlling.min_by(|a, b| a.1.controllability_measure.total_cmp(&b.1.controllability_measure));
+    let named = |found: Option<&(Vec<u32>, &SpaceAnswer)>| found.map_or_else(Vec::new, |(name, _)| name.clone());
+    SpaceOptimum { fixture: named(fixture), dynamic: named(dynamic) }
+}

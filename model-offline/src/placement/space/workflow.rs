@@ -1,0 +1,233 @@
+//! From a scene in space to a placement: mesh, refine if a tolerance is asked for, study every paddle and pair.
+//!
+//! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
+//! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by the next coarser mesh. From a mesh to
+//! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
+//! is left; it is taken times [`SAFETY`].
+
+use super::rest::SpaceResponse;
+use super::study::{SpacePlacement, place_in_space, rest_responses, steps};
+use crate::discretization::{Integration, Method, Resolution};
+use crate::model::ModelError;
+use crate::model::space::SpaceModel;
+use crate::model::space::meshing::{MeshSize, even_mesh, mesh};
+use crate::scene::space::SpaceScene;
+use serde::Serialize;
+use std::time::Instant;
+
+/// What a difference of two meshes is multiplied by.
+pub const SAFETY: f64 = 1.5;
+/// Share of the tolerance that the reference of another method may leave open.
+const REFERENCE_SHARE: f64 = 0.5;
+/// Levels that refinement begins with, and ends with.
+const LEVELS: std::ops::RangeInclusive<i32> = 0..=5;
+/// Nodes of the largest model that is factorised: nodal rules couple a few hundred neighbours, elements a few dozen.
+const MOST_NODES: usize = 20_000;
+const MOST_ELEMENT_NODES: usize = 120_000;
+
+/// What a refinement found out about its own error.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpaceErrorEstimate {
+    /// Estimated worst relative error of the controllability measures, of paddles and pairs.
+    pub controllability: f64,
+    /// The same by paddle, then by pair, in the scene's order.
+    pub by_set: Vec<f64>,
+    /// The part of it that the reference leaves open; the whole where the model is its own.
+    pub reference: f64,
+    /// Nodes of the reference.
+    pub reference_nodes: usize,
+    /// Refinement level that was accepted.
+    pub level: i32,
+}
+
+/// A placement in space with everything that is known about it.
+#[derive(Debug)]
+pub struct SpaceStudy {
+    /// The model that the Jacobians are of.
+    pub model: SpaceModel,
+    /// What the study found.
+    pub placement: SpacePlacement,
+    /// Estimated error, where the scene asks for a tolerance.
+    pub error_estimate: Option<SpaceErrorEstimate>,
+    /// Time that it took, s.
+    pub wall_s: f64,
+}
+
+/// A discretised scene with its responses at rest and, where it asks for a tolerance, the estimated error.
+#[derive(Debug)]
+pub struct Discretised {
+    /// The model.
+    pub model: SpaceModel,
+    /// Responses of every paddle, then every pair, then without any.
+    pub rest: Vec<SpaceResponse>,
+    /// Estimated error.
+    pub estimate: Option<SpaceErrorEstimate>,
+}
+
+impl SpaceStudy {
+    /// Discretises the scene at its resolution and studies every paddle and pair. `progress` is told how many steps there are,
+    /// and then called for each.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the scene cannot be modelled, its tolerance not be reached, or a Jacobian not be computed.
+    pub fn run(
+        scene: &SpaceScene,
+        threads: usize,
+        begin: &dyn Fn(u64),
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Self, ModelError> {
+        let start = Instant::now();
+        let Discretised { model, rest, estimate: error_estimate } = discretise(scene)?;
+        begin(steps(&model));
+        let profile = profile_model(model.scene())?;
+        let placement = place_in_space(&model, &rest, &profile, threads, progress)?;
+        Ok(Self { model, placement, error_estimate, wall_s: start.elapsed().as_secs_f64() })
+    }
+}
+
+/// Discretises a scene at its spacing or level, or refines it to its tolerance.
+///
+/// # Errors
+/// [`ModelError`], among them [`ModelError::ToleranceNotReached`] with the estimate that was reached.
+pub fn discretise(scene: &SpaceScene) -> Result<Discretised, ModelError> {
+    let (mesh, tolerance) = match scene.discretization.resolution {
+        Resolution::Spacing(spacing) => (even_mesh(scene, spacing)?, None),
+        Resolution::Level(level) => (mesh(scene, &MeshSize::level(level))?, None),
+        Resolution::Tolerance(tolerance) => (Default::default(), Some(tolerance)),
+    };
+    if let Some(tolerance) = tolerance {
+        return refine(scene, tolerance);
+    }
+    let model = SpaceModel::on(scene, &mesh)?;
+    Ok(Discretised { rest: rest_responses(&model)?, model, estimate: None })
+}
+
+fn at_level(scene: &SpaceScene, level: i32) -> Result<(SpaceModel, Vec<SpaceResponse>), ModelError> {
+    let mesh = mesh(scene, &MeshSize::level(level))?;
+    let integration = scene.discretization.method.integration;
+    let limit = if integration.is_element() { MOST_ELEMENT_NODES } else { MOST_NODES };
+    // A tetrahedron more brings about seven thirds of a middle node.
+    let nodes = if integration == Integration::FemT10 { 7 * mesh.nodes.len() } else { mesh.nodes.len() };
+    if nodes > limit {
+        return Err(ModelError::TooManyNodes { nodes, limit });
+    }
+    let model = SpaceModel::on(scene, &mesh)?;
+    let rest = rest_responses(&model)?;
+    Ok((model, rest))
+}
+
+/// Relative distances of the controllability measures, by paddle and pair; 0 where neither controls the target.
+fn distances(found: &[SpaceResponse], reference: &[SpaceResponse]) -> Vec<f64> {
+    let measures = |all: &[SpaceResponse]| -> Vec<f64> {
+        all.iter().filter_map(|r| r.controllability.map(|c| c.measure)).collect()
+    };
+    let pairs = measures(found).into_iter().zip(measures(reference));
+    pairs.map(|(a, b)| if a.is_infinite() && b.is_infinite() { 0.0 } else { (a / b - 1.0).abs() }).collect()
+}
+
+/// What is left open on the finer of two meshes whose answers are so far apart. Two meshes may agree by accident (the pair 1 + 2 of
+/// `block` does): nothing is taken to be better than the median.
+fn estimates(mut distances: Vec<f64>) -> Vec<f64> {
+    let mut sorted = distances.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    distances.iter_mut().for_each(|d| *d = SAFETY * d.max(median));
+    distances
+}
+
+fn worst(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
+}
+
+/// Quadratic tetrahedra on finer and finer meshes, until their own estimate is within `open`.
+struct Reference {
+    model: SpaceModel,
+    rest: Vec<SpaceResponse>,
+    errors: Vec<f64>,
+    level: i32,
+}
+
+impl Reference {
+    fn within(scene: &SpaceScene, open: f64) -> Result<Self, ModelError> {
+        let scene = scene.with_method(Method::new(Integration::FemT10));
+        let mut reached = f64::INFINITY;
+        let mut coarser: Option<Vec<SpaceResponse>> = None;
+        for level in *LEVELS.start() - 1..=*LEVELS.end() {
+            let (model, rest) = match at_level(&scene, level) {
+                Ok(found) => found,
+                // The coarsest meshes may not see every patch, the finest may not be affordable.
+                Err(ModelError::TooManyNodes { .. }) if coarser.is_some() => break,
+                Err(_) if coarser.is_none() && level <= *LEVELS.start() => continue,
+                Err(error) => return Err(error),
+            };
+            if let Some(coarser) = &coarser {
+                let errors = estimates(distances(coarser, &rest));
+                let estimate = worst(&errors);
+                if estimate <= open {
+                    return Ok(Self { model, rest, errors, level });
+                }
+                reached = reached.min(estimate);
+            }
+            coarser = Some(rest);
+        }
+        Err(ModelError::ToleranceNotReached { tolerance: open, reached })
+    }
+}
+
+fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
+    let method = scene.discretization.method;
+    if method.integration == Integration::FemT10 {
+        let Reference { model, rest, errors, level } = Reference::within(scene, tolerance)?;
+        let controllability = worst(&errors);
+        let estimate = SpaceErrorEstimate {
+            controllability,
+            by_set: errors,
+            reference: controllability,
+            reference_nodes: model.nodes(),
+            level,
+        };
+        return Ok(Discretised { model, rest, estimate: Some(estimate) });
+    }
+    let reference = Reference::within(scene, REFERENCE_SHARE * tolerance)?;
+    let mut reached = f64::INFINITY;
+    let mut level = *LEVELS.start();
+    while level <= *LEVELS.end() {
+        let (model, rest) = match at_level(scene, level) {
+            Ok(found) => found,
+            Err(ModelError::TooManyNodes { .. }) if reached.is_finite() => break,
+            Err(error) => return Err(error),
+        };
+        let apart = distances(&rest, &reference.rest);
+        let errors: Vec<f64> = apart.iter().zip(&reference.errors).map(|(a, open)| a + open).collect();
+        let controllability = worst(&errors);
+        if controllability <= tolerance {
+            let estimate = SpaceErrorEstimate {
+                controllability,
+                by_set: errors,
+                reference: worst(&reference.errors),
+                reference_nodes: reference.model.nodes(),
+                level,
+            };
+            return Ok(Discretised { model, rest, estimate: Some(estimate) });
+        }
+        reached = reached.min(controllability);
+        // The error falls with the size at the rims, which a level halves: levels that cannot do are not tried.
+        let left = worst(&apart) / (tolerance - worst(&reference.errors));
+        level += (left.log2().floor() as i32).clamp(1, 2);
+    }
+    Err(ModelError::ToleranceNotReached { tolerance, reached })
+}
+
+/// The model that says what the law's nonlinearity adds along insertions: linear tetrahedra on the coarsest mesh that sees
+/// every patch. They cost a tenth of any other method, and go as deep as it.
+fn profile_model(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
+    let scene = scene.with_method(Method::new(Integration::FemT4));
+    let mut outcome = Err(ModelError::NoPaddleControls);
+    for level in LEVELS {
+        outcome = mesh(&scene, &MeshSize::level(level)).and_then(|mesh| SpaceModel::on(&scene, &mesh));
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    outcome
+}

@@ -1,0 +1,206 @@
+//! The body and its inclusions: solids that the scene describes, or what files of other tools hold.
+
+use super::import::{self, FileError};
+use super::schema::{DomainSection, InclusionSection, LabelSet, LabelsSection, SolidSection};
+use crate::geometry::labels::{LabelBody, Labels};
+use crate::geometry::{Implicit, Solid};
+use crate::scene::error::{SceneError, Source};
+use crate::scene::schema::Located;
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::Path;
+use std::sync::Arc;
+
+type Checked<T> = Result<T, SceneError>;
+type Body = Arc<dyn Implicit>;
+
+/// Standard deviation of the Gaussian that smooths labels, in voxels: it takes the stairs away and leaves what is two
+/// voxels thick.
+const SMOOTHING: f64 = 0.7;
+/// A body in millimetres is hardly smaller or larger than this.
+const USUAL_MM: Range<f64> = 2.0..3000.0;
+/// Labels of a segmentation that are told of at most.
+const TOLD: usize = 20;
+
+/// Reads bodies, and keeps what there is to say about their files.
+#[derive(Debug)]
+pub(super) struct Bodies<'a> {
+    source: Source<'a>,
+    folder: &'a Path,
+    unit: &'a str,
+    segmentation: Option<Segmentation>,
+    pub(super) notes: Vec<String>,
+}
+
+/// The labels of the domain, and which of them are the body.
+#[derive(Debug)]
+struct Segmentation {
+    labels: Labels,
+    body: BTreeSet<u16>,
+}
+
+impl<'a> Bodies<'a> {
+    /// For files relative to `folder`, in a scene whose unit of length is `unit`.
+    pub(super) fn new(source: Source<'a>, folder: &'a Path, unit: &'a str) -> Self {
+        Self { source, folder, unit, segmentation: None, notes: Vec::new() }
+    }
+
+    /// The scene's body.
+    pub(super) fn domain(&mut self, located: &Located<DomainSection>) -> Checked<Body> {
+        let (section, span) = (located.get(), located.span());
+        match (&section.cuboid, &section.solid, &section.surface, &section.labels) {
+            (Some(b), None, None, None) => self.solid_body(&SolidSection::Box { min: b.min, max: b.max }, span),
+            (None, Some(solid), None, None) => self.solid_body(solid, span),
+            (None, None, Some(surface), None) => self.surface(surface),
+            (None, None, None, Some(labels)) => self.labelled(labels),
+            _ => Err(self.source.error(
+                span,
+                "[domain] needs one description of the body",
+                "give one of box = { min, max }, solid = { ... }, surface = \"body.stl\" and labels = { file, body }",
+            )),
+        }
+    }
+
+    fn solid_body(&self, solid: &SolidSection, span: Range<usize>) -> Checked<Body> {
+        if let SolidSection::Box { min, max } = solid
+            && (0..3).any(|k| min[k] >= max[k])
+        {
+            return Err(self.source.error(span, "the body is flat", "min must be below max in every coordinate"));
+        }
+        Ok(Arc::new(self.solid(solid, span, "domain")?))
+    }
+
+    /// The region of an inclusion. The domain has to be read before.
+    pub(super) fn inclusion(&mut self, located: &Located<InclusionSection>) -> Checked<Body> {
+        let (section, span) = (located.get(), located.span());
+        let forms = [
+            section.cuboid.map(|b| SolidSection::Box { min: b.min, max: b.max }),
+            section.sphere.map(|s| SolidSection::Sphere { centre: s.centre, radius: s.radius }),
+            section.ellipsoid.map(|e| SolidSection::Ellipsoid { centre: e.centre, semi_axes: e.semi_axes }),
+            section.solid.clone(),
+        ];
+        let mut forms = forms.into_iter().flatten();
+        match (forms.next(), forms.next(), &section.surface, &section.label) {
+            (Some(form), None, None, None) => Ok(Arc::new(self.solid(&form, span, "inclusion")?)),
+            (None, None, Some(surface), None) => self.surface(surface),
+            (None, None, None, Some(label)) => self.label(label),
+            _ => Err(self.source.error(
+                span,
+                "an inclusion needs one shape",
+                "give one of box, sphere, ellipsoid, solid, surface and label",
+            )),
+        }
+    }
+
+    /// A solid that the scene describes.
+    pub(super) fn solid(&self, section: &SolidSection, span: Range<usize>, what: &str) -> Checked<Solid> {
+        section.solid().map_err(|wrong| {
+            self.source.error(span, format!("{what}: {wrong}"), "e.g. { box = { min = [0, 0, 0], max = [1, 1, 1] } }")
+        })
+    }
+
+    /// What a file's surface encloses.
+    fn surface(&mut self, name: &Located<String>) -> Checked<Body> {
+        let read = import::surface(&self.folder.join(name.get()));
+        let read = read.map_err(|wrong| self.unreadable(name, &wrong, "an STL, OBJ or PLY file"))?;
+        let checked = read.value.check().map_err(|wrong| {
+            let help = "repair the surface in the program that made it, and export it again";
+            self.source.error(name.span(), format!("{}: {wrong}", name.get()), help)
+        })?;
+        self.note(name.get(), read.notes);
+        self.note(name.get(), checked.notes().to_vec());
+        let (low, high) = checked.extent();
+        self.note(name.get(), size_doubt((high - low).amax(), self.unit));
+        Ok(Arc::new(checked))
+    }
+
+    /// The body of a segmentation, which is kept for the inclusions.
+    fn labelled(&mut self, located: &Located<LabelsSection>) -> Checked<Body> {
+        let LabelsSection { file, body } = located.get();
+        let read = import::labels(&self.folder.join(file.get()));
+        let read = read.map_err(|wrong| self.unreadable(file, &wrong, "a NIfTI or NRRD file"))?;
+        self.note(file.get(), read.notes);
+        for count in read.value.counts().iter().take(TOLD) {
+            let name = count.name.as_ref().map_or_else(String::new, |name| format!(" ({name})"));
+            let told = format!("label {}{name}: {} voxels, {:.0} mm³", count.label, count.voxels, count.volume);
+            self.note(file.get(), [told]);
+        }
+        if self.unit != "mm" {
+            self.note(file.get(), [format!("coordinates are in mm, and the scene's unit of length is {}", self.unit)]);
+        }
+        let wanted = match body.get() {
+            LabelSet::One(label) => BTreeSet::from([*label]),
+            LabelSet::Several(labels) => labels.iter().copied().collect(),
+        };
+        let region = self.region_of(&read.value, &wanted, body.span())?;
+        self.segmentation = Some(Segmentation { labels: read.value, body: wanted });
+        Ok(region)
+    }
+
+    /// The region of one label of the domain's segmentation.
+    fn label(&self, label: &Located<u16>) -> Checked<Body> {
+        let Some(Segmentation { labels, body }) = &self.segmentation else {
+            return Err(self.source.error(
+                label.span(),
+                format!("label {} is of no segmentation: the domain has none", label.get()),
+                "describe the body by [domain] labels = { file, body }, or the inclusion by another shape",
+            ));
+        };
+        if !body.contains(label.get()) {
+            let all: Vec<String> = body.iter().chain([label.get()]).map(u16::to_string).collect();
+            return Err(self.source.error(
+                label.span(),
+                format!("label {} is no part of the body, which is labels {body:?}", label.get()),
+                format!("name all labels that belong to the body: body = [{}]", all.join(", ")),
+            ));
+        }
+        self.region_of(labels, &BTreeSet::from([*label.get()]), label.span())
+    }
+
+    fn region_of(&self, labels: &Labels, wanted: &BTreeSet<u16>, span: Range<usize>) -> Checked<Body> {
+        let body = LabelBody::new(labels, wanted, SMOOTHING).map_err(|wrong| {
+            self.source.error(span, format!("labels: {wrong}"), "give a label that the file has, e.g. body = [1, 2]")
+        })?;
+        Ok(Arc::new(body))
+    }
+
+    /// A file that cannot be used, at its name in the scene.
+    fn unreadable(&self, name: &Located<String>, wrong: &FileError, wanted: &str) -> SceneError {
+        let help = match wrong {
+            FileError::Io { .. } if self.folder.as_os_str().is_empty() => {
+                format!("give the path of {wanted}, relative to the current folder")
+            }
+            FileError::Io { .. } => {
+                format!("give the path of {wanted}, relative to the scene's folder {}", self.folder.display())
+            }
+            FileError::Ending { .. } => format!("give {wanted}"),
+            FileError::Read { .. } => format!("export the body again as {wanted}"),
+        };
+        self.source.error(name.span(), wrong.to_string(), help)
+    }
+
+    fn note(&mut self, file: &str, notes: impl IntoIterator<Item = String>) {
+        self.notes.extend(notes.into_iter().map(|note| format!("{file}: {note}")));
+    }
+}
+
+/// What to ask about a body of this size.
+fn size_doubt(size: f64, unit: &str) -> Option<String> {
+    let is = |what: &str, other: &str| format!("for a body in mm {size} is {what}: is the file in {other}?");
+    match unit {
+        "mm" if size < USUAL_MM.start => Some(is("tiny", "metres")),
+        "mm" if size > USUAL_MM.end => Some(is("huge", "micrometres")),
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::size_doubt;
+
+    #[test]
+    fn a_body_of_a_tenth_of_a_millimetre_may_be_in_metres() {
+        assert!(size_doubt(0.12, "mm").is_some_and(|note| note.contains("in metres?")));
+        assert_eq!((size_doubt(120.0, "mm"), size_doubt(0.12, "m")), (None, None));
+    }
+}
