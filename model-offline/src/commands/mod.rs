@@ -176,7 +176,7 @@ mod tests {
     use std::path::Path;
 
     /// How each command that takes numbers is called with everything that it needs; outputs are in `OUT`.
-    const CALLS: [(&str, &str); 11] = [
+    const CALLS: [(&str, &str); 12] = [
         ("place", "paper"),
         ("check", "paper"),
         ("draw", "result.json -o OUT/a.svg"),
@@ -188,6 +188,7 @@ mod tests {
         ("fit", "paper --tolerance 0.1 -o OUT/a.toml"),
         ("compare", "paper"),
         ("new", "-o OUT/a.toml"),
+        ("schema", ""),
     ];
 
     /// What a negative number after an option is answered with, and whether that is exit code 2.

@@ -34,8 +34,8 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
-/// The bundled scenes: name and text.
-pub const BUNDLED: [(&str, &str); 9] = [
+/// The bundled planar scenes: name and text.
+pub const BUNDLED: [(&str, &str); 7] = [
     ("paper", include_str!("../../scenes/paper.toml")),
     ("paper-hull", include_str!("../../scenes/paper-hull.toml")),
     ("breast", include_str!("../../scenes/breast.toml")),
@@ -43,9 +43,16 @@ pub const BUNDLED: [(&str, &str); 9] = [
     ("prostate", include_str!("../../scenes/prostate.toml")),
     ("prostate-world", include_str!("../../scenes/prostate-world.toml")),
     ("tethered", include_str!("../../scenes/tethered.toml")),
-    ("block", include_str!("../../scenes/block.toml")),
-    ("mound", include_str!("../../scenes/mound.toml")),
 ];
+
+/// The bundled scenes in space: name and text.
+pub const BUNDLED_IN_SPACE: [(&str, &str); 2] =
+    [("block", include_str!("../../scenes/block.toml")), ("mound", include_str!("../../scenes/mound.toml"))];
+
+/// All bundled scenes.
+fn all_bundled() -> impl Iterator<Item = &'static (&'static str, &'static str)> {
+    BUNDLED.iter().chain(&BUNDLED_IN_SPACE)
+}
 
 /// Letters in which a name may differ from the one that it was meant for.
 const LETTERS: usize = 2;
@@ -199,14 +206,14 @@ impl Scene {
     }
 
     fn bundled_at(path: &Path) -> Option<&'static (&'static str, &'static str)> {
-        if path.is_file() { None } else { BUNDLED.iter().find(|(name, _)| Path::new(name) == path) }
+        if path.is_file() { None } else { all_bundled().find(|(name, _)| Path::new(name) == path) }
     }
 
     /// The bundled scene that a name was meant for: a letter or two differ, or it has a folder or an ending too many.
     fn nearly_bundled(path: &Path) -> Option<&'static str> {
         let word = path.file_stem()?.to_str()?.to_lowercase();
         let distance = |name: &str| strsim::osa_distance(&word, name);
-        let (distance, name) = BUNDLED.iter().map(|(name, _)| (distance(name), *name)).min_by_key(|near| near.0)?;
+        let (distance, name) = all_bundled().map(|(name, _)| (distance(name), *name)).min_by_key(|near| near.0)?;
         (distance <= LETTERS && 3 * distance <= word.chars().count()).then_some(name)
     }
 
@@ -220,7 +227,7 @@ impl Scene {
         }
         let file = path.display().to_string();
         let bytes = std::fs::read(path).map_err(|error| {
-            let known: Vec<&str> = BUNDLED.iter().map(|b| b.0).collect();
+            let known: Vec<&str> = all_bundled().map(|b| b.0).collect();
             let meant = Self::nearly_bundled(path).map_or_else(String::new, |name| format!("did you mean `{name}`? "));
             error::Source { file: &file, text: "" }.error(
                 0..0,

@@ -8,7 +8,7 @@ mod validate;
 use super::error::{SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::dimension_of;
-use super::{Actuator, BUNDLED, Scene, TissueVariant};
+use super::{Actuator, BUNDLED, BUNDLED_IN_SPACE, Scene, TissueVariant};
 use crate::discretization::{Discretization, Method};
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::Law;
@@ -31,7 +31,7 @@ impl AnyScene {
     /// # Errors
     /// [`SceneError`] says what is wrong, where, and what to do.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let file = match BUNDLED.iter().find(|(name, _)| Path::new(name) == path) {
+        let file = match BUNDLED.iter().chain(&BUNDLED_IN_SPACE).find(|(name, _)| Path::new(name) == path) {
             Some((name, _)) if !path.is_file() => format!("<bundled {name}.toml>"),
             _ => path.display().to_string(),
         };
@@ -147,7 +147,7 @@ pub struct SpacePaddle {
 impl SpaceScene {
     /// The bundled scene of this name, if it is one in space.
     pub fn bundled(name: &str) -> Option<Self> {
-        let (_, text) = BUNDLED.iter().find(|(bundled, _)| *bundled == name)?;
+        let (_, text) = BUNDLED_IN_SPACE.iter().find(|(bundled, _)| *bundled == name)?;
         match AnyScene::parse(text, name).ok()? {
             AnyScene::Space(scene) => Some(*scene),
             AnyScene::Planar(_) => None,
