@@ -1,4 +1,4 @@
-//! Derivatives of a body's state with respect to what moves it: needle depth, paddle displacement x and y.
+//! Derivatives of a body's state with respect to its controls: needle depth and paddle displacements.
 //!
 //! With the state d(z) that keeps `f(d) + Λᵀ μ = 0, Λ d = g(z)`, the responses `x_i = ∂d/∂z_i` solve `K x_i + Λᵀ μ = 0,
 //! Λ x_i = ∂g/∂z_i`, and the target displacement u = T d has
@@ -11,8 +11,9 @@
 //! and drops out.
 
 use super::Body;
+use super::driven::DrivenBody;
 use crate::solver::equilibrium::Failure;
-use nalgebra::{Matrix2x3, Matrix3, Vector2};
+use nalgebra::{DMatrix, Matrix2x3, Matrix3};
 
 /// Longest way of a node in a second difference, over the finest spacing: strains of a thousandth, between rounding and
 /// the law's higher derivatives.
@@ -29,63 +30,97 @@ pub struct Derivatives {
     pub responses: Vec<f64>,
 }
 
+/// Derivatives by all controls of a body in D dimensions.
+#[derive(Debug, Clone)]
+pub struct ControlDerivatives<const D: usize> {
+    /// First, of the target displacement: D rows, a column per control.
+    pub slope: DMatrix<f64>,
+    /// Second, by component of the target displacement; none where differences cannot be taken.
+    pub bend: Option<[DMatrix<f64>; D]>,
+    /// First derivatives of the coefficients, control after control.
+    pub responses: Vec<f64>,
+}
+
+/// First and second derivatives at the present state, for bodies whose prescribed values are imposed exactly.
+///
+/// # Errors
+/// [`Failure`] when the current state is not stable.
+pub fn control_derivatives<const D: usize, B: DrivenBody<D>>(body: &mut B) -> Result<ControlDerivatives<D>, Failure> {
+    let unknowns = body.equilibrium().coefficients().len();
+    let controls = 1 + D * body.paddles();
+    let mut rates = Vec::new();
+    for control in 0..controls {
+        let mut unit = vec![0.0; controls];
+        unit[control] = 1.0;
+        rates.extend(body.prescribed(&unit));
+    }
+    let mut on_target = vec![0.0; D * unknowns];
+    for (&i, value) in body.target_row().nodes.iter().zip(&body.target_row().values) {
+        for axis in 0..D {
+            on_target[axis * unknowns + D * i as usize + axis] += value;
+        }
+    }
+    let mut responses = body.equilibrium_mut().linear_responses(&rates, &on_target)?;
+    let adjoints = responses.split_off(controls * unknowns);
+    let mut slope = DMatrix::zeros(D, controls);
+    for (column, response) in responses.chunks_exact(unknowns).enumerate() {
+        slope.set_column(column, &body.target_row().interpolate(response));
+    }
+    let bend = second_derivatives(body, &responses, &adjoints);
+    Ok(ControlDerivatives { slope, bend, responses })
+}
+
+/// By polarisation: `2 D²f[x, y] = D²f[x + y, x + y] − D²f[x, x] − D²f[y, y]`.
+fn second_derivatives<const D: usize, B: DrivenBody<D>>(
+    body: &B,
+    responses: &[f64],
+    adjoints: &[f64],
+) -> Option<[DMatrix<f64>; D]> {
+    let unknowns = body.equilibrium().coefficients().len();
+    let responses: Vec<&[f64]> = responses.chunks_exact(unknowns).collect();
+    let adjoints: Vec<&[f64]> = adjoints.chunks_exact(unknowns).collect();
+    let along = |direction: &[f64]| -> Option<[f64; D]> {
+        let furthest = direction.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        if furthest == 0.0 {
+            return Some([0.0; D]);
+        }
+        let length = DIFFERENCE * body.spacing() / furthest;
+        let sums = body.equilibrium().force_curvature(direction, length, &adjoints).ok()?;
+        Some(std::array::from_fn(|row| -sums[row]))
+    };
+    let mut bend: [DMatrix<f64>; D] = std::array::from_fn(|_| DMatrix::zeros(responses.len(), responses.len()));
+    for (i, x) in responses.iter().enumerate() {
+        let own = along(x)?;
+        (0..D).for_each(|row| bend[row][(i, i)] = own[row]);
+    }
+    for (i, x) in responses.iter().enumerate() {
+        for (j, y) in responses.iter().enumerate().skip(i + 1) {
+            let sum: Vec<f64> = x.iter().zip(*y).map(|(x, y)| x + y).collect();
+            let both = along(&sum)?;
+            for row in 0..D {
+                let mixed = 0.5 * (both[row] - bend[row][(i, i)] - bend[row][(j, j)]);
+                (bend[row][(i, j)], bend[row][(j, i)]) = (mixed, mixed);
+            }
+        }
+    }
+    Some(bend)
+}
+
 impl Body<'_> {
     /// First and second derivatives at the present state, for bodies whose prescribed values are imposed exactly.
     ///
     /// # Errors
     /// [`Failure`] when the current state is not stable.
     pub fn derivatives(&mut self) -> Result<Derivatives, Failure> {
-        let unknowns = self.model.dofs();
-        let mut rates = self.model.prescribed_values(self.attached, 1.0, Vector2::zeros());
-        let controls = if self.attached.is_some() { 3 } else { 1 };
-        for axis in 0..controls - 1 {
-            rates.extend(self.model.prescribed_values(self.attached, 0.0, Vector2::ith(axis, 1.0)));
-        }
-        let mut on_target = vec![0.0; 2 * unknowns];
-        for (&i, value) in self.model.target.nodes.iter().zip(&self.model.target.values) {
-            for axis in 0..2 {
-                on_target[axis * unknowns + 2 * i as usize + axis] += value;
-            }
-        }
-        let mut responses = self.equilibrium.linear_responses(&rates, &on_target)?;
-        let adjoints = responses.split_off(controls * unknowns);
+        let found = control_derivatives::<2, _>(self)?;
         let mut slope = Matrix2x3::zeros();
-        for (column, response) in responses.chunks_exact(unknowns).enumerate() {
-            slope.set_column(column, &self.model.target.interpolate(response));
-        }
-        let bend = self.second_derivatives(&responses, &adjoints);
-        Ok(Derivatives { slope, bend, responses })
-    }
-
-    /// By polarisation: `2 D²f[x, y] = D²f[x + y, x + y] − D²f[x, x] − D²f[y, y]`.
-    fn second_derivatives(&self, responses: &[f64], adjoints: &[f64]) -> Option<[Matrix3<f64>; 2]> {
-        let responses: Vec<&[f64]> = responses.chunks_exact(self.model.dofs()).collect();
-        let adjoints: Vec<&[f64]> = adjoints.chunks_exact(self.model.dofs()).collect();
-        let along = |direction: &[f64]| -> Option<[f64; 2]> {
-            let furthest = direction.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-            if furthest == 0.0 {
-                return Some([0.0; 2]);
-            }
-            let length = DIFFERENCE * self.model.spacing() / furthest;
-            let sums = self.equilibrium.force_curvature(direction, length, &adjoints).ok()?;
-            Some([-sums[0], -sums[1]])
+        slope.view_mut((0, 0), (2, found.slope.ncols())).copy_from(&found.slope);
+        let whole = |part: &DMatrix<f64>| {
+            let mut whole = Matrix3::zeros();
+            whole.view_mut((0, 0), part.shape()).copy_from(part);
+            whole
         };
-        let mut bend = [Matrix3::zeros(); 2];
-        for (i, x) in responses.iter().enumerate() {
-            let own = along(x)?;
-            (0..2).for_each(|row| bend[row][(i, i)] = own[row]);
-        }
-        for (i, x) in responses.iter().enumerate() {
-            for (j, y) in responses.iter().enumerate().skip(i + 1) {
-                let sum: Vec<f64> = x.iter().zip(*y).map(|(x, y)| x + y).collect();
-                let both = along(&sum)?;
-                for row in 0..2 {
-                    let mixed = 0.5 * (both[row] - bend[row][(i, i)] - bend[row][(j, j)]);
-                    (bend[row][(i, j)], bend[row][(j, i)]) = (mixed, mixed);
-                }
-            }
-        }
-        Some(bend)
+        Ok(Derivatives { slope, bend: found.bend.map(|bend| bend.each_ref().map(whole)), responses: found.responses })
     }
 }
 
@@ -95,6 +130,7 @@ mod tests {
     use crate::model::TissueModel;
     use crate::scene::Scene;
     use crate::solver::equilibrium::NewtonSettings;
+    use nalgebra::Vector2;
 
     /// Against differences of the first derivatives of states that were solved for, at rest and deep in.
     #[test]

@@ -1,12 +1,14 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
 mod derivatives;
+pub mod driven;
 mod error;
 mod graded;
 pub mod space;
 mod tissue;
 
-pub use derivatives::Derivatives;
+pub use derivatives::{ControlDerivatives, Derivatives, control_derivatives};
+pub use driven::DrivenBody;
 pub use error::{BoundaryPart, ModelError, ModelFailure};
 pub use graded::{graded_model, sized_model};
 

@@ -7,6 +7,7 @@
 //! - [`online`]: the nonlinear model on a few displacement modes (proper orthogonal decomposition), its energy summed
 //!   over a few weighted integration points (energy-conserving sampling and weighting, Farhat, Avery, Chapman & Cortial
 //!   2014), with an error estimate at every step and a domain that it knows.
+//! - [`tabulated`]: a body in space near one insertion: states with their first and second derivatives.
 //! - [`mod@train`]: makes one from snapshots of the full model, and measures it on states that it was not trained on.
 
 pub mod along_path;
@@ -18,10 +19,12 @@ mod nnls;
 pub mod online;
 mod snapshots;
 mod space;
+pub mod tabulated;
 pub mod train;
 
 pub use along_path::{AlongPath, PathBody, PathOptions};
 pub use condensed::Condensed;
 pub use extrapolated::Extrapolated;
 pub use online::{Invalid, ReducedModel};
+pub use tabulated::{Tabulated, TabulatedBody, TabulationError, TabulationOptions, TabulationReport};
 pub use train::{TrainingError, TrainingOptions, TrainingReport, train};

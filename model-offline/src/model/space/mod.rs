@@ -122,6 +122,11 @@ impl SpaceModel {
         self.spatial.positions().len()
     }
 
+    /// Side of the smallest nodal volume, length.
+    pub fn spacing(&self) -> f64 {
+        self.spacing
+    }
+
     /// Number of unknowns.
     pub fn dofs(&self) -> usize {
         3 * self.nodes()
@@ -302,9 +307,29 @@ impl SpaceBody<'_> {
         self.depth
     }
 
+    /// Displacements of the attached paddles.
+    pub fn paddles(&self) -> &[Vector3<f64>] {
+        &self.paddles
+    }
+
+    /// The model that it is a body of.
+    pub(crate) fn model(&self) -> &SpaceModel {
+        self.model
+    }
+
+    /// Prescribed values with the needle at `depth` and the paddles displaced.
+    pub(crate) fn prescribed_values(&self, depth: f64, paddles: &[Vector3<f64>]) -> Vec<f64> {
+        self.held.values(self.model.scene.needle.axis * depth, paddles)
+    }
+
     /// The equilibrium behind it.
     pub fn equilibrium(&self) -> &Equilibrium<3> {
         &self.equilibrium
+    }
+
+    /// The equilibrium behind it, to change settings.
+    pub fn equilibrium_mut(&mut self) -> &mut Equilibrium<3> {
+        &mut self.equilibrium
     }
 
     /// Takes needle and paddles to the given depth and displacements along a straight path.
@@ -312,7 +337,7 @@ impl SpaceBody<'_> {
     /// # Errors
     /// [`Failure`]; depth and paddles are then where the last converged state has them.
     pub fn drive(&mut self, depth: f64, paddles: &[Vector3<f64>]) -> Result<(), Failure> {
-        let prescribed = self.held.values(self.model.scene.needle.axis * depth, paddles);
+        let prescribed = self.prescribed_values(depth, paddles);
         let outcome = self.equilibrium.drive(&prescribed);
         let reached = outcome.as_ref().map_or_else(|failure| failure.reached, |()| 1.0);
         self.depth += (depth - self.depth) * reached;

@@ -1,6 +1,7 @@
 //! Placement in space: single paddles and pairs, at rest and along the insertion.
 
 pub mod controllability;
+pub mod holding;
 pub mod rest;
 pub mod study;
 pub mod workflow;
