@@ -1,6 +1,7 @@
 //! What the loop needs from its surroundings. Lockstep, free-run and bare metal implement these traits and share
 //! [`run_tick`], so that all of them run the same controller.
 
+use crate::contract::frames::MAX_PADDLES;
 use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use crate::controller::{Controller, State};
 use crate::inputs::Inputs;
@@ -19,8 +20,8 @@ pub trait SampleSource {
     fn needle(&mut self) -> Option<NeedleSample>;
     /// Newest target sample.
     fn target(&mut self) -> Option<TargetSample>;
-    /// Newest paddle sample.
-    fn paddle(&mut self) -> Option<PaddleSample>;
+    /// Newest sample of the paddle at this place of the table, from 0 on. Only asked for places where the table has one.
+    fn paddle(&mut self, place: usize) -> Option<PaddleSample>;
 }
 
 /// Where commands go. Must not block.
@@ -39,14 +40,19 @@ pub trait CommandSink {
 ///
 /// # Errors
 /// That of the sink; the controller has stepped nevertheless.
-pub fn run_tick<T: Scalar, L: SampleSource + CommandSink>(
-    controller: &Controller<'_, T>,
-    state: &mut State<T>,
+pub fn run_tick<T: Scalar, const D: usize, const N: usize, const P: usize, L: SampleSource + CommandSink>(
+    controller: &Controller<'_, T, D, N, P>,
+    state: &mut State<T, D, N, P>,
     tick: u64,
     time_ns: u64,
     link: &mut L,
 ) -> Result<(Inputs, PaddleCommand), L::Error> {
-    let inputs = Inputs { tick, time_ns, needle: link.needle(), target: link.target(), paddle: link.paddle() };
+    let (needle, target) = (link.needle(), link.target());
+    let mut paddles = [None; MAX_PADDLES];
+    for (place, paddle) in paddles.iter_mut().take(P).enumerate() {
+        *paddle = link.paddle(place);
+    }
+    let inputs = Inputs { tick, time_ns, needle, target, paddles };
     let command = controller.step(state, &inputs);
     link.send(&command)?;
     Ok((inputs, command))
@@ -73,8 +79,8 @@ mod tests {
         fn target(&mut self) -> Option<TargetSample> {
             self.arrived.target.take()
         }
-        fn paddle(&mut self) -> Option<PaddleSample> {
-            self.arrived.paddle.take()
+        fn paddle(&mut self, place: usize) -> Option<PaddleSample> {
+            self.arrived.paddles.get_mut(place)?.take()
         }
     }
 

@@ -1,13 +1,17 @@
-//! In which direction the paddle moves to remove an orthogonal error.
+//! In which direction the paddles move to remove an orthogonal error.
+//!
+//! With N the directions orthogonal to the needle and J = [J₁ … J_P] the actuation Jacobians of all paddles, an orthogonal
+//! displacement e of the target is moved by the w = G·e for which Σ ‖wₚ‖²/cₚ is least, where cₚ is the square of paddle p's
+//! largest displacement: a paddle that may go twice as far goes four times as far for the same effect.
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
 use crate::contract::condition_number;
 use crate::scalar::Scalar;
 
-/// Condition number past which the inverse is damped. Below it the damped solution is the exact one, so that
-/// well-placed paddles pay nothing; above it the paddle's excursion along the weak direction stays bounded.
+/// Condition number past which an inverse is damped. Below it the damped solution is the exact one, so that
+/// well-placed paddles pay nothing; above it the excursion along the weak direction stays bounded.
 pub const DAMPING_CONDITION: f64 = 1e2;
 
 /// How measurements of the target become corrections.
@@ -24,38 +28,113 @@ pub enum Feedback {
     Harmonic,
 }
 
-/// Paddle direction per unit of orthogonal target displacement.
+/// Paddle directions per unit of orthogonal target displacement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Direction {
-    /// J⁻¹n: moves the target along n only, its axial position is left alone (the paper, section III.B).
+    /// J⁺N: moves the target orthogonally to the needle only, its axial position is left alone (the paper, section
+    /// III.B). J⁻¹n for the one paddle of the plane.
     #[default]
     Inverse,
-    /// Jₙᵀ/(Jₙ·Jₙᵀ) with Jₙ = nᵀJ: the shortest paddle motion; the target may also move along the axis.
+    /// (NᵀJ)⁺: the shortest motion of the paddles; the target may also move along the axis.
     MinimumNorm,
 }
 
 impl Direction {
-    /// Paddle displacement per unit of target displacement along `orthogonal` (n), from the actuation Jacobian J
-    /// (rows target, columns paddle). Zero if the paddle cannot move the target.
-    pub fn solve<T: Scalar, const D: usize>(
+    /// What a table in this space is controlled with unless somebody chooses: in the plane one direction is to be left
+    /// alone beside the one to be removed, and one paddle does both; in space that takes motions several times as long.
+    pub const fn default_in(dimension: usize) -> Self {
+        if dimension > 2 { Self::MinimumNorm } else { Self::Inverse }
+    }
+
+    /// Displacement of each paddle per unit of target displacement along each column of `orthogonal` (N), from the
+    /// actuation Jacobians (rows target, columns paddle) and the squares of the paddles' limits over that of the largest.
+    /// Zero if the paddles cannot move the target.
+    pub fn solve<T: Scalar, const D: usize, const N: usize, const P: usize>(
         self,
-        jacobian: &SMatrix<T, D, D>,
-        orthogonal: &SVector<T, D>,
-    ) -> SVector<T, D> {
-        match self {
-            Self::Inverse => damped_inverse(jacobian, orthogonal),
-            Self::MinimumNorm => {
-                let row = jacobian.tr_mul(orthogonal);
-                let squared = row.norm_squared();
-                if squared > T::zero() { row / squared } else { row }
+        jacobians: &[SMatrix<T, D, D>; P],
+        orthogonal: &SMatrix<T, D, N>,
+        weights: &[T; P],
+    ) -> [SMatrix<T, D, N>; P] {
+        match (self, jacobians.as_slice()) {
+            // Of a single paddle no weight matters, and its inverse is cheaper than one of squares.
+            (Self::Inverse, [jacobian]) => [damped_inverse(jacobian, orthogonal); P],
+            (Self::Inverse, _) => {
+                let mut columns = [SMatrix::zeros(); P];
+                for (column, jacobian) in columns.iter_mut().zip(jacobians) {
+                    *column = jacobian.transpose();
+                }
+                weighted(&columns, orthogonal, weights)
+            }
+            (Self::MinimumNorm, _) => {
+                let mut columns = [SMatrix::zeros(); P];
+                for (column, jacobian) in columns.iter_mut().zip(jacobians) {
+                    *column = jacobian.tr_mul(orthogonal);
+                }
+                if N == 1 { along_rows(columns, weights) } else { weighted(&columns, &SMatrix::identity(), weights) }
             }
         }
     }
 }
 
-/// Damped least squares (JᵀJ + μ²I)⁻¹Jᵀn with μ² = (‖J‖/κ_d)²·(1 − (κ_d/κ)²) past the condition number κ_d, and
+/// What minimises Σ ‖wₚ‖²/cₚ with Σ Aₚ·wₚ = one column of `wanted` (R × N): wₚ = cₚ·Aₚᵀ·M⁻¹·wanted with M = Σ cₚ·Aₚ·Aₚᵀ,
+/// from the columns Aₚᵀ (D × R).
+///
+/// Damped as [`damped_inverse`] is: M + μ²I with μ² = (tr M/κ_d²)·(1 − (κ_d/κ)²) past κ_d, where κ² = tr M · tr M⁻¹ is the
+/// condition number of [√c₁·A₁ …] in the Frobenius norm.
+#[inline(never)]
+fn weighted<T: Scalar, const D: usize, const R: usize, const N: usize, const P: usize>(
+    columns: &[SMatrix<T, D, R>; P],
+    wanted: &SMatrix<T, R, N>,
+    weights: &[T; P],
+) -> [SMatrix<T, D, N>; P] {
+    let mut joint = SMatrix::<T, R, R>::zeros();
+    for (column, weight) in columns.iter().zip(weights) {
+        joint += column.tr_mul(column) * *weight;
+    }
+    let size = joint.trace();
+    let limit = T::of(DAMPING_CONDITION * DAMPING_CONDITION);
+    let inverse = joint.try_inverse();
+    let condition = inverse.as_ref().map(|inverse| size * inverse.trace());
+    let inverse = match condition {
+        Some(condition) if condition <= limit => inverse,
+        _ => {
+            // Singular: the condition number is infinite.
+            let undamped = condition.map_or(T::zero(), |condition| limit / condition);
+            let damping = size / limit * (T::one() - undamped);
+            (joint + SMatrix::identity() * damping).try_inverse()
+        }
+    };
+    let answer = inverse.map_or_else(SMatrix::zeros, |inverse| inverse * wanted);
+    let mut directions = [SMatrix::zeros(); P];
+    for ((direction, column), weight) in directions.iter_mut().zip(columns).zip(weights) {
+        *direction = column * answer * *weight;
+    }
+    directions
+}
+
+/// The same for one direction, whose M is a number: rows and their weighted squares.
+#[inline(always)]
+fn along_rows<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    mut rows: [SMatrix<T, D, N>; P],
+    weights: &[T; P],
+) -> [SMatrix<T, D, N>; P] {
+    let mut squares = rows.iter().zip(weights).map(|(row, weight)| row.norm_squared() * *weight);
+    let first = squares.next().unwrap_or_else(T::zero);
+    let squared = squares.fold(first, |sum, square| sum + square);
+    if squared > T::zero() {
+        for (row, weight) in rows.iter_mut().zip(weights) {
+            *row = *row * *weight / squared;
+        }
+    }
+    rows
+}
+
+/// Damped least squares (JᵀJ + μ²I)⁻¹JᵀN with μ² = (‖J‖/κ_d)²·(1 − (κ_d/κ)²) past the condition number κ_d, and
 /// μ = 0 up to it; continuous in κ (after Nakamura & Hanafusa, 1986).
-fn damped_inverse<T: Scalar, const D: usize>(jacobian: &SMatrix<T, D, D>, orthogonal: &SVector<T, D>) -> SVector<T, D> {
+fn damped_inverse<T: Scalar, const D: usize, const N: usize>(
+    jacobian: &SMatrix<T, D, D>,
+    orthogonal: &SMatrix<T, D, N>,
+) -> SMatrix<T, D, N> {
     // The condition number in squares, from the inverse that is needed anyway.
     if let Some(inverse) = jacobian.try_inverse() {
         let squared = jacobian.norm_squared().to_f64() * inverse.norm_squared().to_f64();
@@ -68,7 +147,7 @@ fn damped_inverse<T: Scalar, const D: usize>(jacobian: &SMatrix<T, D, D>, orthog
     let scale = jacobian.norm() / T::of(DAMPING_CONDITION);
     let damping = scale * scale * T::of(1.0 - ratio * ratio);
     let normal_matrix = jacobian.tr_mul(jacobian) + SMatrix::identity() * damping;
-    normal_matrix.try_inverse().map_or_else(SVector::zeros, |inverse| inverse * jacobian.tr_mul(orthogonal))
+    normal_matrix.try_inverse().map_or_else(SMatrix::zeros, |inverse| inverse * jacobian.tr_mul(orthogonal))
 }
 
 #[cfg(test)]
@@ -78,24 +157,30 @@ mod tests {
     use super::*;
     use crate::contract::example::jacobian;
 
+    /// Of one paddle in the plane.
+    fn solve(direction: Direction, jacobian: Matrix2<f64>, n: &Vector2<f64>) -> Vector2<f64> {
+        let [solved] = direction.solve(&[jacobian], n, &[1.0]);
+        solved
+    }
+
     #[test]
     fn the_inverse_leaves_the_axis_alone() {
         let n = Vector2::x();
-        let moved = jacobian() * Direction::Inverse.solve(&jacobian(), &n);
+        let moved = jacobian() * solve(Direction::Inverse, jacobian(), &n);
         assert!((moved - n).norm() < 1e-14);
     }
 
     #[test]
     fn a_paddle_that_does_nothing_has_no_direction() {
-        assert_eq!(Direction::MinimumNorm.solve(&Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
+        assert_eq!(solve(Direction::MinimumNorm, Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
     }
 
     #[test]
     fn the_minimum_norm_is_shorter() {
         let n = Vector2::x();
-        let shortest = Direction::MinimumNorm.solve(&jacobian(), &n);
+        let shortest = solve(Direction::MinimumNorm, jacobian(), &n);
         assert!((n.dot(&(jacobian() * shortest)) - 1.0).abs() < 1e-14);
-        assert!(shortest.norm() < Direction::Inverse.solve(&jacobian(), &n).norm());
+        assert!(shortest.norm() < solve(Direction::Inverse, jacobian(), &n).norm());
     }
 
     /// μ = 0 up to the condition number κ_d, by the formula in the documentation of `damped_inverse` past it.
@@ -116,7 +201,7 @@ mod tests {
                 let entry = jacobian[(k, k)];
                 entry * n[k] / (entry * entry + damping)
             });
-            let found = Direction::Inverse.solve(&jacobian, &n);
+            let found = solve(Direction::Inverse, jacobian, &n);
             assert!((found - expected).norm() < 1e-9 * expected.norm(), "{condition}: {found} {expected}");
         }
     }
@@ -126,10 +211,10 @@ mod tests {
         for exponent in 1..=12 {
             let smallest = 10f64.powi(-exponent);
             let n = Vector2::new(0.6, 0.8);
-            let direction = Direction::Inverse.solve(&Matrix2::new(1.0, 0.0, 0.0, smallest), &n);
+            let direction = solve(Direction::Inverse, Matrix2::new(1.0, 0.0, 0.0, smallest), &n);
             assert!(direction.norm() <= DAMPING_CONDITION, "σ = {smallest}: {}", direction.norm());
         }
-        assert_eq!(Direction::Inverse.solve(&Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
+        assert_eq!(solve(Direction::Inverse, Matrix2::<f64>::zeros(), &Vector2::x()), Vector2::zeros());
     }
 
     #[test]
@@ -143,7 +228,7 @@ mod tests {
             let damping = (norm / DAMPING_CONDITION).powi(2) * (1.0 - ratio * ratio);
             let component = |value: f64, n: f64| value / (value * value + damping) * n;
             let expected = Vector2::new(component(2.0, 0.6), component(2.0 * smallest, 0.8));
-            let solved = Direction::Inverse.solve(&jacobian, &Vector2::new(0.6, 0.8));
+            let solved = solve(Direction::Inverse, jacobian, &Vector2::new(0.6, 0.8));
             assert!((solved - expected).norm() < 1e-9 * expected.norm(), "σ {smallest}: {solved} {expected}");
         }
     }

@@ -68,29 +68,29 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! // Tissue that takes the target along by 2 % of the depth sideways; paddle number 3.
-//! let table = decode::<f64, 2>(&std::fs::read("tests/planar.table")?)?;
+//! let table = decode::<f64, 2, 1, 1>(&std::fs::read("tests/planar.table")?)?;
 //! // 1 kHz loop; target at 50 Hz, 20 ms old when it arrives.
 //! let controller = Controller::new(&table, &Settings::new(1_000_000, 20_000_000, 20_000_000))?;
 //! let mut state = State::new();
 //!
 //! // The needle goes in at 0.02 per second; the target stays where it is.
-//! let mut paddle = [0.0; 2];
+//! let mut paddle = [0.0; 3];
 //! for tick in 0..1000 {
 //!     let (sequence, time_ns) = (tick as u32, tick * 1_000_000);
 //!     let depth = 2e-5 * tick as f64;
 //!     let needle = NeedleSample { sequence, time_ns, depth, velocity: 0.02, ..Default::default() };
-//!     let target = TargetSample { sequence, time_ns, flags: TARGET_VISIBLE, displacement: [0.0, -0.1 * depth] };
+//!     let target = TargetSample { sequence, time_ns, flags: TARGET_VISIBLE, displacement: [0.0, -0.1 * depth, 0.0] };
 //!     let measured = PaddleSample { sequence, time_ns, paddle_index: 3, displacement: paddle };
 //!     let inputs = Inputs {
 //!         tick,
 //!         time_ns,
 //!         needle: Some(needle),
 //!         target: (tick % 20 == 0).then_some(target),
-//!         paddle: Some(measured),
+//!         paddles: [Some(measured), None],
 //!     };
 //!     let command = controller.step(&mut state, &inputs);
 //!     if command.is_valid() {
-//!         paddle = command.displacement; // what an ideal actuator does until the next tick
+//!         [paddle, _] = command.displacement; // what an ideal actuator does until the next tick
 //!     }
 //! }
 //! assert_eq!(state.mode(), Mode::Run);

@@ -18,7 +18,7 @@ pub enum PositionLimit {
     Box,
 }
 
-/// Limits of the paddle in runtime form.
+/// Limits of a paddle in runtime form.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits<T: Scalar> {
     /// Shape of the admissible positions.

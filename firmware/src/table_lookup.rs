@@ -10,9 +10,9 @@ use crate::scalar::{Scalar, bounded};
 
 /// A depth located in the table: the two knots around it and the position between them.
 #[derive(Clone, Copy, Debug)]
-pub struct TableLocation<'t, T: Scalar, const D: usize> {
-    left: &'t Knot<T, D>,
-    right: &'t Knot<T, D>,
+pub struct TableLocation<'t, T: Scalar, const D: usize = 2, const P: usize = 1> {
+    left: &'t Knot<T, D, P>,
+    right: &'t Knot<T, D, P>,
     /// Distance of the knots, length.
     interval: T,
     /// 0 at the left knot, 1 at the right one.
@@ -23,9 +23,9 @@ pub struct TableLocation<'t, T: Scalar, const D: usize> {
     pub clamped: bool,
 }
 
-impl<T: Scalar, const D: usize> Table<T, D> {
+impl<T: Scalar, const D: usize, const N: usize, const P: usize> Table<T, D, N, P> {
     /// Locates `depth` by bisection; `None` only for a table with fewer than two knots, which validation refuses.
-    pub fn locate(&self, depth: T) -> Option<TableLocation<'_, T, D>> {
+    pub fn locate(&self, depth: T) -> Option<TableLocation<'_, T, D, P>> {
         let (first, last) = (self.knots.first()?, self.knots.last()?);
         let inside = bounded(depth, first.depth, last.depth);
         let right_index =
@@ -43,9 +43,9 @@ impl<T: Scalar, const D: usize> Table<T, D> {
     }
 }
 
-impl<T: Scalar, const D: usize> TableLocation<'_, T, D> {
-    /// Feed-forward paddle displacement, length.
-    pub fn paddle_path(&self) -> SVector<T, D> {
+impl<T: Scalar, const D: usize, const P: usize> TableLocation<'_, T, D, P> {
+    /// Feed-forward paddle displacements, length; a column per paddle.
+    pub fn paddle_path(&self) -> SMatrix<T, D, P> {
         self.hermite(
             (&self.left.paddle_path, &self.left.paddle_path_slope),
             (&self.right.paddle_path, &self.right.paddle_path_slope),
@@ -60,33 +60,38 @@ impl<T: Scalar, const D: usize> TableLocation<'_, T, D> {
         )
     }
 
-    /// Target displacement with the paddle held at zero, length.
+    /// Target displacement with the paddles held at zero, length.
     pub fn static_target_displacement(&self) -> SVector<T, D> {
         self.left.static_target_displacement.lerp(&self.right.static_target_displacement, self.fraction)
     }
 
-    /// Actuation Jacobian; rows target, columns paddle.
-    pub fn jacobian(&self) -> SMatrix<T, D, D> {
-        self.left.jacobian.zip_map(&self.right.jacobian, |left, right| left + (right - left) * self.fraction)
+    /// Actuation Jacobian of each paddle; rows target, columns paddle.
+    pub fn jacobian(&self) -> [SMatrix<T, D, D>; P] {
+        let mut jacobians = [SMatrix::zeros(); P];
+        for (jacobian, (left, right)) in jacobians.iter_mut().zip(self.left.jacobian.iter().zip(&self.right.jacobian)) {
+            *jacobian = left.zip_map(right, |left, right| left + (right - left) * self.fraction);
+        }
+        jacobians
     }
 
     /// Cubic through values and slopes at both knots, with s the fraction and h the interval:
     /// p = p₀ + s·(h·m₀ + s·((3Δ − 2h·m₀ − h·m₁) + s·(h·m₀ + h·m₁ − 2Δ))), Δ = p₁ − p₀.
-    fn hermite(
+    fn hermite<const C: usize>(
         &self,
-        (left, left_slope): (&SVector<T, D>, &SVector<T, D>),
-        (right, right_slope): (&SVector<T, D>, &SVector<T, D>),
-    ) -> SVector<T, D> {
+        (left, left_slope): (&SMatrix<T, D, C>, &SMatrix<T, D, C>),
+        (right, right_slope): (&SMatrix<T, D, C>, &SMatrix<T, D, C>),
+    ) -> SMatrix<T, D, C> {
         let s = self.fraction;
         let (two, three) = (T::of(2.0), T::of(3.0));
         // One component at a time: every operation on vectors would be a loop of its own in code compiled for size.
-        SVector::from_fn(|i, _| {
-            let rise = right[i] - left[i];
-            let start = left_slope[i] * self.interval;
-            let end = right_slope[i] * self.interval;
+        SMatrix::from_fn(|i, j| {
+            let at = (i, j);
+            let rise = right[at] - left[at];
+            let start = left_slope[at] * self.interval;
+            let end = right_slope[at] * self.interval;
             let quadratic = rise * three - start * two - end;
             let cubic = start + end - rise * two;
-            left[i] + (start + (quadratic + cubic * s) * s) * s
+            left[at] + (start + (quadratic + cubic * s) * s) * s
         })
     }
 }
@@ -117,13 +122,13 @@ mod tests {
     #[test]
     fn jacobians_are_linear_between_knots() {
         let mut table = table();
-        let at_start = table.knots[0].jacobian;
+        let [at_start] = table.knots[0].jacobian;
         for knot in &mut table.knots {
-            knot.jacobian = at_start * (1.0 + 10.0 * knot.depth);
+            knot.jacobian = [at_start * (1.0 + 10.0 * knot.depth)];
         }
         for step in 0..=100 {
             let depth = 0.1 * f64::from(step) / 100.0;
-            let found = table.locate(depth).unwrap().jacobian();
+            let [found] = table.locate(depth).unwrap().jacobian();
             assert!((found - at_start * (1.0 + 10.0 * depth)).norm() < 1e-15, "{depth}: {found}");
         }
     }

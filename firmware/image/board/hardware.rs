@@ -140,7 +140,7 @@ pub(crate) fn reset_cause() -> ResetCause {
 }
 
 /// The last word before a reset: a SAFE command that moves nothing, framed beforehand.
-static LAST_WORD: [AtomicU8; 64] = [const { AtomicU8::new(0) }; 64];
+static LAST_WORD: [AtomicU8; 96] = [const { AtomicU8::new(0) }; 96];
 
 /// Keeps the frame that is to be sent before a reset.
 pub(crate) fn keep_last_word(frame: &[u8]) {

@@ -6,7 +6,7 @@
 //! | 8 | 2 | format version |
 //! | 10 | 1 | scalar kind: 4 = f32, 8 = f64 |
 //! | 11 | 1 | dimension of space |
-//! | 12 | 2 | paddle degrees of freedom |
+//! | 12 | 2 | degrees of freedom of all paddles: their number times the dimension |
 //! | 14 | 2 | reserved, 0 |
 //! | 16 | 32 | SHA-256 of the scene |
 //! | 48 | 4 | length L of the payload |
@@ -21,6 +21,7 @@ use nalgebra::SMatrix;
 use serde::Deserialize;
 
 pub use super::format::{FORMAT_VERSION, MAX_TABLE_BYTES};
+use super::frames::{MAX_DIMENSION, MAX_PADDLES};
 use super::{Gains, Knot, Paddle, Table, TableError, Units, Validity};
 use crate::scalar::{Scalar, ScalarKind};
 
@@ -41,7 +42,7 @@ pub struct Header {
     pub scalar: ScalarKind,
     /// Dimension of space.
     pub dimension: u8,
-    /// Degrees of freedom of the paddle.
+    /// Degrees of freedom of all paddles.
     pub paddle_dof: u16,
     /// SHA-256 of the scene.
     pub scene_hash: [u8; 32],
@@ -105,7 +106,8 @@ impl Header {
 ///
 /// # Errors
 /// [`TableError::BufferTooSmall`], or what [`Table::validate`] refuses: an invalid table is never written.
-pub fn encode<T: Scalar, const D: usize>(table: &Table<T, D>, buffer: &mut [u8]) -> Result<usize, TableError> {
+pub fn encode<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    table: &Table<T, D, N, P>, buffer: &mut [u8]) -> Result<usize, TableError> {
     table.validate()?;
     let too_small = TableError::BufferTooSmall { bytes: buffer.len() };
     let (header, body) = buffer.split_first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
@@ -113,8 +115,9 @@ pub fn encode<T: Scalar, const D: usize>(table: &Table<T, D>, buffer: &mut [u8])
     *header = Header {
         format_version: FORMAT_VERSION,
         scalar: T::KIND,
-        dimension: u8::try_from(D).map_err(|_| TableError::Dimension { found: D, expected: 3 })?,
-        paddle_dof: u16::try_from(D).map_err(|_| TableError::PaddleDof { found: D, expected: 3 })?,
+        dimension: u8::try_from(D).map_err(|_| TableError::Dimension { found: D, expected: MAX_DIMENSION })?,
+        paddle_dof: u16::try_from(D * P)
+            .map_err(|_| TableError::PaddleDof { found: D * P, expected: MAX_DIMENSION * MAX_PADDLES })?,
         scene_hash: table.scene_hash,
         payload_bytes: u32::try_from(payload_bytes).map_err(|_| too_small)?,
     }
@@ -129,7 +132,7 @@ pub fn encode<T: Scalar, const D: usize>(table: &Table<T, D>, buffer: &mut [u8])
 ///
 /// # Errors
 /// The first check that fails, as its own [`TableError`].
-pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, TableError> {
+pub fn decode<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: &[u8]) -> Result<Table<T, D, N, P>, TableError> {
     let mut table = Table::empty();
     fill(bytes, &mut table, Labels::Keep)?;
     Ok(table)
@@ -141,7 +144,7 @@ pub fn decode<T: Scalar, const D: usize>(bytes: &[u8]) -> Result<Table<T, D>, Ta
 ///
 /// # Errors
 /// As [`decode`].
-pub fn decode_into<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>) -> Result<(), TableError> {
+pub fn decode_into<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: &[u8], table: &mut Table<T, D, N, P>) -> Result<(), TableError> {
     fill_again(bytes, table, Labels::Skip)
 }
 
@@ -149,16 +152,16 @@ pub fn decode_into<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T,
 ///
 /// # Errors
 /// As [`decode`].
-pub fn decode_labelled_into<T: Scalar, const D: usize>(
+pub fn decode_labelled_into<T: Scalar, const D: usize, const N: usize, const P: usize>(
     bytes: &[u8],
-    table: &mut Table<T, D>,
+    table: &mut Table<T, D, N, P>,
 ) -> Result<(), TableError> {
     fill_again(bytes, table, Labels::Keep)
 }
 
-fn fill_again<T: Scalar, const D: usize>(
+fn fill_again<T: Scalar, const D: usize, const N: usize, const P: usize>(
     bytes: &[u8],
-    table: &mut Table<T, D>,
+    table: &mut Table<T, D, N, P>,
     labels: Labels,
 ) -> Result<(), TableError> {
     table.knots.clear();
@@ -172,7 +175,7 @@ enum Labels {
     Skip,
 }
 
-fn fill<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>, labels: Labels) -> Result<(), TableError> {
+fn fill<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: &[u8], table: &mut Table<T, D, N, P>, labels: Labels) -> Result<(), TableError> {
     let (header, payload) = split(bytes)?;
     if header.scalar != T::KIND {
         return Err(TableError::ScalarKind { found: header.scalar, expected: T::KIND });
@@ -180,19 +183,21 @@ fn fill<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>, labels
     if usize::from(header.dimension) != D {
         return Err(TableError::Dimension { found: header.dimension.into(), expected: D });
     }
-    if usize::from(header.paddle_dof) != D {
-        return Err(TableError::PaddleDof { found: header.paddle_dof.into(), expected: D });
+    if usize::from(header.paddle_dof) != D * P {
+        return Err(TableError::PaddleDof { found: header.paddle_dof.into(), expected: D * P });
     }
     // The fields of `Table` in their order, which postcard writes one after the other; the knots are the last.
     let mut payload = Payload(payload);
     table.units = Units { length: payload.label(labels)?, stress: payload.label(labels)? };
     table.tissue = payload.label(labels)?;
-    table.paddle = Paddle {
-        index: payload.take()?,
-        segment: [payload.numbers()?, payload.numbers()?],
-        max_displacement: payload.take()?,
-        max_rate: payload.take()?,
-    };
+    for paddle in &mut table.paddles {
+        *paddle = Paddle {
+            index: payload.take()?,
+            extent: [payload.numbers()?, payload.numbers()?],
+            max_displacement: payload.take()?,
+            max_rate: payload.take()?,
+        };
+    }
     table.needle_axis = payload.numbers()?;
     table.orthogonal = payload.numbers()?;
     table.target_position = payload.numbers()?;
@@ -207,7 +212,7 @@ fn fill<T: Scalar, const D: usize>(bytes: &[u8], table: &mut Table<T, D>, labels
     for _ in 0..knots {
         let knot = Knot {
             depth: payload.take()?,
-            jacobian: payload.numbers()?,
+            jacobian: payload.jacobians()?,
             paddle_path: payload.numbers()?,
             paddle_path_slope: payload.numbers()?,
             target_displacement: payload.numbers()?,
@@ -242,6 +247,15 @@ impl<'a> Payload<'a> {
             *number = self.take()?;
         }
         Ok(numbers)
+    }
+
+    /// One Jacobian for each paddle.
+    fn jacobians<T: Scalar, const D: usize, const P: usize>(&mut self) -> Result<[SMatrix<T, D, D>; P], TableError> {
+        let mut jacobians = [SMatrix::zeros(); P];
+        for jacobian in &mut jacobians {
+            *jacobian = self.numbers()?;
+        }
+        Ok(jacobians)
     }
 
     fn label<const N: usize>(&mut self, labels: Labels) -> Result<String<N>, TableError> {

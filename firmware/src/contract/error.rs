@@ -87,7 +87,7 @@ pub enum TableError {
         /// Field that holds it.
         field: Field,
     },
-    /// The unit vector n is not orthogonal to the needle axis.
+    /// A direction orthogonal to the needle is not orthogonal to its axis, or to another one of them.
     NotOrthogonal,
     /// Fewer than two knots.
     TooFewKnots {
@@ -172,7 +172,7 @@ impl fmt::Display for TableError {
             Self::FormatVersion { found } => write!(
                 f,
                 "table format version {found}, this build reads version {}: write the table again with the \
-                 `model-offline` of this build",
+                 `model-offline` of this build, as `model-offline table SCENE -o FILE`",
                 super::format::FORMAT_VERSION
             ),
             Self::Reserved => write!(f, "reserved header bytes are not zero; {REWRITE}"),
@@ -189,10 +189,18 @@ impl fmt::Display for TableError {
                 write!(f, "the table holds {found}, this controller computes in {expected}: write it as {expected}")
             }
             Self::Dimension { found, expected } => {
-                write!(f, "the table is {found}-dimensional, this controller {expected}-dimensional")
+                write!(
+                    f,
+                    "the table is {found}-dimensional, this controller {expected}-dimensional: give it a table of a \
+                     scene with dimension {expected}"
+                )
             }
             Self::PaddleDof { found, expected } => {
-                write!(f, "the table has {found} paddle degrees of freedom, this controller {expected}")
+                write!(
+                    f,
+                    "the table has {found} degrees of freedom of paddles, this controller {expected}: write the table \
+                     for as many paddles as the controller moves"
+                )
             }
             Self::Payload => write!(f, "the payload is no table although its checksum is right; {REWRITE}"),
             Self::PayloadTrailing { extra } => {
@@ -201,7 +209,9 @@ impl fmt::Display for TableError {
             Self::NotFinite { field } => write!(f, "{field} is not a finite number: check the scene, solve again"),
             Self::NotPositive { field } => write!(f, "{field} must be positive: correct the scene"),
             Self::NotUnit { field } => write!(f, "{field} is not a unit vector: normalise it before writing"),
-            Self::NotOrthogonal => write!(f, "n is not orthogonal to the needle axis: project it before writing"),
+            Self::NotOrthogonal => {
+                write!(f, "orthogonal directions and needle axis are not orthogonal to each other: project before writing")
+            }
             Self::TooFewKnots { found } => {
                 write!(f, "{found} knots in depth, at least 2 are needed")
             }
@@ -212,10 +222,10 @@ impl fmt::Display for TableError {
             }
             Self::IllConditioned { knot } => write!(
                 f,
-                "the Jacobian of knot {knot} is (nearly) singular: this paddle cannot control the target, choose another"
+                "the Jacobian of knot {knot} is (nearly) singular: its paddles cannot control the target, choose others"
             ),
             Self::PathBeyondLimit { knot } => {
-                write!(f, "the feed-forward path leaves the paddle's range at knot {knot}: raise the paddle's limit")
+                write!(f, "the feed-forward path leaves a paddle's range at knot {knot}: raise the paddle's limit")
             }
             Self::Gains => write!(f, "the suggested gain must lie in (0, 1) and lambda_max be at least 1"),
             Self::Implausible { field } => {

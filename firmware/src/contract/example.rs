@@ -10,7 +10,7 @@ pub(crate) fn jacobian() -> Matrix2<f64> {
 }
 
 /// Needle down, depth 0 to 0.1, the target pushed sideways by 0.02 per unit of depth without the paddle.
-pub(crate) fn table() -> Table<f64, 2> {
+pub(crate) fn table() -> Table<f64> {
     let n = Vector2::new(1.0, 0.0);
     let inverse = jacobian().try_inverse().unwrap();
     let knots = (0..=10)
@@ -20,7 +20,7 @@ pub(crate) fn table() -> Table<f64, 2> {
             let axial = Vector2::new(0.0, -0.1 * depth);
             Knot {
                 depth,
-                jacobian: jacobian(),
+                jacobian: [jacobian()],
                 paddle_path: slope * depth,
                 paddle_path_slope: slope,
                 target_displacement: axial,
@@ -33,12 +33,12 @@ pub(crate) fn table() -> Table<f64, 2> {
         scene_hash: [7; 32],
         units: Units { length: "1".try_into().unwrap(), stress: "1".try_into().unwrap() },
         tissue: "homogeneous".try_into().unwrap(),
-        paddle: Paddle {
+        paddles: [Paddle {
             index: 3,
-            segment: [Vector2::new(0.2, 0.3), Vector2::new(0.1, 0.4)],
+            extent: [Vector2::new(0.2, 0.3), Vector2::new(0.1, 0.4)],
             max_displacement: 0.05,
             max_rate: 0.1,
-        },
+        }],
         needle_axis: Vector2::new(0.0, -1.0),
         orthogonal: n,
         target_position: Vector2::new(0.5, 0.5),

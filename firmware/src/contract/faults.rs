@@ -133,6 +133,9 @@ fault_codes! {
     FROZEN = 34;
     /// Periods before this tick were skipped. Goes on until too many in a row.
     TICKS_SKIPPED = 35;
+    /// What another code of this tick says of a paddle, it says of the second one, at least. Goes on by itself; what it
+    /// says with a code that holds or latches, that code does. A paddle's code without it is the first one's.
+    SECOND_PADDLE = 36;
 }
 
 impl Faults {

@@ -8,8 +8,8 @@ use core::fmt;
 pub enum Field {
     /// Target position.
     TargetPosition,
-    /// Paddle segment.
-    PaddleSegment,
+    /// Paddle extent.
+    PaddleExtent,
     /// Needle axis.
     NeedleAxis,
     /// Orthogonal direction.
@@ -57,7 +57,7 @@ impl Field {
     pub const fn name(self) -> &'static str {
         match self {
             Self::TargetPosition => "target position",
-            Self::PaddleSegment => "paddle segment",
+            Self::PaddleExtent => "paddle extent",
             Self::NeedleAxis => "needle axis",
             Self::OrthogonalDirection => "orthogonal direction",
             Self::PaddleDisplacementLimit => "paddle displacement limit",
@@ -100,7 +100,7 @@ mod tests {
         use Field as F;
         let all = [
             F::TargetPosition,
-            F::PaddleSegment,
+            F::PaddleExtent,
             F::NeedleAxis,
             F::OrthogonalDirection,
             F::PaddleDisplacementLimit,

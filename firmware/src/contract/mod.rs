@@ -5,6 +5,7 @@
 
 mod bounds;
 pub mod codec;
+mod each;
 pub mod error;
 #[cfg(test)]
 pub(crate) mod example;
@@ -22,5 +23,6 @@ pub use faults::{Faults, Mode};
 pub use field::Field;
 pub use format::MAX_TABLE_BYTES;
 pub use frames::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
-pub use table::{Gains, Knot, MAX_KNOTS, Paddle, Table, Units, Validity};
+pub use table::{Gains, Knot, MAX_KNOTS, Paddle, PlanarTable, SpatialTable, Table, Units, Validity};
 pub use validate::{CONDITION_LIMIT, condition_number};
+pub(crate) use validate::relative_weights;

@@ -34,7 +34,35 @@ pub fn condition_number<T: Scalar, const D: usize>(jacobian: &SMatrix<T, D, D>) 
     }
 }
 
-impl<T: Scalar, const D: usize> Table<T, D> {
+/// Condition number of [J₁ … J_P] with each paddle in units of its limit, in the Frobenius norm: with
+/// M = Σ wₚ·Jₚ·Jₚᵀ it is √(tr M · tr M⁻¹). For one paddle, [`condition_number`].
+///
+/// That of the orthogonal rows alone is never larger: singular values interlace.
+fn joint_condition_number<T: Scalar, const D: usize, const P: usize>(
+    jacobians: &[SMatrix<T, D, D>; P],
+    weights: &[T; P],
+) -> f64 {
+    if let [jacobian] = jacobians.as_slice() {
+        return condition_number(jacobian);
+    }
+    let weighted = jacobians.iter().zip(weights).map(|(jacobian, weight)| jacobian * jacobian.transpose() * *weight);
+    let joint = weighted.fold(SMatrix::<T, D, D>::zeros(), |sum, term| sum + term);
+    match joint.try_inverse() {
+        Some(inverse) => libm::sqrt(joint.trace().to_f64() * inverse.trace().to_f64()),
+        None => f64::INFINITY,
+    }
+}
+
+/// What a motion of each paddle may cost: the squares of their limits, over that of the largest.
+pub(crate) fn relative_weights<T: Scalar, const P: usize>(max_displacements: &[T; P]) -> [T; P] {
+    let largest = max_displacements.iter().fold(T::zero(), |largest, limit| if *limit > largest { *limit } else { largest });
+    max_displacements.map(|limit| {
+        let ratio = limit / largest;
+        ratio * ratio
+    })
+}
+
+impl<T: Scalar, const D: usize, const N: usize, const P: usize> Table<T, D, N, P> {
     /// Checks every invariant that the controller relies on.
     ///
     /// # Errors
@@ -48,21 +76,33 @@ impl<T: Scalar, const D: usize> Table<T, D> {
 
     fn validate_geometry(&self) -> Result<(), TableError> {
         finite(Field::TargetPosition, self.target_position.as_slice())?;
-        let [start, end] = &self.paddle.segment;
-        finite(Field::PaddleSegment, start.as_slice())?;
-        finite(Field::PaddleSegment, end.as_slice())?;
+        for paddle in &self.paddles {
+            let [start, end] = &paddle.extent;
+            finite(Field::PaddleExtent, start.as_slice())?;
+            finite(Field::PaddleExtent, end.as_slice())?;
+        }
         unit(Field::NeedleAxis, &self.needle_axis)?;
-        unit(Field::OrthogonalDirection, &self.orthogonal)?;
-        let cosine = self.needle_axis.dot(&self.orthogonal).to_f64();
-        ensure(cosine.abs() <= T::UNIT_TOLERANCE, TableError::NotOrthogonal)
+        let mut others = self.orthogonal.column_iter();
+        while let Some(direction) = others.next() {
+            let direction = direction.into_owned();
+            unit(Field::OrthogonalDirection, &direction)?;
+            let is_orthogonal = |other: &SVector<T, D>| other.dot(&direction).to_f64().abs() <= T::UNIT_TOLERANCE;
+            let among_each_other = others.clone().all(|other| is_orthogonal(&other.into_owned()));
+            ensure(is_orthogonal(&self.needle_axis) && among_each_other, TableError::NotOrthogonal)?;
+        }
+        Ok(())
     }
 
     fn validate_limits(&self) -> Result<(), TableError> {
-        positive(Field::PaddleDisplacementLimit, self.paddle.max_displacement)?;
-        positive(Field::PaddleRateLimit, self.paddle.max_rate)?;
+        for paddle in &self.paddles {
+            positive(Field::PaddleDisplacementLimit, paddle.max_displacement)?;
+            positive(Field::PaddleRateLimit, paddle.max_rate)?;
+        }
         positive(Field::ValidPaddleDisplacement, self.validity.paddle_displacement)?;
         positive(Field::NeedleSpeedLimit, self.validity.needle_speed)?;
-        ensure(self.paddle.max_displacement <= self.validity.paddle_displacement, TableError::DisplacementRange)?;
+        for paddle in &self.paddles {
+            ensure(paddle.max_displacement <= self.validity.paddle_displacement, TableError::DisplacementRange)?;
+        }
         finite(Field::Gains, &[self.gains.loop_gain, self.gains.lambda_max])?;
         let gain = self.gains.loop_gain.to_f64();
         ensure(gain > 0.0 && gain < 1.0 && self.gains.lambda_max.to_f64() >= 1.0, TableError::Gains)
@@ -86,44 +126,54 @@ impl<T: Scalar, const D: usize> Table<T, D> {
             first.depth == self.validity.depth_start && last.depth == self.validity.depth_end,
             TableError::DepthRange,
         )?;
+        let weights = relative_weights(&self.paddles.each_ref().map(|paddle| paddle.max_displacement));
         for (index, knot) in self.knots.iter().enumerate() {
-            ensure(condition_number(&knot.jacobian) <= CONDITION_LIMIT, TableError::IllConditioned { knot: index })?;
-            ensure(
-                knot.paddle_path.norm() <= self.paddle.max_displacement,
-                TableError::PathBeyondLimit { knot: index },
-            )?;
+            let condition = joint_condition_number(&knot.jacobian, &weights);
+            ensure(condition <= CONDITION_LIMIT, TableError::IllConditioned { knot: index })?;
+            for (path, paddle) in knot.paddle_path.column_iter().zip(&self.paddles) {
+                ensure(path.norm() <= paddle.max_displacement, TableError::PathBeyondLimit { knot: index })?;
+            }
         }
         Ok(())
     }
 }
 
-impl<T: Scalar, const D: usize> Table<T, D> {
+impl<T: Scalar, const D: usize, const N: usize, const P: usize> Table<T, D, N, P> {
     /// Every number against the table's own geometry: what is finite but out of all proportion would switch off the
     /// monitors that follow from it.
     fn validate_proportions(&self) -> Result<(), TableError> {
         let depth = (self.validity.depth_end - self.validity.depth_start).to_f64();
         let reach = |end: &SVector<T, D>| (end - self.target_position).norm().to_f64();
-        let [start, end] = &self.paddle.segment;
-        let distance = reach(start).max(reach(end));
+        let ends = self.paddles.iter().flat_map(|paddle| &paddle.extent);
+        let distance = ends.map(reach).fold(0.0, f64::max);
         in_proportion(Field::DepthRange, depth, ASPECT_LIMIT * distance)?;
         in_proportion(Field::DistanceFromPaddleToTarget, distance, ASPECT_LIMIT * depth)?;
         let extent = LENGTH_MARGIN * (depth + distance);
         in_proportion(Field::ValidPaddleDisplacement, self.validity.paddle_displacement.to_f64(), extent)?;
-        let range = self.paddle.max_displacement.to_f64();
-        in_proportion(Field::PaddleRateLimit, self.paddle.max_rate.to_f64(), CROSSINGS_PER_SECOND * range)?;
+        for paddle in &self.paddles {
+            let fastest = CROSSINGS_PER_SECOND * paddle.max_displacement.to_f64();
+            in_proportion(Field::PaddleRateLimit, paddle.max_rate.to_f64(), fastest)?;
+        }
         in_proportion(Field::NeedleSpeedLimit, self.validity.needle_speed.to_f64(), CROSSINGS_PER_SECOND * depth)?;
         let bounds = TableBounds::of(self);
-        in_proportion(Field::KnotJacobian, bounds.jacobian_norm, JACOBIAN_LIMIT)?;
+        for norm in bounds.jacobian_norm {
+            in_proportion(Field::KnotJacobian, norm, JACOBIAN_LIMIT)?;
+        }
         in_proportion(Field::TargetDisplacement, bounds.target_displacement, extent)?;
         in_proportion(Field::TargetDisplacementSlope, bounds.target_slope, DRAG_LIMIT)?;
-        in_proportion(Field::PaddlePathSlope, HERMITE_LIFT * bounds.path_lift, range)
+        for (lift, paddle) in bounds.path_lift.iter().zip(&self.paddles) {
+            in_proportion(Field::PaddlePathSlope, HERMITE_LIFT * lift, paddle.max_displacement.to_f64())?;
+        }
+        Ok(())
     }
 }
 
-impl<T: Scalar, const D: usize> Knot<T, D> {
+impl<T: Scalar, const D: usize, const P: usize> Knot<T, D, P> {
     fn validate_finite(&self) -> Result<(), TableError> {
         finite(Field::KnotDepth, &[self.depth])?;
-        finite(Field::KnotJacobian, self.jacobian.as_slice())?;
+        for jacobian in &self.jacobian {
+            finite(Field::KnotJacobian, jacobian.as_slice())?;
+        }
         finite(Field::KnotPaddlePath, self.paddle_path.as_slice())?;
         finite(Field::KnotPaddlePathSlope, self.paddle_path_slope.as_slice())?;
         finite(Field::KnotTargetDisplacement, self.target_displacement.as_slice())?;

@@ -33,9 +33,9 @@ impl Clock {
     ///
     /// Time must go on, and by as much as the numbers do: otherwise a single tick from the far future would make every
     /// right one after it a tick from the past.
-    pub(super) fn start<T: Scalar>(
+    pub(super) fn start<T: Scalar, const P: usize>(
         &mut self,
-        runtime: &Runtime<T>,
+        runtime: &Runtime<T, P>,
         inputs: &Inputs,
         ledger: &mut TickLedger,
         faults: &mut Faults,

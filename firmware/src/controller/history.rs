@@ -1,8 +1,7 @@
-//! Where needle and paddle were when the target was measured.
+//! Where needle and paddles were when the target was measured.
 
-use nalgebra::SVector;
+use nalgebra::SMatrix;
 
-use super::D;
 use crate::scalar::Scalar;
 
 /// Moments that are remembered.
@@ -13,35 +12,35 @@ const _: () = assert!(MOMENTS.is_power_of_two());
 /// Intervals between them: the newest moment lies anywhere within one, and one more may be cut off by a late tick.
 pub(crate) const INTERVALS: u64 = MOMENTS as u64 - 2;
 
-/// Needle and paddle at one time.
+/// Needle and paddles at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Moment<T: Scalar> {
-    /// When the paddle is there, ns.
+pub(super) struct Moment<T: Scalar, const D: usize = 2, const P: usize = 1> {
+    /// When the paddles are there, ns.
     pub(super) time_ns: u64,
     /// Depth of the needle, length.
     pub(super) depth: T,
-    /// Displacement of the paddle, length.
-    pub(super) paddle: SVector<T, D>,
+    /// Displacements of the paddles, length; a column each.
+    pub(super) paddles: SMatrix<T, D, P>,
 }
 
 /// The last moments, no closer than a spacing but for the newest: a ring.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct History<T: Scalar> {
-    moments: [Moment<T>; MOMENTS],
+pub(super) struct History<T: Scalar, const D: usize = 2, const P: usize = 1> {
+    moments: [Moment<T, D, P>; MOMENTS],
     newest: usize,
     count: usize,
 }
 
-impl<T: Scalar> Default for History<T> {
+impl<T: Scalar, const D: usize, const P: usize> Default for History<T, D, P> {
     fn default() -> Self {
-        let empty = Moment { time_ns: 0, depth: T::ZERO, paddle: SVector::zeros() };
+        let empty = Moment { time_ns: 0, depth: T::ZERO, paddles: SMatrix::zeros() };
         Self { moments: [empty; MOMENTS], newest: 0, count: 0 }
     }
 }
 
-impl<T: Scalar> History<T> {
+impl<T: Scalar, const D: usize, const P: usize> History<T, D, P> {
     /// Adds the newest moment.
-    pub(super) fn record(&mut self, spacing_ns: u64, moment: Moment<T>) {
+    pub(super) fn record(&mut self, spacing_ns: u64, moment: Moment<T, D, P>) {
         let is_spaced = match (self.ago(0), self.ago(1)) {
             (Some(newest), _) if moment.time_ns < newest.time_ns => {
                 // Another clock: what was before it is of no use.
@@ -60,9 +59,9 @@ impl<T: Scalar> History<T> {
         }
     }
 
-    /// Needle and paddle at a time, between the moments around it; before the oldest, the oldest. `None` if nothing is
+    /// Needle and paddles at a time, between the moments around it; before the oldest, the oldest. `None` if nothing is
     /// remembered.
-    pub(super) fn at(&self, time_ns: u64) -> Option<Moment<T>> {
+    pub(super) fn at(&self, time_ns: u64) -> Option<Moment<T, D, P>> {
         let mut later = self.ago(0)?;
         for ago in 0..self.count {
             let moment = self.ago(ago)?;
@@ -74,12 +73,16 @@ impl<T: Scalar> History<T> {
         Some(*later)
     }
 
-    fn ago(&self, ago: usize) -> Option<&Moment<T>> {
+    fn ago(&self, ago: usize) -> Option<&Moment<T, D, P>> {
         if ago < self.count { self.moments.get(self.newest.wrapping_sub(ago) % MOMENTS) } else { None }
     }
 }
 
-fn between<T: Scalar>(earlier: &Moment<T>, later: &Moment<T>, time_ns: u64) -> Moment<T> {
+fn between<T: Scalar, const D: usize, const P: usize>(
+    earlier: &Moment<T, D, P>,
+    later: &Moment<T, D, P>,
+    time_ns: u64,
+) -> Moment<T, D, P> {
     if time_ns >= later.time_ns {
         return *later;
     }
@@ -89,7 +92,7 @@ fn between<T: Scalar>(earlier: &Moment<T>, later: &Moment<T>, time_ns: u64) -> M
     Moment {
         time_ns,
         depth: earlier.depth + (later.depth - earlier.depth) * fraction,
-        paddle: earlier.paddle.zip_map(&later.paddle, |before, after| before + (after - before) * fraction),
+        paddles: earlier.paddles.zip_map(&later.paddles, |before, after| before + (after - before) * fraction),
     }
 }
 
@@ -103,7 +106,7 @@ mod tests {
 
     fn moment(ms: u64) -> Moment<f64> {
         let x = ms as f64;
-        Moment { time_ns: ms * MS, depth: 2.0 * x, paddle: Vector2::new(x, -x) }
+        Moment { time_ns: ms * MS, depth: 2.0 * x, paddles: Vector2::new(x, -x) }
     }
 
     #[test]
@@ -118,7 +121,7 @@ mod tests {
                 let asked = (ms as f64 - ago).max(oldest);
                 let found = history.at((asked * MS as f64) as u64).unwrap();
                 assert!((found.depth - 2.0 * asked).abs() < 1e-9, "{ms} − {ago}: {found:?}");
-                assert!((found.paddle - Vector2::new(asked, -asked)).norm() < 1e-9);
+                assert!((found.paddles - Vector2::new(asked, -asked)).norm() < 1e-9);
             }
         }
         assert_eq!(history.at(1_000 * MS), Some(moment(500)), "nothing is extrapolated");

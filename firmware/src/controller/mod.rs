@@ -1,6 +1,6 @@
 //! The control law, one tick at a time.
 
-use crate::contract::frames::COMMAND_VALID;
+use crate::contract::frames::{COMMAND_VALID, MAX_PADDLES};
 use crate::contract::{Faults, Mode, PaddleCommand, Table};
 use crate::inputs::Inputs;
 use crate::scalar::Scalar;
@@ -8,6 +8,7 @@ use crate::settings::{Runtime, Settings, SettingsError};
 
 mod clock;
 mod feedback;
+mod handover;
 mod history;
 mod motion;
 #[cfg(test)]
@@ -21,10 +22,7 @@ use motion::Tick;
 pub use state::State;
 use state::to_frame;
 
-/// Planar tissue: displacements have two components.
-const D: usize = 2;
-
-/// Controller of one paddle: a table and settings, nothing that changes. See the crate documentation for the law.
+/// Controller of the table's paddles: a table and settings, nothing that changes. See the crate documentation for the law.
 ///
 /// # Example
 /// ```
@@ -32,7 +30,7 @@ const D: usize = 2;
 /// use firmware::{Controller, Faults, Inputs, Mode, NeedleSample, PaddleSample, Settings, State, TargetSample, decode};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// let table = decode::<f64, 2>(&std::fs::read("tests/planar.table")?)?;
+/// let table = decode::<f64, 2, 1, 1>(&std::fs::read("tests/planar.table")?)?;
 /// let controller = Controller::new(&table, &Settings::new(1_000_000, 20_000_000, 20_000_000))?;
 /// let mut state = State::new();
 ///
@@ -40,11 +38,11 @@ const D: usize = 2;
 /// for tick in 0..100 {
 ///     let (sequence, time_ns) = (tick as u32, tick * 1_000_000);
 ///     let needle = NeedleSample { sequence, time_ns, ..Default::default() };
-///     let target = TargetSample { sequence, time_ns, flags: TARGET_VISIBLE, displacement: [0.0; 2] };
-///     let paddle = PaddleSample { sequence, time_ns, paddle_index: 3, displacement: [0.01, 0.0] };
-///     let inputs = Inputs { tick, time_ns, needle: Some(needle), target: Some(target), paddle: Some(paddle) };
+///     let target = TargetSample { sequence, time_ns, flags: TARGET_VISIBLE, displacement: [0.0; 3] };
+///     let paddle = PaddleSample { sequence, time_ns, paddle_index: 3, displacement: [0.01, 0.0, 0.0] };
+///     let inputs = Inputs { tick, time_ns, needle: Some(needle), target: Some(target), paddles: [Some(paddle), None] };
 ///     let command = controller.step(&mut state, &inputs);
-///     assert!(!command.is_valid() || (command.displacement[0] - 0.01).abs() < 1e-3);
+///     assert!(!command.is_valid() || (command.displacement[0][0] - 0.01).abs() < 1e-3);
 /// }
 /// assert_eq!(state.mode(), Mode::Run);
 ///
@@ -58,17 +56,17 @@ const D: usize = 2;
 /// # }
 /// ```
 #[derive(Clone, Copy, Debug)]
-pub struct Controller<'t, T: Scalar> {
-    table: &'t Table<T, D>,
-    runtime: Runtime<T>,
+pub struct Controller<'t, T: Scalar, const D: usize = 2, const N: usize = 1, const P: usize = 1> {
+    table: &'t Table<T, D, N, P>,
+    runtime: Runtime<T, P>,
 }
 
-impl<'t, T: Scalar> Controller<'t, T> {
+impl<'t, T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'t, T, D, N, P> {
     /// Builds the runtime form of `settings` for `table`, which [`crate::contract::decode`] has validated.
     ///
     /// # Errors
     /// What is wrong with the settings.
-    pub fn new(table: &'t Table<T, D>, settings: &Settings) -> Result<Self, SettingsError> {
+    pub fn new(table: &'t Table<T, D, N, P>, settings: &Settings) -> Result<Self, SettingsError> {
         Ok(Self { table, runtime: Runtime::new(table, settings)? })
     }
 
@@ -91,8 +89,8 @@ impl<'t, T: Scalar> Controller<'t, T> {
         self.runtime.delay_samples
     }
 
-    /// One tick: reads and checks the inputs, decides the mode, and gives the command for the paddle.
-    pub fn step(&self, state: &mut State<T>, inputs: &Inputs) -> PaddleCommand {
+    /// One tick: reads and checks the inputs, decides the mode, and gives the command for the paddles.
+    pub fn step(&self, state: &mut State<T, D, N, P>, inputs: &Inputs) -> PaddleCommand {
         let mut faults = Faults::NONE;
         let elapsed_ns = state.clock.start(&self.runtime, inputs, &mut state.ledger.ticks, &mut faults);
         let fresh_target = elapsed_ns.and_then(|_| self.read_inputs(state, inputs, &mut faults));
@@ -102,7 +100,7 @@ impl<'t, T: Scalar> Controller<'t, T> {
         let depth = self.depth_ahead(state, inputs.time_ns);
         if let (Mode::Run, Some(elapsed_ns), Some(depth)) = (mode, elapsed_ns, depth) {
             state.armed = true;
-            self.move_paddle(state, &Tick { time_ns: inputs.time_ns, elapsed_ns, fresh_target }, depth, &mut faults);
+            self.move_paddles(state, &Tick { time_ns: inputs.time_ns, elapsed_ns, fresh_target }, depth, &mut faults);
             // The law itself may have found a reason to stop; its last command is within the limits.
             mode = state.supervisor.decide(self.runtime.seen(faults));
         }
@@ -116,9 +114,14 @@ impl<'t, T: Scalar> Controller<'t, T> {
     }
 
     /// The command frame for the state after a tick.
-    fn command(&self, state: &mut State<T>, inputs: &Inputs) -> PaddleCommand {
+    fn command(&self, state: &mut State<T, D, N, P>, inputs: &Inputs) -> PaddleCommand {
         // A paddle that is not where it is told must not be pulled there once somebody lets it go.
         let follows = !state.faults.contains(Faults::FOLLOWING_ERROR);
+        let displacement = state.displacement();
+        let mut paddle_index = [0; MAX_PADDLES];
+        for (index, paddle) in paddle_index.iter_mut().zip(&self.runtime.paddles) {
+            *index = paddle.index;
+        }
         let sequence = state.command_sequence;
         state.command_sequence = sequence.wrapping_add(1);
         PaddleCommand {
@@ -127,11 +130,12 @@ impl<'t, T: Scalar> Controller<'t, T> {
             tick: inputs.tick,
             time_ns: inputs.time_ns,
             faults: state.faults.bits(),
-            displacement: state.displacement.as_ref().map(to_frame).unwrap_or_default(),
+            displacement: displacement.as_ref().map(to_frame).unwrap_or_default(),
             needle_sequence: state.needle.accepted.map(|sample| sample.sequence).unwrap_or_default(),
             target_sequence: state.target.accepted.map(|sample| sample.sequence).unwrap_or_default(),
-            paddle_index: self.table.paddle.index,
-            flags: if follows && state.displacement.is_some() { COMMAND_VALID } else { 0 },
+            paddle_index,
+            flags: if follows && displacement.is_some() { COMMAND_VALID } else { 0 },
+            reserved: 0,
         }
     }
 }

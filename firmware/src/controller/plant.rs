@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 
 use crate::contract::example::jacobian;
-use crate::contract::frames::TARGET_VISIBLE;
+use crate::contract::frames::{TARGET_VISIBLE, from_plane, to_plane};
 use crate::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use crate::inputs::Inputs;
 
@@ -63,7 +63,7 @@ impl Plant {
                 sequence: self.target_sequence,
                 flags: TARGET_VISIBLE,
                 time_ns,
-                displacement: self.target().into(),
+                displacement: from_plane(self.target().into()),
             });
             self.target_sequence = self.target_sequence.wrapping_add(1);
         }
@@ -79,12 +79,15 @@ impl Plant {
                 velocity: self.speed,
             }),
             target: if arrived { self.pending.pop_front() } else { None },
-            paddle: Some(PaddleSample {
+            paddles: [
+                Some(PaddleSample {
                 sequence: self.sequence,
                 paddle_index: self.paddle_index,
                 time_ns,
-                displacement: self.paddle.into(),
-            }),
+                displacement: from_plane(self.paddle.into()),
+                }),
+                None,
+            ],
         };
         self.tick += 1;
         self.sequence = self.sequence.wrapping_add(1);
@@ -94,7 +97,7 @@ impl Plant {
     /// Time goes on by one tick under `command`.
     pub(crate) fn act(&mut self, command: &PaddleCommand) {
         if command.is_valid() {
-            self.paddle = Vector2::from(command.displacement) * self.actuator_gain;
+            self.paddle = Vector2::from(to_plane(command.displacement[0])) * self.actuator_gain;
         }
         self.depth = (self.depth + self.speed * 1e-3).clamp(0.0, 0.1);
         if self.depth >= 0.1 {

@@ -6,12 +6,14 @@ use proptest::prelude::*;
 use super::plant::{MS, Plant};
 use super::*;
 use crate::contract::example::{jacobian, table};
+use crate::contract::frames::{from_plane, to_plane};
 use crate::contract::{Table, TargetSample};
 use crate::detection::{MAX_SUCCESSIVE_OVERRUNS, TICKS_TO_HOLD};
 use crate::inputs::Discard;
 use crate::loop_stability;
 
 mod attacks;
+mod bits;
 mod control;
 mod faults;
 
@@ -30,7 +32,7 @@ struct Loop<'t> {
 }
 
 impl<'t> Loop<'t> {
-    fn new(table: &'t Table<f64, 2>, settings: &Settings) -> Self {
+    fn new(table: &'t Table<f64>, settings: &Settings) -> Self {
         let controller = Controller::new(table, settings).unwrap();
         Self { controller, state: State::new(), plant: Plant::new(), last: None, worst: 0.0 }
     }
@@ -40,11 +42,11 @@ impl<'t> Loop<'t> {
         let mut inputs = self.plant.sense();
         fault(&mut inputs);
         let command = self.controller.step(&mut self.state, &inputs);
-        let displacement = Vector2::from(command.displacement);
+        let displacement = Vector2::from(to_plane(command.displacement[0]));
         assert!(displacement.norm() <= 0.05 * (1.0 + 1e-12));
         // A command that is not valid is none: the actuator keeps its position, wherever that is.
         if let Some(last) = self.last.filter(|last| last.is_valid() && command.is_valid()) {
-            assert!((displacement - Vector2::from(last.displacement)).norm() <= 1e-4 * (1.0 + 1e-9));
+            assert!((displacement - Vector2::from(to_plane(last.displacement[0]))).norm() <= 1e-4 * (1.0 + 1e-9));
         }
         assert_eq!(self.state.ledger().unaccounted(), 0);
         self.plant.act(&command);

@@ -6,13 +6,13 @@ use super::sample::{Measurement, are_within};
 use super::stream::fault_of;
 use crate::detection::{NEEDLE_JUMP_FLOOR, NEEDLE_JUMP_MARGIN};
 use crate::scalar::Scalar;
-use crate::settings::Runtime;
+use crate::settings::{PaddleRuntime, Runtime};
 use crate::units::seconds;
 
 /// The checks of one tick.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Checks<'r, T: Scalar> {
-    pub(crate) runtime: &'r Runtime<T>,
+pub(crate) struct Checks<'r, T: Scalar, const P: usize = 1> {
+    pub(crate) runtime: &'r Runtime<T, P>,
     /// Time of the tick, ns.
     pub(crate) now_ns: u64,
     /// Latest time of a measurement, ns. One period after the tick: the sensor may stamp a sample while this tick has
@@ -20,9 +20,9 @@ pub(crate) struct Checks<'r, T: Scalar> {
     latest_ns: u64,
 }
 
-impl<'r, T: Scalar> Checks<'r, T> {
+impl<'r, T: Scalar, const P: usize> Checks<'r, T, P> {
     /// The checks of a tick at `now_ns`.
-    pub(crate) fn new(runtime: &'r Runtime<T>, now_ns: u64) -> Self {
+    pub(crate) fn new(runtime: &'r Runtime<T, P>, now_ns: u64) -> Self {
         Self { runtime, now_ns, latest_ns: now_ns.saturating_add(runtime.loop_period_ns) }
     }
 
@@ -64,11 +64,11 @@ impl<'r, T: Scalar> Checks<'r, T> {
     }
 
     /// Checks a target sample; `gate` knows what motion can explain.
-    pub(crate) fn target(
+    pub(crate) fn target<const D: usize>(
         &self,
-        sample: &Measurement,
-        previous: Option<&Measurement>,
-        gate: &InnovationGate,
+        sample: &Measurement<D>,
+        previous: Option<&Measurement<D>>,
+        gate: &InnovationGate<D, P>,
     ) -> Result<(), Discard> {
         let runtime = self.runtime;
         self.numbers_and_time(sample, previous)?;
@@ -79,10 +79,15 @@ impl<'r, T: Scalar> Checks<'r, T> {
         gate.check(runtime, &previous.values, &sample.values)
     }
 
-    /// Checks a paddle sample.
-    pub(crate) fn paddle(&self, sample: &Measurement, previous: Option<&Measurement>) -> Result<(), Discard> {
+    /// Checks a sample of `paddle`.
+    pub(crate) fn paddle<const D: usize>(
+        &self,
+        paddle: &PaddleRuntime<T>,
+        sample: &Measurement<D>,
+        previous: Option<&Measurement<D>>,
+    ) -> Result<(), Discard> {
         self.numbers_and_time(sample, previous)?;
-        within(&sample.values, self.runtime.paddle_range)
+        within(&sample.values, paddle.range)
     }
 
     /// Zero or normal numbers, measured after the sample before and not in the future.
@@ -90,9 +95,12 @@ impl<'r, T: Scalar> Checks<'r, T> {
     /// Subnormals are no measurement: they come from garbage read as a float, and slow some processors down by a factor
     /// of a hundred.
     #[inline(never)]
-    fn numbers_and_time(&self, sample: &Measurement, previous: Option<&Measurement>) -> Result<(), Discard> {
-        let [first, second] = sample.values;
-        if !(is_number(first) && is_number(second)) {
+    fn numbers_and_time<const V: usize>(
+        &self,
+        sample: &Measurement<V>,
+        previous: Option<&Measurement<V>>,
+    ) -> Result<(), Discard> {
+        if !sample.values.iter().all(|value| is_number(*value)) {
             return Err(Discard::NotFinite);
         }
         if sample.time_ns > self.latest_ns || previous.is_some_and(|previous| sample.time_ns <= previous.time_ns) {
@@ -103,8 +111,8 @@ impl<'r, T: Scalar> Checks<'r, T> {
 }
 
 /// |displacement| ≤ range.
-fn within(displacement: &[f64; 2], range: f64) -> Result<(), Discard> {
-    if are_within(displacement, &[0.0; 2], range) { Ok(()) } else { Err(Discard::OutOfRange) }
+fn within<const D: usize>(displacement: &[f64; D], range: f64) -> Result<(), Discard> {
+    if are_within(displacement, &[0.0; D], range) { Ok(()) } else { Err(Discard::OutOfRange) }
 }
 
 /// Whether `value` is zero or normal. Asked of its bits: without hardware for doubles, comparisons take ten times as long.

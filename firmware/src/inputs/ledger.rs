@@ -7,6 +7,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::contract::Mode;
+use crate::contract::frames::MAX_PADDLES;
 
 /// Why a received sample was not used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,8 +158,8 @@ pub struct Ledger {
     pub needle: StreamLedger,
     /// Target samples.
     pub target: StreamLedger,
-    /// Paddle samples.
-    pub paddle: StreamLedger,
+    /// Samples of each paddle, in the order of the table; nothing in a place without one.
+    pub paddles: [StreamLedger; MAX_PADDLES],
     /// Ticks of the loop.
     pub ticks: TickLedger,
 }
@@ -166,7 +167,8 @@ pub struct Ledger {
 impl Ledger {
     /// Everything without an entry: 0 unless the controller is wrong.
     pub fn unaccounted(&self) -> u64 {
-        self.needle.unaccounted() + self.target.unaccounted() + self.paddle.unaccounted() + self.ticks.unaccounted()
+        let paddles: u64 = self.paddles.iter().map(StreamLedger::unaccounted).sum();
+        self.needle.unaccounted() + self.target.unaccounted() + paddles + self.ticks.unaccounted()
     }
 }
 
@@ -221,9 +223,10 @@ mod tests {
         assert_eq!((ticks.unaccounted(), TickLedger { hold: 4, ..ticks }.unaccounted()), (0, 2));
         let all = Ledger { target: StreamLedger { lost: 1, ..StreamLedger::default() }, ticks, ..Ledger::default() };
         assert_eq!(all.unaccounted(), 1);
-        let paddle = StreamLedger { strays: 4, ..StreamLedger::default() };
+        let second = StreamLedger { strays: 4, ..StreamLedger::default() };
+        let paddles = [StreamLedger::default(), second];
         let due = TickLedger { due: 12, ..ticks };
-        assert_eq!(Ledger { paddle, ticks: due, ..Ledger::default() }.unaccounted(), 6);
+        assert_eq!(Ledger { paddles, ticks: due, ..Ledger::default() }.unaccounted(), 6);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! What comes from outside, and whether to believe it: streams, checks and monitors of single streams, the supervisor
 //! that draws the conclusion, and the accounts.
 
+use crate::contract::frames::MAX_PADDLES;
 use crate::contract::{NeedleSample, PaddleSample, TargetSample};
 
 pub(crate) mod checks;
@@ -27,6 +28,6 @@ pub struct Inputs {
     pub needle: Option<NeedleSample>,
     /// Newest target sample.
     pub target: Option<TargetSample>,
-    /// Newest paddle sample.
-    pub paddle: Option<PaddleSample>,
+    /// Newest sample of each paddle, in the order of the table. What stands in a place without a paddle is not read.
+    pub paddles: [Option<PaddleSample>; MAX_PADDLES],
 }

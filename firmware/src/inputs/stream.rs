@@ -14,22 +14,22 @@ use crate::detection::{RESTART_SAMPLES, RESTART_SPACING, SEQUENCE_JUMP};
 
 /// One stream: sequence numbers and the last accepted sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct StreamGate {
+pub(crate) struct StreamGate<const V: usize = 2> {
     /// What has arrived, for the accounts.
     arrivals: SequenceTracker,
     /// Sequence number of the last accepted sample; unlike `accepted` it does not expire.
     head: Option<u32>,
-    pub(crate) accepted: Option<Measurement>,
+    pub(crate) accepted: Option<Measurement<V>>,
     /// Last number that contradicted its time, and how many before it led there.
     contradiction: Option<(u32, u32)>,
 }
 
-impl StreamGate {
+impl<const V: usize> StreamGate<V> {
     /// Enters a delivery whose content has been checked. Returns whether it is accepted.
     #[inline(never)]
     pub(crate) fn offer(
         &mut self,
-        sample: &Measurement,
+        sample: &Measurement<V>,
         content: Result<(), Discard>,
         ledger: &mut StreamLedger,
         faults: &mut Faults,
@@ -48,7 +48,7 @@ impl StreamGate {
         accepted && self.accept(sample, ledger)
     }
 
-    fn accept(&mut self, sample: &Measurement, ledger: &mut StreamLedger) -> bool {
+    fn accept(&mut self, sample: &Measurement<V>, ledger: &mut StreamLedger) -> bool {
         ledger.consumed += 1;
         self.head = Some(sample.sequence);
         self.accepted = Some(*sample);

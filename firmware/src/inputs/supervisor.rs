@@ -11,7 +11,10 @@ pub(crate) struct Supervisor {
 impl Supervisor {
     /// Mode for the faults of this tick; latching ones stay.
     pub(crate) fn decide(&mut self, faults: Faults) -> Mode {
-        self.latched |= faults.intersection(Faults::LATCHING);
+        if !faults.intersection(Faults::LATCHING).is_empty() {
+            // With which paddle it was, if it was one.
+            self.latched |= faults.intersection(Faults::LATCHING | Faults::SECOND_PADDLE);
+        }
         if !self.latched.is_empty() {
             Mode::Safe
         } else if !faults.intersection(Faults::HOLDING).is_empty() {

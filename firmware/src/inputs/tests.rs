@@ -25,7 +25,7 @@ struct AccountedStream {
 impl AccountedStream {
     fn offer(&mut self, sequence: u32, content: Result<(), Discard>) -> (bool, Faults) {
         let mut faults = Faults::NONE;
-        let sample = Measurement { sequence, ..Measurement::default() };
+        let sample = Measurement { sequence, time_ns: 0, values: [0.0; 2] };
         let accepted = self.stream.offer(&sample, content, &mut self.ledger, &mut faults);
         assert_eq!(self.ledger.unaccounted(), 0, "after {sequence}: {:?}", self.ledger);
         assert!(!accepted || self.stream.accepted.is_some_and(|last| last.sequence == sequence));
@@ -165,7 +165,7 @@ fn times_are_after_the_last_one_and_at_most_a_period_ahead() {
     let table = table();
     let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
     let checks = checks_of(&runtime);
-    let paddle = |time_ns, previous: Option<&Measurement>| checks.paddle(&at(time_ns, [0.0; 2]), previous);
+    let paddle = |time_ns, previous: Option<&Measurement>| checks.paddle(&runtime.paddles[0], &at(time_ns, [0.0; 2]), previous);
     assert_eq!(paddle(1001 * MS, None), Ok(()));
     assert_eq!(paddle(1001 * MS + 1, None), Err(Discard::Time));
     let previous = at(990 * MS, [0.0; 2]);
@@ -179,7 +179,7 @@ fn values_are_normal_and_within_the_geometry() {
     let table = table();
     let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
     let checks = checks_of(&runtime);
-    let paddle = |x, y| checks.paddle(&at(990 * MS, [x, y]), None);
+    let paddle = |x, y| checks.paddle(&runtime.paddles[0], &at(990 * MS, [x, y]), None);
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 5e-324, -1e-310] {
         assert_eq!((paddle(bad, 0.0), paddle(0.0, bad)), (Err(Discard::NotFinite), Err(Discard::NotFinite)));
     }

@@ -9,15 +9,18 @@ use super::message::{Account, ClockSource, Identity, PROTOCOL_VERSION, Refusal, 
 use crate::contract::codec::FORMAT_VERSION;
 use crate::contract::frames::LAYOUT_VERSION;
 use crate::contract::{Faults, Mode};
-use crate::contract::{PaddleCommand, Table, decode_into};
+use crate::contract::{PaddleCommand, PaddleSample, Table, decode_into};
 use crate::controller::{Controller, State};
 use crate::inputs::Inputs;
 use crate::scalar::Scalar;
 use crate::schedule::Releases;
 use crate::settings::Settings;
 
-/// Room for an encoded table: 256 knots in f64 with two paddle degrees of freedom take 31 KB.
+/// Room for an encoded table in the plane: 256 knots in f64 take 31 KB.
 pub const TABLE_BYTES: usize = 32 * 1024;
+
+/// Room for one in space: 256 knots in f64 with two paddles take 82 KB.
+pub const SPATIAL_TABLE_BYTES: usize = 84 * 1024;
 
 /// Bits of [`Board::counter`]: those of a SysTick.
 pub const COUNTER_BITS: u32 = 24;
@@ -49,11 +52,18 @@ pub trait Board {
     }
 }
 
-/// Everything large that a device needs, for a `static`.
+/// Everything large that a device needs, for a `static`: tables of one dimension and number of paddles, and the bytes of
+/// one.
 #[derive(Debug)]
-pub struct Memory<T: Scalar> {
-    table: Table<T, 2>,
-    encoded: [u8; TABLE_BYTES],
+pub struct Memory<
+    T: Scalar,
+    const D: usize = 2,
+    const N: usize = 1,
+    const P: usize = 1,
+    const BYTES: usize = TABLE_BYTES,
+> {
+    table: Table<T, D, N, P>,
+    encoded: [u8; BYTES],
     filled: usize,
     line: Line,
 }
@@ -64,11 +74,11 @@ struct Line {
     writer: FrameWriter,
 }
 
-impl<T: Scalar> Memory<T> {
+impl<T: Scalar, const D: usize, const N: usize, const P: usize, const BYTES: usize> Memory<T, D, N, P, BYTES> {
     /// Memory of a device that starts.
     pub const fn new() -> Self {
         let line = Line { reader: FrameReader::new(), writer: FrameWriter::new() };
-        Self { table: Table::empty(), encoded: [0; TABLE_BYTES], filled: 0, line }
+        Self { table: Table::empty(), encoded: [0; BYTES], filled: 0, line }
     }
 
     /// The frame of a SAFE command that moves nothing, for an exception to send before it resets the device: it has
@@ -81,14 +91,20 @@ impl<T: Scalar> Memory<T> {
     }
 }
 
-impl<T: Scalar> Default for Memory<T> {
+impl<T: Scalar, const D: usize, const N: usize, const P: usize, const BYTES: usize> Default
+    for Memory<T, D, N, P, BYTES>
+{
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// Serves the line for ever (in tests: until it is closed).
-pub fn serve<T: Scalar, B: Board>(board: &mut B, memory: &mut Memory<T>, reset: ResetCause) {
+pub fn serve<T: Scalar, const D: usize, const N: usize, const P: usize, const BYTES: usize, B: Board>(
+    board: &mut B,
+    memory: &mut Memory<T, D, N, P, BYTES>,
+    reset: ResetCause,
+) {
     let Memory { table, encoded, filled, line } = memory;
     line.writer.restart();
     let identity = Identity {
@@ -96,7 +112,9 @@ pub fn serve<T: Scalar, B: Board>(board: &mut B, memory: &mut Memory<T>, reset: 
         layout: LAYOUT_VERSION,
         table_format: FORMAT_VERSION,
         scalar: T::KIND as u8,
-        table_bytes: TABLE_BYTES as u32,
+        dimension: D as u8,
+        paddles: P as u8,
+        table_bytes: BYTES as u32,
         counter_hz: B::COUNTER_HZ,
         reset,
     };
@@ -138,7 +156,7 @@ pub fn serve<T: Scalar, B: Board>(board: &mut B, memory: &mut Memory<T>, reset: 
 
 /// Appends a piece of the table; returns the bytes that are there.
 #[inline(never)]
-fn take(encoded: &mut [u8; TABLE_BYTES], filled: &mut usize, offset: u32, bytes: &[u8]) -> Result<u32, Refusal> {
+fn take(encoded: &mut [u8], filled: &mut usize, offset: u32, bytes: &[u8]) -> Result<u32, Refusal> {
     if offset == 0 {
         *filled = 0;
     }
@@ -155,18 +173,29 @@ fn take(encoded: &mut [u8; TABLE_BYTES], filled: &mut usize, offset: u32, bytes:
 }
 
 #[inline(never)]
-fn check_table<T: Scalar>(encoded: &[u8], table: &mut Table<T, 2>) -> Result<(), Refusal> {
+fn check_table<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    encoded: &[u8],
+    table: &mut Table<T, D, N, P>,
+) -> Result<(), Refusal> {
     decode_into(encoded, table).map_err(|error| Refusal::Table { code: error.code() })
 }
 
 #[inline(never)]
-fn build<'t, T: Scalar>(table: &'t Table<T, 2>, settings: &Settings) -> Result<Controller<'t, T>, Refusal> {
+fn build<'t, T: Scalar, const D: usize, const N: usize, const P: usize>(
+    table: &'t Table<T, D, N, P>,
+    settings: &Settings,
+) -> Result<Controller<'t, T, D, N, P>, Refusal> {
     Controller::new(table, settings).map_err(|_| Refusal::Settings)
 }
 
 /// Builds the controller and runs it until the host says Hello.
 #[inline(never)]
-fn run<T: Scalar, B: Board>(board: &mut B, line: &mut Line, table: &Table<T, 2>, start: &Start) -> Result<(), Refusal> {
+fn run<T: Scalar, const D: usize, const N: usize, const P: usize, B: Board>(
+    board: &mut B,
+    line: &mut Line,
+    table: &Table<T, D, N, P>,
+    start: &Start,
+) -> Result<(), Refusal> {
     let controller = build(table, &start.settings)?;
     let period_ns = start.settings.loop_period_ns;
     let mut state = State::new();
@@ -175,6 +204,7 @@ fn run<T: Scalar, B: Board>(board: &mut B, line: &mut Line, table: &Table<T, 2>,
         controller: &controller,
         state: &mut state,
         inbox: Inputs::default(),
+        paddles: table.paddles.each_ref().map(|paddle| paddle.index),
         clock: start.clock,
         session: start.session,
         now: Now::new(board.counter()),
@@ -193,11 +223,13 @@ struct Start {
 }
 
 /// A controller at work.
-struct Run<'r, T: Scalar> {
-    controller: &'r Controller<'r, T>,
-    state: &'r mut State<T>,
+struct Run<'r, T: Scalar, const D: usize, const N: usize, const P: usize> {
+    controller: &'r Controller<'r, T, D, N, P>,
+    state: &'r mut State<T, D, N, P>,
     /// Newest sample of each stream since the last step.
     inbox: Inputs,
+    /// Identities of the table's paddles.
+    paddles: [u32; P],
     clock: ClockSource,
     /// Number of the run since the reset.
     session: u32,
@@ -207,7 +239,7 @@ struct Run<'r, T: Scalar> {
     releases: Releases,
 }
 
-impl<T: Scalar> Run<'_, T> {
+impl<T: Scalar, const D: usize, const N: usize, const P: usize> Run<'_, T, D, N, P> {
     #[inline(never)]
     fn serve<B: Board>(&mut self, board: &mut B, line: &mut Line) {
         while !board.is_closed() {
@@ -235,7 +267,7 @@ impl<T: Scalar> Run<'_, T> {
                 _ if frame == Frame::Start => {}
                 Some(Request::Needle(sample)) => keep_newest(&mut self.inbox.needle, sample, |s| s.sequence),
                 Some(Request::Target(sample)) => keep_newest(&mut self.inbox.target, sample, |s| s.sequence),
-                Some(Request::Paddle(sample)) => keep_newest(&mut self.inbox.paddle, sample, |s| s.sequence),
+                Some(Request::Paddle(sample)) => self.keep_paddle(sample),
                 // Anything but a sample means something only in its place.
                 _ if frame == Frame::Late => {}
                 Some(Request::Time { tick, time_ns }) => match self.clock {
@@ -254,6 +286,14 @@ impl<T: Scalar> Run<'_, T> {
                 ) => line.send_refusal(board, Refusal::Order),
                 None => line.reader.count_unknown(),
             }
+        }
+    }
+
+    /// A sample goes to the place of its paddle. One of another paddle goes to the first: the controller refuses it there.
+    fn keep_paddle(&mut self, sample: PaddleSample) {
+        let place = self.paddles.iter().position(|index| *index == sample.paddle_index).unwrap_or_default();
+        if let Some(kept) = self.inbox.paddles.get_mut(place) {
+            keep_newest(kept, sample, |s| s.sequence);
         }
     }
 
@@ -289,10 +329,10 @@ impl<T: Scalar> Run<'_, T> {
 /// `Controller::step` and the counts that it took. Not inlined, and with its arguments and result opaque, so that
 /// nothing of the step is moved out of the count and nothing else into it.
 #[inline(never)]
-fn timed_step<T: Scalar, B: Board>(
+fn timed_step<T: Scalar, const D: usize, const N: usize, const P: usize, B: Board>(
     board: &mut B,
-    controller: &Controller<'_, T>,
-    state: &mut State<T>,
+    controller: &Controller<'_, T, D, N, P>,
+    state: &mut State<T, D, N, P>,
     inputs: &Inputs,
 ) -> (PaddleCommand, u32) {
     use core::hint::black_box;

@@ -15,7 +15,7 @@ use crate::inputs::{Arrival, SequenceTracker};
 use crate::inputs::{Discard, StreamLedger};
 
 /// Largest content of a frame, bytes: an account with every counter full fits.
-pub const MAX_CONTENT_BYTES: usize = 704;
+pub const MAX_CONTENT_BYTES: usize = 848;
 /// Largest frame on the line: COBS adds one byte and one more per 254, the delimiters two.
 pub const MAX_FRAME_BYTES: usize = MAX_CONTENT_BYTES + MAX_CONTENT_BYTES / 254 + 4;
 
@@ -332,14 +332,14 @@ mod tests {
     fn a_message_too_large_for_a_frame_is_not_sent() {
         let mut writer = FrameWriter::new();
         let large = [1u8; 32];
-        assert!(writer.encode(&[large; 22]).is_none());
-        assert!(writer.encode(&[large; 21]).is_some());
+        assert!(writer.encode(&[large; 27]).is_none());
+        assert!(writer.encode(&[large; 26]).is_some());
     }
 
     #[test]
     fn frames_are_no_larger_than_promised() {
         let mut writer = FrameWriter::new();
-        let content = [[1u8; 29]; 24];
+        let content = [[1u8; 28]; 30];
         assert!(writer.encode(&content).is_some_and(|frame| frame.len() <= MAX_FRAME_BYTES));
     }
 }

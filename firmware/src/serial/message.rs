@@ -10,7 +10,7 @@ use crate::inputs::Ledger;
 use crate::settings::Settings;
 
 /// Version of the messages; the host refuses a device of another one.
-pub const PROTOCOL_VERSION: u32 = 3;
+pub const PROTOCOL_VERSION: u32 = 4;
 
 /// Bytes of a table in one message: whole frames stay small against the line's buffers.
 pub const TABLE_CHUNK_BYTES: usize = 256;
@@ -44,7 +44,7 @@ pub enum Request<'a> {
     Needle(NeedleSample),
     /// Target sample.
     Target(TargetSample),
-    /// Paddle sample.
+    /// Sample of a paddle; which one, its index says.
     Paddle(PaddleSample),
     /// The host's clock. With [`ClockSource::Frames`] the samples before it are one tick's: step now.
     Time {
@@ -109,6 +109,10 @@ pub struct Identity {
     pub table_format: u16,
     /// [`crate::scalar::ScalarKind`] as a byte.
     pub scalar: u8,
+    /// Dimension of space that it controls in.
+    pub dimension: u8,
+    /// Paddles that it moves.
+    pub paddles: u8,
     /// Largest table that it can take, bytes.
     pub table_bytes: u32,
     /// Rate of [`Board::counter`](super::device::Board::counter), Hz.

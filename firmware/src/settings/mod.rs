@@ -12,7 +12,7 @@ use crate::schedule::quotient;
 
 mod runtime;
 
-pub(crate) use runtime::{AgeLimits, Runtime};
+pub(crate) use runtime::{AgeLimits, PaddleRuntime, Runtime};
 
 /// What the user may choose. [`Settings::new`] gives defaults that follow from the rates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -33,11 +33,11 @@ pub struct Settings {
     pub loop_gain: Option<f64>,
     /// Largest |λ| of J·Ĵ⁻¹ over the expected model errors; `None`: the table's.
     pub lambda_max: Option<f64>,
-    /// Direction of the feedback.
-    pub direction: Direction,
+    /// Direction of the feedback; `None`: that of the table's space, [`Direction::default_in`].
+    pub direction: Option<Direction>,
     /// Shape of the position limit.
     pub position_limit: PositionLimit,
-    /// Admitted distance between measured and commanded paddle at rest, length; `None`: 2 % of the paddle's range.
+    /// Admitted distance between measured and commanded paddle at rest, length; `None`: 2 % of each paddle's range.
     pub following_error: Option<f64>,
 }
 
@@ -53,7 +53,7 @@ impl Settings {
             feedback: Feedback::Observer,
             loop_gain: None,
             lambda_max: None,
-            direction: Direction::Inverse,
+            direction: None,
             position_limit: PositionLimit::Norm,
             following_error: None,
         }

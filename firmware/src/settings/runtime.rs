@@ -1,7 +1,7 @@
 //! Settings and table, built once into the numbers that a step uses.
 
 use super::{Settings, SettingsError, check, check_periods};
-use crate::contract::{Faults, Table, TableBounds};
+use crate::contract::{Faults, Paddle, Table, TableBounds, relative_weights};
 use crate::detection::{
     DEPTH_MARGIN, FOLLOWING_FRACTION, GATE_FLOOR, GATE_FLOOR_STATED, GATE_SIGMAS, NEEDLE_SPEED_MARGIN, PADDLE_MARGIN,
     RESOLUTION_PER_FOLLOWING_ERROR, SAFE_AGE_FLOOR_NS, TARGET_MARGIN, TARGET_SAMPLES_TO_HOLD, TARGET_SAMPLES_TO_SAFE,
@@ -21,10 +21,29 @@ pub(crate) struct AgeLimits {
     pub(crate) safe_ns: u64,
 }
 
+/// What a step uses of one paddle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PaddleRuntime<T: Scalar> {
+    /// Identity, as in the table.
+    pub(crate) index: u32,
+    pub(crate) limits: Limits<T>,
+    /// Rate limit, length/s.
+    pub(crate) rate: f64,
+    /// Largest plausible measured displacement, length.
+    pub(crate) range: f64,
+    pub(crate) following_error: f64,
+    /// What its sensor resolves, length.
+    pub(crate) resolution: f64,
+    /// Largest ‖J‖.
+    pub(crate) jacobian_norm: f64,
+}
+
 /// Settings and table in the form that a step uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Runtime<T: Scalar> {
-    pub(crate) limits: Limits<T>,
+pub(crate) struct Runtime<T: Scalar, const P: usize = 1> {
+    pub(crate) paddles: [PaddleRuntime<T>; P],
+    /// What a motion of each paddle may cost: the squares of their limits over that of the largest.
+    pub(crate) weights: [T; P],
     pub(crate) gain: T,
     pub(crate) feedback: Feedback,
     /// What the observer believes.
@@ -32,8 +51,6 @@ pub(crate) struct Runtime<T: Scalar> {
     /// Longest time from a measurement of the target to the tick that uses it, ns.
     pub(crate) history_ns: u64,
     pub(crate) direction: Direction,
-    /// Identity of the table's paddle.
-    pub(crate) paddle_index: u32,
     pub(crate) loop_period_ns: u64,
     pub(crate) actuator_delay_ns: u64,
     pub(crate) delay_samples: u32,
@@ -56,17 +73,8 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) target_range: f64,
     /// How far two samples of the target may be apart without any motion, length.
     pub(crate) target_jump: f64,
-    /// Largest plausible measured paddle displacement, length.
-    pub(crate) paddle_range: f64,
     /// Largest |d(target displacement)/d(depth)|, with or without paddle motion.
     pub(crate) target_slope: f64,
-    /// Largest ‖J‖.
-    pub(crate) jacobian_norm: f64,
-    pub(crate) following_error: f64,
-    /// What the paddle's sensor resolves, length.
-    pub(crate) paddle_resolution: f64,
-    /// Rate limit of the paddle, length/s.
-    pub(crate) paddle_rate: f64,
     /// Until a command shows in a measured position, s.
     pub(crate) unseen_delay: f64,
     /// Codes of monitors that are off.
@@ -74,9 +82,13 @@ pub(crate) struct Runtime<T: Scalar> {
     pub(crate) off: Faults,
 }
 
-impl<T: Scalar> Runtime<T> {
+impl<T: Scalar, const P: usize> Runtime<T, P> {
     /// Validates `settings` and combines them with a valid `table`.
-    pub(crate) fn new<const D: usize>(table: &Table<T, D>, settings: &Settings) -> Result<Self, SettingsError> {
+    pub(crate) fn new<const D: usize, const N: usize>(
+        table: &Table<T, D, N, P>,
+        settings: &Settings,
+    ) -> Result<Self, SettingsError> {
+        let () = Table::<T, D, N, P>::SHAPE;
         check_periods(settings)?;
         let delay_samples = settings.delay_samples();
         if delay_samples > loop_stability::MAX_DELAY_SAMPLES {
@@ -89,11 +101,14 @@ impl<T: Scalar> Runtime<T> {
         check("loop gain", "above 0 and at most 2", gain > 0.0 && gain <= 2.0)?;
         let noise = settings.target_noise;
         check("target noise", "finite and not negative", noise.is_finite() && noise >= 0.0)?;
-        let max_displacement = table.paddle.max_displacement.to_f64();
-        let following_error = settings.following_error.unwrap_or(FOLLOWING_FRACTION * max_displacement);
+        let following_error = settings.following_error.unwrap_or(1.0);
         check("following error", "finite and positive", following_error.is_finite() && following_error > 0.0)?;
-
-        let loop_period = seconds(settings.loop_period_ns);
+        let bounds = TableBounds::of(table);
+        let mut norms = bounds.jacobian_norm.into_iter();
+        let paddles = table
+            .paddles
+            .each_ref()
+            .map(|paddle| PaddleRuntime::new(paddle, norms.next().unwrap_or_default(), settings));
         let loop_age = AgeLimits {
             hold_ns: TICKS_TO_HOLD * settings.loop_period_ns,
             safe_ns: SAFE_AGE_FLOOR_NS.max(10 * TICKS_TO_HOLD * settings.loop_period_ns),
@@ -105,27 +120,23 @@ impl<T: Scalar> Runtime<T> {
         };
         let (start, end) = (table.validity.depth_start.to_f64(), table.validity.depth_end.to_f64());
         let margin = DEPTH_MARGIN * (end - start);
-        let bounds = TableBounds::of(table);
-        let target_range = TARGET_MARGIN * bounds.target_displacement + bounds.jacobian_norm * max_displacement;
+        let moved = paddles.iter().map(|paddle| paddle.jacobian_norm * paddle.limits.max_displacement.to_f64());
+        let target_range = moved.fold(TARGET_MARGIN * bounds.target_displacement, |sum, moved| sum + moved);
         let belief = Belief::new(noise, bounds.target_slope, end - start, target_range, gain.min(1.0));
         let belief = match settings.feedback {
             Feedback::Harmonic => belief.with_breathing(seconds(settings.target_period_ns)),
             Feedback::Integral | Feedback::Observer => belief,
         };
         Ok(Self {
-            limits: Limits {
-                shape: settings.position_limit,
-                max_displacement: table.paddle.max_displacement,
-                max_step: T::of(table.paddle.max_rate.to_f64() * loop_period),
-            },
+            paddles,
+            weights: relative_weights(&table.paddles.each_ref().map(|paddle| paddle.max_displacement)),
             gain: T::of(gain),
             feedback: settings.feedback,
             belief,
             history_ns: settings.target_latency_ns
                 + TARGET_SAMPLES_TO_HOLD * settings.target_period_ns
                 + settings.actuator_delay_ns,
-            direction: settings.direction,
-            paddle_index: table.paddle.index,
+            direction: settings.direction.unwrap_or(Direction::default_in(D)),
             loop_period_ns: settings.loop_period_ns,
             actuator_delay_ns: settings.actuator_delay_ns,
             delay_samples,
@@ -141,16 +152,39 @@ impl<T: Scalar> Runtime<T> {
             plausible_speed: NEEDLE_SPEED_MARGIN * table.validity.needle_speed.to_f64(),
             target_range,
             target_jump: unexplained_jump(noise, target_range),
-            paddle_range: PADDLE_MARGIN * max_displacement,
             target_slope: bounds.target_slope,
-            jacobian_norm: bounds.jacobian_norm,
-            following_error,
-            paddle_resolution: RESOLUTION_PER_FOLLOWING_ERROR * following_error,
-            paddle_rate: table.paddle.max_rate.to_f64(),
             unseen_delay: seconds(settings.actuator_delay_ns.saturating_add(settings.loop_period_ns)),
             #[cfg(feature = "switches")]
             off: Faults::NONE,
         })
+    }
+}
+
+impl<T: Scalar> PaddleRuntime<T> {
+    /// Of a paddle of the table and the largest norm of its Jacobian.
+    fn new<const D: usize>(paddle: &Paddle<T, D>, jacobian_norm: f64, settings: &Settings) -> Self {
+        let max_displacement = paddle.max_displacement.to_f64();
+        let rate = paddle.max_rate.to_f64();
+        let following_error = settings.following_error.unwrap_or(FOLLOWING_FRACTION * max_displacement);
+        Self {
+            index: paddle.index,
+            limits: Limits {
+                shape: settings.position_limit,
+                max_displacement: paddle.max_displacement,
+                max_step: T::of(rate * seconds(settings.loop_period_ns)),
+            },
+            rate,
+            range: PADDLE_MARGIN * max_displacement,
+            following_error,
+            resolution: RESOLUTION_PER_FOLLOWING_ERROR * following_error,
+            jacobian_norm,
+        }
+    }
+
+    /// What the command may have moved since a position that was measured `age` s ago was asked for, when a command
+    /// shows after `delay` s at the latest, length.
+    pub(crate) fn unseen_motion(&self, age: f64, delay: f64) -> f64 {
+        self.rate * (age + delay)
     }
 }
 
@@ -160,7 +194,7 @@ fn unexplained_jump(target_noise: f64, target_range: f64) -> f64 {
     noise + target_range * if noise > 0.0 { GATE_FLOOR_STATED } else { GATE_FLOOR }
 }
 
-impl<T: Scalar> Runtime<T> {
+impl<T: Scalar, const P: usize> Runtime<T, P> {
     /// What remains of `faults` when some monitors are off: everything, outside of test benches.
     #[inline(always)]
     pub(crate) fn seen(&self, faults: Faults) -> Faults {
@@ -174,10 +208,6 @@ impl<T: Scalar> Runtime<T> {
         self.table_depth.1 - self.table_depth.0
     }
 
-    /// What the command may have moved since a measured position of this age (s) was asked for, length.
-    pub(crate) fn unseen_motion(&self, age: f64) -> f64 {
-        self.paddle_rate * (age + self.unseen_delay)
-    }
 }
 
 #[cfg(test)]
@@ -221,20 +251,21 @@ mod tests {
         let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         let slope = (0.02f64 * 0.02 + 0.1 * 0.1).sqrt();
         let jacobian = (0.3f64.powi(2) + 0.05f64.powi(2) + 0.04f64.powi(2) + 0.25f64.powi(2)).sqrt();
-        close(runtime.limits.max_step, 0.1 * 2e-3);
+        let [paddle] = runtime.paddles;
+        close(paddle.limits.max_step, 0.1 * 2e-3);
         close(runtime.target_slope, slope);
-        close(runtime.jacobian_norm, jacobian);
+        close(paddle.jacobian_norm, jacobian);
         close(runtime.target_range, 3.0 * 0.1 * slope + jacobian * 0.05);
-        close(runtime.paddle_range, 0.055);
-        close(runtime.following_error, 0.001);
-        close(runtime.paddle_resolution, 0.0001);
+        close(paddle.range, 0.055);
+        close(paddle.following_error, 0.001);
+        close(paddle.resolution, 0.0001);
         close(runtime.plausible_speed, 1.0);
         close(runtime.depth_range(), 0.1);
         close(Runtime { table_depth: (1.0, 3.0), ..runtime }.depth_range(), 2.0);
         close(runtime.plausible_depth.0, -0.1);
         close(runtime.plausible_depth.1, 0.2);
-        close(runtime.unseen_motion(0.01), 0.1 * (0.01 + 0.005));
-        assert_eq!((runtime.delay_samples, runtime.gain, runtime.paddle_index), (1, 0.25, 3));
+        close(paddle.unseen_motion(0.01, runtime.unseen_delay), 0.1 * (0.01 + 0.005));
+        assert_eq!((runtime.delay_samples, runtime.gain, paddle.index, runtime.weights), (1, 0.25, 3, [1.0]));
     }
 
     #[cfg(feature = "switches")]

@@ -20,7 +20,7 @@ fn the_right_table_leaves_almost_no_error() {
 fn a_wrong_table_is_corrected_by_feedback() {
     let table = table();
     for direction in [crate::law::Direction::Inverse, crate::law::Direction::MinimumNorm] {
-        let mut closed = Loop::new(&table, &Settings { direction, ..settings() });
+        let mut closed = Loop::new(&table, &Settings { direction: Some(direction), ..settings() });
         closed.plant.push = 0.035;
         closed.plant.jacobian = jacobian() * 0.7;
         closed.run(6500);
@@ -51,7 +51,7 @@ fn a_slow_target_sensor_makes_no_oscillation() {
 /// Final size of the orthogonal error at g·λ = `ratio` × limit, relative to its start, with everything linear.
 fn growth(ratio: f64) -> f64 {
     let mut table = table();
-    table.paddle.max_rate = 1e3;
+    table.paddles[0].max_rate = 1e3;
     let limit = loop_stability::gain_limit(0.0, 1);
     let settings = Settings { feedback: Feedback::Integral, loop_gain: Some(ratio * limit), ..settings() };
     let mut closed = Loop::new(&table, &settings);
@@ -151,10 +151,11 @@ fn monitors_hear_of_corrections_that_act_by_more_than_half() {
             location: table.locate(0.0).unwrap(),
             feed_forward: Vector2::zeros(),
             previous,
-            limits: controller.runtime.limits,
+            limits: controller.runtime.paddles.map(|paddle| paddle.limits),
         };
         let found = controller.integrate(&state, Some(sample), &setting).correction;
-        assert_eq!(found.map(|found| (found.error, found.size)), heard.then_some((error, size)), "room for {room}");
+        let found = found.map(|found| (found.error, found.size, found.acted));
+        assert_eq!(found, Some((-error, size, Some(heard))), "room for {room}");
     }
 }
 
@@ -171,8 +172,8 @@ fn a_command_is_the_path_ahead_of_the_needle_and_the_feedback() {
         let command = closed.tick(|inputs| inputs.needle = None);
         assert!(!closed.state.faults().contains(Faults::RATE_LIMITED));
         let ahead = depth + velocity * 1e-3 * f64::from(silence + 3);
-        let expected = table.knots[0].paddle_path_slope * ahead + Vector2::from(closed.state.added().unwrap());
-        let off = (Vector2::from(command.displacement) - expected).norm();
+        let expected = table.knots[0].paddle_path_slope * ahead + Vector2::from(to_plane(closed.state.added().unwrap()[0]));
+        let off = (Vector2::from(to_plane(command.displacement[0])) - expected).norm();
         assert!(off < 1e-15, "{silence} ticks after the last sample: {off}");
     }
 }
@@ -223,12 +224,12 @@ fn the_way_of_the_paddle_is_summed_along_both_axes() {
             continue;
         }
         if let Some(before) = before {
-            way = core::array::from_fn(|axis| way[axis] + (command.displacement[axis] - before[axis]).abs());
+            way = core::array::from_fn(|axis| way[axis] + (command.displacement[0][axis] - before[axis]).abs());
         }
-        before = Some(command.displacement);
+        before = Some(to_plane(command.displacement[0]));
     }
     assert!(way.iter().all(|along| *along > 1e-4), "{way:?}");
-    let summed = closed.state.gate.travel.paddle;
+    let summed = closed.state.gate.travel.paddles[0];
     assert!((0..2).all(|axis| (summed[axis] - way[axis]).abs() < 1e-12), "{summed:?} instead of {way:?}");
 }
 
@@ -269,7 +270,7 @@ fn single_precision_follows_double() {
         let command = closed.tick(|inputs| seen = *inputs);
         let other = single.step(&mut state, &seen);
         assert_eq!(other.state, command.state);
-        let distance = Vector2::from(other.displacement) - Vector2::from(command.displacement);
+        let distance = Vector2::from(to_plane(other.displacement[0])) - Vector2::from(to_plane(command.displacement[0]));
         assert!(distance.norm() < 1e-6);
     }
 }

@@ -8,13 +8,13 @@ fn a_start_moves_nothing_and_restarts_where_the_paddle_is() {
     let mut closed = Loop::new(&table, &settings());
     closed.plant.paddle = Vector2::new(0.01, -0.02);
     closed.plant.depth = 0.05;
-    let command = closed.tick(|inputs| inputs.paddle = None);
+    let command = closed.tick(|inputs| inputs.paddles[0] = None);
     assert!(!command.is_valid() && command.state == Mode::Hold as u32);
     for tick in 0..100 {
         let command = closed.tick(|_| {});
         assert_eq!(command.is_valid(), tick >= TICKS_TO_HOLD, "at rest for as long as a sample may be old");
         if command.is_valid() && command.state == Mode::Hold as u32 {
-            assert_eq!(command.displacement, [0.01, -0.02]);
+            assert_eq!(command.displacement, [[0.01, -0.02, 0.0], [0.0; 3]]);
         }
         if command.state == Mode::Run as u32 {
             return;
@@ -33,7 +33,7 @@ fn a_paddle_beside_its_path_stays_there_until_the_target_says_otherwise() {
         (closed.plant.paddle, closed.plant.depth, closed.plant.speed) = (beside, depth, 0.0);
         closed.run(1000);
         assert_eq!(closed.state.mode(), Mode::Run);
-        let command = Vector2::from(closed.last.unwrap().displacement);
+        let command = Vector2::from(to_plane(closed.last.unwrap().displacement[0]));
         assert!((command - beside).norm() < 1e-4, "{depth}: {command:?} {beside:?}");
     }
 }
@@ -58,7 +58,7 @@ fn ages_lead_to_hold_and_safe_and_safe_needs_rearming() {
         let silence = |inputs: &mut Inputs| match stream {
             0 => inputs.needle = None,
             1 => inputs.target = None,
-            _ => inputs.paddle = None,
+            _ => inputs.paddles[0] = None,
         };
         let mut closed = Loop::new(&table, &settings());
         closed.run(1000);
@@ -82,7 +82,7 @@ fn a_pause_of_100_ms_is_one_gap_and_resumes() {
     closed.run(1000);
     for _ in 0..100 {
         closed.tick(|inputs| {
-            (inputs.needle, inputs.target, inputs.paddle) = (None, None, None);
+            (inputs.needle, inputs.target, inputs.paddles) = (None, None, [None; 2]);
         });
     }
     assert_eq!(closed.state.mode(), Mode::Hold);
@@ -109,14 +109,14 @@ fn rejected_inputs_leave_the_integral_bit_identical() {
                     1 => inputs.needle.as_mut().unwrap().velocity = value,
                     2 => target.unwrap().displacement[0] = value,
                     3 => target.unwrap().displacement[1] = value,
-                    4 => inputs.paddle.as_mut().unwrap().displacement[0] = value,
-                    _ => inputs.paddle.as_mut().unwrap().displacement[1] = value,
+                    4 => inputs.paddles[0].as_mut().unwrap().displacement[0] = value,
+                    _ => inputs.paddles[0].as_mut().unwrap().displacement[1] = value,
                 }
                 if field != 2 && field != 3 {
                     inputs.target = None;
                 }
             });
-            let same = integral.map(f64::to_bits) == closed.state.integral().unwrap().map(f64::to_bits);
+            let same = integral[0].map(f64::to_bits) == closed.state.integral().unwrap()[0].map(f64::to_bits);
             assert!(same, "field {field} = {value}");
         }
     }
@@ -206,7 +206,7 @@ fn a_wrong_first_sample_from_long_ago_is_forgotten_before_the_start() {
                     (needle.time_ns, needle.depth) = (needle.time_ns - 1000 * MS, 0.1);
                 }
                 (1, _, Some(target)) if target.sequence == 0 => {
-                    (target.time_ns, target.displacement) = (target.time_ns - 1000 * MS, [0.02, 0.0]);
+                    (target.time_ns, target.displacement) = (target.time_ns - 1000 * MS, [0.02, 0.0, 0.0]);
                 }
                 _ => {}
             });
@@ -240,7 +240,7 @@ fn frozen_inputs_are_detected() {
         let mut closed = Loop::new(&table, &settings());
         closed.run(1000);
         let depth = closed.plant.depth;
-        let displacement = closed.plant.target().into();
+        let displacement = from_plane(closed.plant.target().into());
         let ticks = closed.until_safe(|inputs| match (stream, &mut inputs.needle, &mut inputs.target) {
             (0, Some(needle), _) => needle.depth = depth,
             (1, _, Some(target)) => target.displacement = displacement,
@@ -325,13 +325,13 @@ fn a_paddle_that_hangs_is_frozen_once_the_command_has_left_it() {
     let table = table();
     let mut closed = Loop::new(&table, &Settings { following_error: Some(1.0), ..settings() });
     closed.run(1000);
-    let (stuck, commanded) = (closed.plant.paddle, Vector2::from(closed.last.unwrap().displacement));
+    let (stuck, commanded) = (closed.plant.paddle, Vector2::from(to_plane(closed.last.unwrap().displacement[0])));
     while !closed.state.faults().contains(Faults::FROZEN) {
-        closed.tick(|inputs| inputs.paddle.as_mut().unwrap().displacement = stuck.into());
+        closed.tick(|inputs| inputs.paddles[0].as_mut().unwrap().displacement = from_plane(stuck.into()));
         assert!(closed.plant.tick < 4000, "never found");
     }
     // 0.5 % of the range, and what is on its way for two ticks at the full rate.
-    let left = (Vector2::from(closed.last.unwrap().displacement) - commanded).norm();
+    let left = (Vector2::from(to_plane(closed.last.unwrap().displacement[0])) - commanded).norm();
     let admitted = 0.005 * 0.05 + 0.1 * 2e-3;
     assert!((admitted..admitted + 2e-4).contains(&left), "{left}, {admitted} admitted");
 }
@@ -366,7 +366,7 @@ proptest! {
         let mut table = table();
         if ill {
             for knot in &mut table.knots {
-                knot.jacobian = Matrix2::new(0.3, 0.0, 0.0, 0.3 / 400.0);
+                knot.jacobian = [Matrix2::new(0.3, 0.0, 0.0, 0.3 / 400.0)];
             }
         }
         let mut closed = Loop::new(&table, &settings());
@@ -374,18 +374,18 @@ proptest! {
         for (kind, shift, a, b, time) in seeds {
             closed.tick(|inputs| {
                 let needle = inputs.needle.as_mut().unwrap();
-                let paddle = inputs.paddle.as_mut().unwrap();
+                let paddle = inputs.paddles[0].as_mut().unwrap();
                 match kind % 12 {
                     0 => (needle.depth, needle.velocity) = (a, b),
                     1 => needle.sequence = needle.sequence.wrapping_sub(shift),
                     2 => needle.time_ns = time,
-                    3 => paddle.displacement = [a, b],
+                    3 => paddle.displacement = [a, b, 0.0],
                     4 => paddle.sequence = paddle.sequence.wrapping_add(shift),
                     5 => inputs.target = Some(TargetSample {
                         sequence: shift,
                         flags: 1,
                         time_ns: inputs.time_ns,
-                        displacement: [a, b],
+                        displacement: [a, b, 0.0],
                     }),
                     6 => inputs.needle = None,
                     7 if kind > 200 => inputs.time_ns = time,

@@ -21,9 +21,9 @@ pub(crate) struct DivergenceMonitor {
 
 impl DivergenceMonitor {
     /// Enters a sample whose correction, the target's motion that it asks for, acts; returns whether the loop diverges.
-    pub(crate) fn update<T: Scalar>(
+    pub(crate) fn update<T: Scalar, const P: usize>(
         &mut self,
-        runtime: &Runtime<T>,
+        runtime: &Runtime<T, P>,
         error: f64,
         correction: f64,
         needle_speed: f64,

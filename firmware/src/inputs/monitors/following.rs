@@ -4,7 +4,7 @@ use super::LeakyBucket;
 use crate::detection::FOLLOWING_SAMPLES;
 use crate::inputs::sample::are_within;
 use crate::scalar::Scalar;
-use crate::settings::Runtime;
+use crate::settings::PaddleRuntime;
 
 /// Trips when the paddle is away from its command too often.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -13,14 +13,15 @@ pub(crate) struct FollowingMonitor {
 }
 
 impl FollowingMonitor {
-    /// Whether a position measured `age` seconds ago is where `commanded` explains it.
-    pub(crate) fn follows<T: Scalar>(
-        runtime: &Runtime<T>,
-        measured: &[f64; 2],
-        commanded: &[f64; 2],
-        age: f64,
+    /// Whether a measured position is where `commanded` explains it.
+    /// `unseen` is how far it may have been commanded since, length.
+    pub(crate) fn follows<T: Scalar, const D: usize>(
+        paddle: &PaddleRuntime<T>,
+        measured: &[f64; D],
+        commanded: &[f64; D],
+        unseen: f64,
     ) -> bool {
-        are_within(measured, commanded, runtime.following_error + runtime.unseen_motion(age))
+        are_within(measured, commanded, paddle.following_error + unseen)
     }
 
     /// Enters whether a fresh sample follows; returns whether the fault is certain.

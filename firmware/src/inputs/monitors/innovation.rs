@@ -7,20 +7,26 @@ use crate::scalar::Scalar;
 use crate::settings::Runtime;
 
 /// Cumulated motion of needle and paddle, length.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Travel {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Travel<const D: usize = 2, const P: usize = 1> {
     pub(crate) needle: f64,
-    /// Along each axis: square roots are dear.
-    pub(crate) paddle: [f64; 2],
+    /// Of each paddle along each axis: square roots are dear.
+    pub(crate) paddles: [[f64; D]; P],
 }
 
-impl Travel {
-    /// How far apart two positions of the paddle since `before` are at most, length. Larger plus (√2 − 1) times smaller
-    /// component is the norm along the axes and between them, and at most 8 % more elsewhere.
-    fn paddle_since(&self, before: &Self) -> f64 {
-        let (x, y) = (self.paddle[0] - before.paddle[0], self.paddle[1] - before.paddle[1]);
-        x.max(y) + (core::f64::consts::SQRT_2 - 1.0) * x.min(y)
+impl<const D: usize, const P: usize> Default for Travel<D, P> {
+    fn default() -> Self {
+        Self { needle: 0.0, paddles: [[0.0; D]; P] }
     }
+}
+
+/// How far apart two positions of a paddle between two travels are at most, length. Larger plus (√2 − 1) times smaller
+/// component is the norm along the axes and between them, and at most 8 % more elsewhere; with a third component the
+/// same of those two and the third, at most 17 %.
+fn farthest<const D: usize>(now: &[f64; D], before: &[f64; D]) -> f64 {
+    let mut components = now.iter().zip(before).map(|(now, before)| now - before);
+    let first = components.next().unwrap_or_default();
+    components.fold(first, |x, y| x.max(y) + (core::f64::consts::SQRT_2 - 1.0) * x.min(y))
 }
 
 /// Accepted samples that are remembered; the motion since the oldest one may show in the newest measurement.
@@ -29,16 +35,22 @@ const GATE_HISTORY: usize = 8;
 const _: () = assert!(GATE_HISTORY.is_power_of_two());
 
 /// Refuses target samples that jump further than motion and noise can explain (wrong association).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct InnovationGate {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct InnovationGate<const D: usize = 2, const P: usize = 1> {
     /// Motion so far.
-    pub(crate) travel: Travel,
+    pub(crate) travel: Travel<D, P>,
     /// Motion at the arrival of the last accepted samples: a ring, from `newest` on ever older.
-    at_arrival: [Travel; GATE_HISTORY],
+    at_arrival: [Travel<D, P>; GATE_HISTORY],
     newest: usize,
 }
 
-impl InnovationGate {
+impl<const D: usize, const P: usize> Default for InnovationGate<D, P> {
+    fn default() -> Self {
+        Self { travel: Travel::default(), at_arrival: [Travel::default(); GATE_HISTORY], newest: 0 }
+    }
+}
+
+impl<const D: usize, const P: usize> InnovationGate<D, P> {
     /// A target sample has been accepted now.
     pub(crate) fn accept(&mut self) {
         self.newest = self.newest.wrapping_sub(1) % GATE_HISTORY;
@@ -48,22 +60,24 @@ impl InnovationGate {
     }
 
     /// Motion at the arrival of the accepted sample so many before the newest.
-    fn at_arrival(&self, samples_ago: usize) -> Travel {
+    fn at_arrival(&self, samples_ago: usize) -> Travel<D, P> {
         self.at_arrival.get(self.newest.wrapping_add(samples_ago) % GATE_HISTORY).copied().unwrap_or_default()
     }
 
-    /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + ‖J‖·paddle travel) + floor, where the travel reaches back
+    /// |y − y_previous| ≤ 8σ√2 + 3·(slope·needle travel + Σ ‖Jₚ‖·paddle travel) + floor, where the travel reaches back
     /// to everything that can lie between the two measurements.
     pub(crate) fn check<T: Scalar>(
         &self,
-        runtime: &Runtime<T>,
-        previous: &[f64; 2],
-        current: &[f64; 2],
+        runtime: &Runtime<T, P>,
+        previous: &[f64; D],
+        current: &[f64; D],
     ) -> Result<(), Discard> {
         let reach = (runtime.delay_samples as usize + 1).min(GATE_HISTORY - 1);
         let oldest = self.at_arrival(reach);
-        let motion = runtime.target_slope * (self.travel.needle - oldest.needle)
-            + runtime.jacobian_norm * self.travel.paddle_since(&oldest);
+        let mut motion = runtime.target_slope * (self.travel.needle - oldest.needle);
+        for ((now, before), paddle) in self.travel.paddles.iter().zip(&oldest.paddles).zip(&runtime.paddles) {
+            motion += paddle.jacobian_norm * farthest(now, before);
+        }
         let gate = GATE_MOTION * motion + runtime.target_jump;
         if are_within(current, previous, gate) { Ok(()) } else { Err(Discard::Innovation) }
     }

@@ -26,9 +26,9 @@ impl NeedleMonitor {
     }
 
     /// The window once `sample` is accepted; refuses one with which depth and velocity contradict each other.
-    pub(crate) fn next<T: Scalar>(
+    pub(crate) fn next<T: Scalar, const P: usize>(
         &self,
-        runtime: &Runtime<T>,
+        runtime: &Runtime<T, P>,
         sample: &Measurement,
         previous: &Measurement,
     ) -> Result<Self, Discard> {

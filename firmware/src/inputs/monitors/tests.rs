@@ -101,14 +101,17 @@ fn following_error_over_noise() {
     let table = table();
     let settings = Settings::new(1_000_000, 20_000_000, 20_000_000);
     let runtime = Runtime::new(&table, &settings).unwrap();
-    let tolerance = FOLLOWING_FRACTION * table.paddle.max_displacement;
+    let tolerance = FOLLOWING_FRACTION * table.paddles[0].max_displacement;
     let mut noise = Noise(7);
     let mut trips = |offset: f64, deviation: f64, samples: usize| {
         let mut monitor = FollowingMonitor::default();
         (0..samples).any(|_| {
             let [x, y] = noise.normal();
             let measured = [offset + deviation * x, deviation * y];
-            monitor.enter(FollowingMonitor::follows(&runtime, &measured, &[0.0; 2], 0.0))
+            monitor.enter({
+                let unseen = runtime.paddles[0].unseen_motion(0.0, runtime.unseen_delay);
+                FollowingMonitor::follows(&runtime.paddles[0], &measured, &[0.0; 2], unseen)
+            })
         })
     };
     // False alarm: noise of half the tolerance leaves it in 1 sample of 18. Detection: off by twice the tolerance.
@@ -156,11 +159,12 @@ fn the_gate_is_noise_and_three_times_the_motion_since_the_delay() {
     for (noise, floor) in [(0.0, 0.01), (1e-4, 0.002)] {
         // A delay of 1 sample: motion since the arrival of the second sample before the last one counts.
         let runtime = runtime(&Settings { target_noise: noise, ..settings() });
-        let mut gate = InnovationGate::default();
+        let mut gate = InnovationGate::<2, 1>::default();
         // Since the second sample before the last one the paddle has gone 0.012 along x and 0.016 along y.
         for (needle, [x, y]) in [(0.5, [0.5, 0.1]), (0.01, [0.0; 2]), (0.0, [0.011, 0.016]), (0.003, [0.001, 0.0])] {
             gate.travel.needle += needle;
-            gate.travel.paddle = [gate.travel.paddle[0] + x, gate.travel.paddle[1] + y];
+            let [way] = &mut gate.travel.paddles;
+            *way = [way[0] + x, way[1] + y];
             gate.accept();
         }
         gate.travel.needle += 0.004;
@@ -175,7 +179,7 @@ fn the_gate_is_noise_and_three_times_the_motion_since_the_delay() {
 fn the_gate_reaches_back_no_further_than_it_remembers() {
     let far = Settings { target_latency_ns: 640 * MS, ..settings() };
     let runtime = runtime(&far);
-    let mut gate = InnovationGate::default();
+    let mut gate = InnovationGate::<2, 1>::default();
     for _ in 0..20 {
         gate.travel.needle += 0.001;
         gate.accept();
@@ -338,27 +342,32 @@ fn a_window_of_the_needle_ends_after_10_s() {
 fn rest_takes_as_long_as_a_sample_may_be_old() {
     let runtime = runtime(&settings());
     let resolution = 0.1 * FOLLOWING_FRACTION * 0.05;
+    let enter = |monitor: &mut RestMonitor, sample: &Measurement| {
+        monitor.enter(runtime.paddles[0].resolution, runtime.paddle_age.hold_ns, sample)
+    };
     let mut monitor = RestMonitor::default();
-    let states: Vec<Motion> = (0..8).map(|tick| monitor.enter(&runtime, &sample(tick, [0.01, 0.0]))).collect();
+    let states: Vec<Motion> = (0..8).map(|tick| enter(&mut monitor, &sample(tick, [0.01, 0.0]))).collect();
     assert_eq!(states[..5], [Motion::Unknown; 5]);
     assert_eq!(states[5..], [Motion::Resting; 3]);
-    assert_eq!(monitor.enter(&runtime, &sample(8, [0.01 + 0.99 * resolution, 0.0])), Motion::Resting);
-    assert_eq!(monitor.enter(&runtime, &sample(9, [0.01 + 1.01 * resolution, 0.0])), Motion::Moving);
-    assert_eq!(monitor.enter(&runtime, &sample(10, [0.01 + 1.01 * resolution, 0.0])), Motion::Unknown);
+    assert_eq!(enter(&mut monitor, &sample(8, [0.01 + 0.99 * resolution, 0.0])), Motion::Resting);
+    assert_eq!(enter(&mut monitor, &sample(9, [0.01 + 1.01 * resolution, 0.0])), Motion::Moving);
+    assert_eq!(enter(&mut monitor, &sample(10, [0.01 + 1.01 * resolution, 0.0])), Motion::Unknown);
     // A gap longer than that begins anew, without a word about motion.
     let mut monitor = RestMonitor::default();
     for tick in [0, 4, 9] {
-        monitor.enter(&runtime, &sample(tick, [0.01, 0.0]));
+        enter(&mut monitor, &sample(tick, [0.01, 0.0]));
     }
-    assert_eq!(monitor.enter(&runtime, &sample(14, [0.01, 0.0])), Motion::Resting);
-    assert_eq!(monitor.enter(&runtime, &sample(20, [0.01, 0.0])), Motion::Unknown);
+    assert_eq!(enter(&mut monitor, &sample(14, [0.01, 0.0])), Motion::Resting);
+    assert_eq!(enter(&mut monitor, &sample(20, [0.01, 0.0])), Motion::Unknown);
 }
 
 #[test]
 fn a_paddle_follows_within_the_error_and_what_is_on_its_way() {
     let runtime = runtime(&settings());
     for age in [0.0, 0.003] {
-        let off = threshold(0.05, |off| FollowingMonitor::follows(&runtime, &[off, 0.01], &[0.0, 0.01], age));
+        let paddle = &runtime.paddles[0];
+        let unseen = paddle.unseen_motion(age, runtime.unseen_delay);
+        let off = threshold(0.05, |off| FollowingMonitor::follows(paddle, &[off, 0.01], &[0.0, 0.01], unseen));
         close(off, 0.001 + 0.1 * (age + 0.002));
     }
 }

@@ -114,8 +114,9 @@ fn insertion<T: Scalar>(ticks: u64) -> Vec<(Inputs, PaddleCommand)> {
 }
 
 fn requests_of<'a>(inputs: &Inputs) -> impl Iterator<Item = Request<'a>> + use<'a> {
-    let Inputs { tick, time_ns, needle, target, paddle } = *inputs;
-    let samples = [needle.map(Request::Needle), target.map(Request::Target), paddle.map(Request::Paddle)];
+    let Inputs { tick, time_ns, needle, target, paddles } = *inputs;
+    let [first, second] = paddles.map(|paddle| paddle.map(Request::Paddle));
+    let samples = [needle.map(Request::Needle), target.map(Request::Target), first, second];
     samples.into_iter().flatten().chain([Request::Time { tick, time_ns }])
 }
 
@@ -230,7 +231,7 @@ fn the_last_word_is_a_safe_command_that_moves_nothing() {
     let Some(Reply::Command { command, .. }) = reader.message::<Reply>() else { panic!("no command") };
     assert_eq!((command.state, command.is_valid()), (Mode::Safe as u32, false));
     assert_eq!(command.faults, Faults::WATCHDOG.bits());
-    assert!(memory.last_word().len() <= 64, "fits where an exception finds it");
+    assert!(memory.last_word().len() <= 96, "fits where an exception finds it");
 }
 
 /// A run in RUN, then these requests, then some more of the insertion: the mode at its end and the replies in between.
@@ -428,7 +429,7 @@ fn an_account_with_every_counter_full_fits_into_a_frame() {
     let most = u64::MAX;
     let ticks = TickLedger { due: most, run: most, hold: most, safe: most, skipped: most };
     let line = LineLedger { frames: stream, damaged: most, unknown: most, starts: most, replayed_starts: most };
-    let ledger = Ledger { needle: stream, target: stream, paddle: stream, ticks };
+    let ledger = Ledger { needle: stream, target: stream, paddles: [stream; 2], ticks };
     let account = Account { ledger, line, state: u32::MAX, faults: Faults::from_bits(most), stack_bytes: u32::MAX };
     let mut writer = FrameWriter::new();
     writer.encode(&HELLO).unwrap();

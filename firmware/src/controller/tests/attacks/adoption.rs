@@ -12,11 +12,11 @@ fn a_measurement_from_long_ago_is_not_adopted() {
     for tick in 0..200 {
         let mut inputs = plant.sense();
         if tick == 0 {
-            let paddle = inputs.paddle.as_mut().unwrap();
-            (paddle.time_ns, paddle.displacement) = (paddle.time_ns - 10_000 * MS, [RANGE, 0.0]);
+            let paddle = inputs.paddles[0].as_mut().unwrap();
+            (paddle.time_ns, paddle.displacement) = (paddle.time_ns - 10_000 * MS, [RANGE, 0.0, 0.0]);
         }
         let command = controller.step(&mut state, &inputs);
-        assert!(!command.is_valid() || distance(command.displacement, [0.0; 2]) < 0.1 * RANGE, "tick {tick}");
+        assert!(!command.is_valid() || distance(to_plane(command.displacement[0]), [0.0; 2]) < 0.1 * RANGE, "tick {tick}");
         plant.act(&command);
     }
     assert_eq!(state.mode(), Mode::Run, "{}", state.faults());
@@ -64,12 +64,12 @@ fn the_adopted_position_expires_with_its_measurement() {
     }
     assert!(closed.last.unwrap().is_valid());
     for _ in 0..400 {
-        closed.tick(|inputs| (inputs.target, inputs.paddle) = (None, None));
+        closed.tick(|inputs| (inputs.target, inputs.paddles) = (None, [None; 2]));
     }
     assert!(!closed.last.unwrap().is_valid(), "nobody knows where the paddle is");
     closed.plant.paddle = Vector2::new(0.0, 0.02);
     let first = (0..50).map(|_| closed.tick(|_| {})).find(PaddleCommand::is_valid);
-    assert_eq!(first.unwrap().displacement, [0.0, 0.02]);
+    assert_eq!(first.unwrap().displacement, [[0.0, 0.02, 0.0], [0.0; 3]]);
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn a_paddle_that_somebody_moves_before_the_start_is_adopted_anew() {
         let mut inputs = closed.plant.sense();
         inputs.target = None;
         let command = closed.controller.step(&mut closed.state, &inputs);
-        assert!(!command.is_valid() || command.displacement == [0.0, 0.02]);
+        assert!(!command.is_valid() || command.displacement[0] == [0.0, 0.02, 0.0]);
     }
     closed.last = None;
     closed.run(100);
@@ -121,14 +121,14 @@ proptest! {
             let tick = 20_000 + i as u64;
             let age = if i == 0 { first_age } else { age };
             // What is 20 s old was measured elsewhere.
-            let displacement = if i == 0 && age > 100 { [RANGE, 0.0] } else { truth(tick - age) };
+            let displacement = from_plane(if i == 0 && age > 100 { [RANGE, 0.0] } else { truth(tick - age) });
             let sample =
                 PaddleSample { sequence: i as u32, paddle_index: 3, time_ns: (tick - age) * MS, displacement };
             let paddle = (arrives || i == 0).then_some(sample);
-            let inputs = Inputs { tick, time_ns: tick * MS, paddle, ..Inputs::default() };
+            let inputs = Inputs { tick, time_ns: tick * MS, paddles: [paddle, None], ..Inputs::default() };
             let command = controller.step(&mut state, &inputs);
             if command.is_valid() {
-                let off = distance(command.displacement, truth(tick));
+                let off = distance(to_plane(command.displacement[0]), truth(tick));
                 prop_assert!(off <= RESOLUTION * (1.0 + 1e-9), "tick {}: {} off", tick, off);
                 is_adopted = true;
                 break;
@@ -151,16 +151,16 @@ proptest! {
             for _ in 0..ticks {
                 let mut inputs = closed.plant.sense();
                 if kind == 0 {
-                    inputs.paddle = None;
+                    inputs.paddles[0] = None;
                 }
-                let consumed = closed.state.ledger().paddle.consumed;
+                let consumed = closed.state.ledger().paddles[0].consumed;
                 let command = closed.controller.step(&mut closed.state, &inputs);
                 let mut moved = closed.plant.paddle;
                 match kind {
                     1 => {}
                     2 => moved = Vector2::new(0.5 * RANGE * x, 0.5 * RANGE * y),
-                    3 if command.is_valid() => moved = Vector2::from(command.displacement) * 0.5,
-                    _ if command.is_valid() => moved = Vector2::from(command.displacement),
+                    3 if command.is_valid() => moved = Vector2::from(to_plane(command.displacement[0])) * 0.5,
+                    _ if command.is_valid() => moved = Vector2::from(to_plane(command.displacement[0])),
                     _ => {}
                 }
                 closed.plant.act(&command);
@@ -169,11 +169,11 @@ proptest! {
                     away = 0;
                 }
                 // A position that is refused, as frozen, is no measurement.
-                let is_accepted = closed.state.ledger().paddle.consumed > consumed;
-                let Some(last) = inputs.paddle.filter(|_| command.is_valid() && is_accepted) else { continue };
+                let is_accepted = closed.state.ledger().paddles[0].consumed > consumed;
+                let Some(last) = inputs.paddles[0].filter(|_| command.is_valid() && is_accepted) else { continue };
                 let age = 1e-3 * (inputs.tick - last.time_ns / MS) as f64;
                 let explained = FOLLOWING_FRACTION * RANGE + RATE * (age + 2e-3 + 1e-3);
-                let off = distance(command.displacement, last.displacement);
+                let off = distance(to_plane(command.displacement[0]), to_plane(last.displacement));
                 // Further away in no more samples than the following error takes to be certain.
                 compared += 1;
                 away = if off > explained { away + 1 } else { 0 };

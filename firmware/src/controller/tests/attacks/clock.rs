@@ -87,7 +87,7 @@ proptest! {
             if let Some(needle) = &mut inputs.needle {
                 needle.time_ns = time_ns;
             }
-            if let Some(paddle) = &mut inputs.paddle {
+            if let Some(paddle) = &mut inputs.paddles[0] {
                 paddle.time_ns = time_ns;
             }
             if let Some(target) = &mut inputs.target {
@@ -96,7 +96,7 @@ proptest! {
             let command = controller.step(&mut state, &inputs);
             plant.act(&command);
             if let Some(before) = last.filter(|before| before.is_valid() && command.is_valid()) {
-                let step = distance(before.displacement, command.displacement);
+                let step = distance(to_plane(before.displacement[0]), to_plane(command.displacement[0]));
                 let explained = RATE * 1e-9 * elapsed_ns as f64;
                 prop_assert!(step <= explained * (1.0 + 1e-9), "{} in {} ns", step, elapsed_ns);
                 travelled += step;

@@ -43,7 +43,7 @@ fn an_encoder_that_trembles_at_rest_does_not_travel() {
             let sign = if tick % 2 == 0 { 1.0 } else { -1.0 };
             needle.depth += sign * 0.001 * DEPTH;
             if let Some(target) = &mut inputs.target {
-                target.displacement = [0.0, -0.005];
+                target.displacement = [0.0, -0.005, 0.0];
             }
         });
     }

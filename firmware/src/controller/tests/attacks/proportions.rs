@@ -41,18 +41,18 @@ proptest! {
 
 #[test]
 fn no_huge_number_passes_in_a_table() {
-    type Change = fn(&mut Table<f64, 2>, f64);
+    type Change = fn(&mut Table<f64>, f64);
     let changes: [(&str, Change); 17] = [
-        ("rate", |t, x| t.paddle.max_rate = x),
+        ("rate", |t, x| t.paddles[0].max_rate = x),
         ("needle speed", |t, x| t.validity.needle_speed = x),
-        ("paddle range", |t, x| (t.paddle.max_displacement, t.validity.paddle_displacement) = (x, x)),
+        ("paddle range", |t, x| (t.paddles[0].max_displacement, t.validity.paddle_displacement) = (x, x)),
         ("valid range", |t, x| t.validity.paddle_displacement = x),
-        ("segment start", |t, x| t.paddle.segment[0].x = x),
-        ("segment end", |t, x| t.paddle.segment[1].y = -x),
+        ("segment start", |t, x| t.paddles[0].extent[0].x = x),
+        ("segment end", |t, x| t.paddles[0].extent[1].y = -x),
         ("target position", |t, x| t.target_position.y = x),
         ("depth end", |t, x| (t.validity.depth_end, t.knots[10].depth) = (x, x)),
         ("depth start", |t, x| (t.validity.depth_start, t.knots[0].depth) = (-x, -x)),
-        ("Jacobian", |t, x| t.knots[4].jacobian *= x),
+        ("Jacobian", |t, x| t.knots[4].jacobian[0] *= x),
         ("path slope", |t, x| t.knots[0].paddle_path_slope.x = x),
         ("last path slope", |t, x| t.knots[10].paddle_path_slope.y = -x),
         ("target", |t, x| t.knots[5].target_displacement.x = x),
@@ -74,15 +74,15 @@ fn no_huge_number_passes_in_a_table() {
 
 #[test]
 fn proportions_are_refused_at_their_limits() {
-    let refused = |change: fn(&mut Table<f64, 2>)| {
+    let refused = |change: fn(&mut Table<f64>)| {
         let mut table = table();
         change(&mut table);
         table.validate()
     };
     let field = |field| Err(TableError::Implausible { field });
     // 100 crossings per second; the paddle's range is 0.05, the table's depth 0.1.
-    assert_eq!(refused(|t| t.paddle.max_rate = 4.99), Ok(()));
-    assert_eq!(refused(|t| t.paddle.max_rate = 5.01), field(Field::PaddleRateLimit));
+    assert_eq!(refused(|t| t.paddles[0].max_rate = 4.99), Ok(()));
+    assert_eq!(refused(|t| t.paddles[0].max_rate = 5.01), field(Field::PaddleRateLimit));
     assert_eq!(refused(|t| t.validity.needle_speed = 9.99), Ok(()));
     assert_eq!(refused(|t| t.validity.needle_speed = 10.01), field(Field::NeedleSpeedLimit));
     // A slope of 33.75 over an interval of 0.01 lifts the path by 0.05.
@@ -92,21 +92,21 @@ fn proportions_are_refused_at_their_limits() {
     let steep = refused(|t| t.knots[3].target_displacement_slope = Vector2::new(0.0, 3.01));
     assert_eq!(steep, field(Field::TargetDisplacementSlope));
     // ‖J‖ = 0.396.
-    assert_eq!(refused(|t| t.knots[3].jacobian *= 252.0), Ok(()));
-    assert_eq!(refused(|t| t.knots[3].jacobian *= 253.0), field(Field::KnotJacobian));
+    assert_eq!(refused(|t| t.knots[3].jacobian[0] *= 252.0), Ok(()));
+    assert_eq!(refused(|t| t.knots[3].jacobian[0] *= 253.0), field(Field::KnotJacobian));
     // From (0.5, 0.5) to (0.1, 0.4) it is 0.412: ten times that and the depth are 5.12.
     assert_eq!(refused(|t| t.validity.paddle_displacement = 5.12), Ok(()));
     assert_eq!(refused(|t| t.validity.paddle_displacement = 5.13), field(Field::ValidPaddleDisplacement));
     // A depth is a difference: where it is counted from does not matter.
-    let deeper = |t: &mut Table<f64, 2>| {
+    let deeper = |t: &mut Table<f64>| {
         t.knots.iter_mut().for_each(|knot| knot.depth += 1000.0);
         (t.validity.depth_start, t.validity.depth_end) = (1000.0, 1000.1);
         let last = t.knots.len() - 1;
         t.knots[last].depth = 1000.1;
     };
     assert_eq!(refused(deeper), Ok(()));
-    let far = |t: &mut Table<f64, 2>| t.target_position.x = 100.3;
+    let far = |t: &mut Table<f64>| t.target_position.x = 100.3;
     assert_eq!(refused(far), field(Field::DistanceFromPaddleToTarget));
-    let near = |t: &mut Table<f64, 2>| t.paddle.segment = [t.target_position.add_scalar(5e-5); 2];
+    let near = |t: &mut Table<f64>| t.paddles[0].extent = [t.target_position.add_scalar(5e-5); 2];
     assert_eq!(refused(near), field(Field::DepthRange));
 }

@@ -19,7 +19,7 @@ fn poison(inputs: &mut Inputs, stream: usize, by: u32, bad: Option<f64>) {
             target.displacement[0] = bad.unwrap_or(target.displacement[0]);
         }
         _ => {
-            let paddle = inputs.paddle.as_mut().unwrap();
+            let paddle = inputs.paddles[0].as_mut().unwrap();
             paddle.sequence = paddle.sequence.wrapping_add(by);
             paddle.displacement[0] = bad.unwrap_or(paddle.displacement[0]);
         }
@@ -56,7 +56,7 @@ proptest! {
         closed.tick(|inputs| poison(inputs, stream, ahead, Some(bad)));
         let consumed = |state: &State<f64>| {
             let ledger = state.ledger();
-            [ledger.needle.consumed, ledger.target.consumed, ledger.paddle.consumed]
+            [ledger.needle.consumed, ledger.target.consumed, ledger.paddles[0].consumed]
         };
         let before = consumed(&closed.state);
         closed.run(200);

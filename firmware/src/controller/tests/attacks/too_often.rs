@@ -10,7 +10,7 @@ fn a_paddle_that_is_off_in_most_samples_is_found() {
         closed.run(1000);
         let mut tick = 0;
         let found = closed.until_safe(|inputs| {
-            let paddle = inputs.paddle.as_mut().unwrap();
+            let paddle = inputs.paddles[0].as_mut().unwrap();
             if paddle.sequence % of < off {
                 paddle.displacement[1] += 45.0 * FOLLOWING_FRACTION * RANGE;
             }
