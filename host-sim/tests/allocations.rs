@@ -57,11 +57,11 @@ fn allocations(act: impl FnOnce()) -> u64 {
 const MS: u64 = 1_000_000;
 const TICKS: u64 = 2000;
 
-fn samples(tick: u64, paddle: [f64; 2]) -> (NeedleSample, Option<TargetSample>, PaddleSample) {
+fn samples(tick: u64, paddle: [f64; 3]) -> (NeedleSample, Option<TargetSample>, PaddleSample) {
     let (sequence, time_ns) = (tick as u32, tick * MS);
     let depth = 1e-5 * tick as f64;
     let wobble = if (tick / 20).is_multiple_of(2) { 1e-6 } else { -1e-6 };
-    let target = TargetSample { sequence: (tick / 20) as u32, flags: 1, time_ns, displacement: [wobble, 0.0] };
+    let target = TargetSample { sequence: (tick / 20) as u32, flags: 1, time_ns, displacement: [wobble, 0.0, 0.0] };
     (
         NeedleSample { sequence, reserved: 0, time_ns, depth, velocity: 0.01 },
         tick.is_multiple_of(20).then_some(target),
@@ -83,8 +83,9 @@ fn the_step_allocates_nothing() {
     let mut in_run = 0;
     let count = allocations(|| {
         for tick in 0..TICKS {
-            let (needle, target, paddle) = samples(tick, command.displacement);
-            let inputs = Inputs { tick, time_ns: tick * MS, needle: Some(needle), target, paddle: Some(paddle) };
+            let (needle, target, paddle) = samples(tick, command.displacement[0]);
+            let inputs =
+                Inputs { tick, time_ns: tick * MS, needle: Some(needle), target, paddles: [Some(paddle), None] };
             command = controller.step(&mut state, &inputs);
             in_run += u64::from(state.mode() == Mode::Run);
         }
@@ -107,7 +108,7 @@ fn the_loop_allocates_no_more_than_its_transport() {
     let folder = tempfile::tempdir().unwrap();
     let header = RecordingHeader { mode: RunMode::Lockstep, seed: 0, scene_hash: [0; 32], settings, table: Vec::new() };
     let mut recorder = StreamRecorder::create(&folder.path().join("log.rec"), &header).unwrap();
-    let mut displacement = [0.0; 2];
+    let mut displacement = [0.0; 3];
     let (mut reading, mut ticking, mut recording) = (0, 0, 0);
     for tick in 0..TICKS {
         let (needle, target, paddle) = samples(tick, displacement);
@@ -122,7 +123,7 @@ fn the_loop_allocates_no_more_than_its_transport() {
             exchange = ControllerTick { inputs, command };
         });
         recording += allocations(|| recorder.record(&exchange));
-        reading += allocations(|| displacement = plant.command.newest().unwrap().unwrap().displacement);
+        reading += allocations(|| displacement = plant.command.newest().unwrap().unwrap().displacement[0]);
     }
     // iceoryx2 allocates once for each frame that is lent out for sending; a tick sends one command.
     assert!(ticking <= TICKS, "{ticking} allocations in {TICKS} ticks");

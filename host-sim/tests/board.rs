@@ -3,6 +3,7 @@
 mod emulator;
 mod missing;
 
+use firmware::contract::frames::to_plane;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::time::Duration;
@@ -98,10 +99,10 @@ impl<'t> BoardPlant<'t> {
     fn new(table: &'t Table<f64, 2>) -> Self {
         let Validity { depth_end, needle_speed, .. } = table.validity;
         let drive = ShuttleDrive::new(table, depth_end, 0.5 * needle_speed, 1e-3);
-        let actuator = ActuatorModel { max_rate: table.paddle.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
+        let actuator = ActuatorModel { max_rate: table.paddles[0].max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
         // No sensor reads the same number twice.
         let target = TargetSensor::new(20 * MS, 20 * MS, 1e-9, 1);
-        let sensors = Sensors { target, encoders: Encoders::new(table.paddle.index) };
+        let sensors = Sensors { target, encoders: Encoders::new(table.paddles[0].index) };
         let tissue = LinearTissue::new(table);
         let uncontrolled = tissue.error(&tissue.target(depth_end, &Vector2::zeros())).abs();
         Self { world: World::of(tissue, drive, PaddleActuator::new(actuator), sensors), tick: 0, uncontrolled }
@@ -125,7 +126,7 @@ struct BoardRun {
 
 /// Runs the loop for so many ticks; both limits must hold on every command that arrives.
 fn drive(device: &mut Device, plant: &mut BoardPlant<'_>, ticks: u64) -> BoardRun {
-    let paddle = plant.world.tissue.table().paddle.clone();
+    let paddle = plant.world.tissue.table().paddles[0].clone();
     let step = paddle.max_rate * 1e-3;
     let mut run = BoardRun { last: PaddleCommand::default(), lost_ticks: 0, worst_error: 0.0 };
     let mut answered = None;
@@ -138,9 +139,9 @@ fn drive(device: &mut Device, plant: &mut BoardPlant<'_>, ticks: u64) -> BoardRu
             continue;
         };
         let last = run.last;
-        let moved = Vector2::from(command.displacement) - Vector2::from(last.displacement);
+        let moved = Vector2::from(to_plane(command.displacement[0])) - Vector2::from(to_plane(last.displacement[0]));
         let elapsed = command.sequence.wrapping_sub(last.sequence).max(1);
-        assert!(Vector2::from(command.displacement).norm() <= paddle.max_displacement * (1.0 + 1e-12));
+        assert!(Vector2::from(to_plane(command.displacement[0])).norm() <= paddle.max_displacement * (1.0 + 1e-12));
         if last.is_valid() {
             assert!(moved.norm() <= f64::from(elapsed) * step * (1.0 + 1e-9), "{last:?} → {command:?}");
         }
@@ -283,7 +284,7 @@ fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
     device.begin(&bytes, &settings()).unwrap();
     let measured = plant.world.actuator.position();
     let first = (0..10).map(|_| drive(&mut device, &mut plant, 1).last).find(PaddleCommand::is_valid).unwrap();
-    assert_eq!(Vector2::from(first.displacement), measured);
+    assert_eq!(Vector2::from(to_plane(first.displacement[0])), measured);
     assert_eq!(first.state, Mode::Hold as u32);
     assert_eq!(drive(&mut device, &mut plant, 200).last.state, Mode::Run as u32);
 }

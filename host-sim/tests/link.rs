@@ -31,7 +31,7 @@ fn frames_cross_unchanged() {
     assert_eq!(controller.needle(), None, "each frame once");
     assert_eq!(controller.target(), None);
 
-    let command = PaddleCommand { tick: 3, displacement: [1e-9, 2.0], ..PaddleCommand::default() };
+    let command = PaddleCommand { tick: 3, displacement: [[1e-9, 2.0, 0.0], [0.0; 3]], ..PaddleCommand::default() };
     controller.send(&command).unwrap();
     assert_eq!(plant.command.oldest().unwrap(), Some(command));
     end(&space, plant, controller);

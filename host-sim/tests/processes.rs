@@ -60,7 +60,7 @@ fn the_same_seed_gives_the_same_bytes_and_replays() {
     // A command altered under a whole chain is found by the replay.
     let mut forged = Recording::decode(&recordings[0]).unwrap();
     let record = &mut forged.records[300];
-    record.tick.command.displacement[0] += f64::EPSILON;
+    record.tick.command.displacement[0][0] += f64::EPSILON;
     std::fs::write(&path, forged.encode()).unwrap();
     let replayed = host_sim().arg("replay").arg(&path).output().unwrap();
     assert_eq!(replayed.status.code(), Some(1));

@@ -2,6 +2,7 @@
 
 use core::ffi::c_char;
 
+use firmware::contract::frames::{from_plane, to_plane};
 use firmware::{
     Direction, Feedback, Inputs, Mode, NeedleSample, PaddleCommand, PaddleSample, PositionLimit, Settings, Table,
     TargetSample,
@@ -29,7 +30,7 @@ impl From<&StillpointTargetSample> for TargetSample {
             sequence: sample.sequence,
             flags: sample.flags,
             time_ns: sample.time_ns,
-            displacement: sample.displacement_lu,
+            displacement: from_plane(sample.displacement_lu),
         }
     }
 }
@@ -40,7 +41,7 @@ impl From<&StillpointPaddleSample> for PaddleSample {
             sequence: sample.sequence,
             paddle_index: sample.paddle_index,
             time_ns: sample.time_ns,
-            displacement: sample.displacement_lu,
+            displacement: from_plane(sample.displacement_lu),
         }
     }
 }
@@ -59,7 +60,7 @@ impl TryFrom<&StillpointInputs> for Inputs {
             time_ns: inputs.time_ns,
             needle: has(STILLPOINT_NEEDLE_ARRIVED).then(|| (&inputs.needle).into()),
             target: has(STILLPOINT_TARGET_ARRIVED).then(|| (&inputs.target).into()),
-            paddle: has(STILLPOINT_PADDLE_ARRIVED).then(|| (&inputs.paddle).into()),
+            paddles: [has(STILLPOINT_PADDLE_ARRIVED).then(|| (&inputs.paddle).into()), None],
         })
     }
 }
@@ -72,10 +73,10 @@ impl From<&PaddleCommand> for StillpointCommand {
             tick: command.tick,
             time_ns: command.time_ns,
             faults: command.faults,
-            displacement_lu: command.displacement,
+            displacement_lu: to_plane(command.displacement[0]),
             needle_sequence: command.needle_sequence,
             target_sequence: command.target_sequence,
-            paddle_index: command.paddle_index,
+            paddle_index: command.paddle_index[0],
             flags: command.flags,
         }
     }
@@ -115,8 +116,9 @@ impl From<&Settings> for StillpointSettings {
                 Feedback::Harmonic => STILLPOINT_FEEDBACK_HARMONIC,
             },
             direction: match settings.direction {
-                Direction::Inverse => STILLPOINT_DIRECTION_INVERSE,
-                Direction::MinimumNorm => STILLPOINT_DIRECTION_MINIMUM_NORM,
+                // What the plane has when nobody chooses.
+                None | Some(Direction::Inverse) => STILLPOINT_DIRECTION_INVERSE,
+                Some(Direction::MinimumNorm) => STILLPOINT_DIRECTION_MINIMUM_NORM,
             },
             position_limit: match settings.position_limit {
                 PositionLimit::Norm => STILLPOINT_POSITION_LIMIT_NORM,
@@ -152,8 +154,8 @@ impl TryFrom<&StillpointSettings> for Settings {
             loop_gain: chosen(settings.loop_gain),
             lambda_max: chosen(settings.lambda_max),
             direction: match settings.direction {
-                STILLPOINT_DIRECTION_INVERSE => Direction::Inverse,
-                STILLPOINT_DIRECTION_MINIMUM_NORM => Direction::MinimumNorm,
+                STILLPOINT_DIRECTION_INVERSE => Some(Direction::Inverse),
+                STILLPOINT_DIRECTION_MINIMUM_NORM => Some(Direction::MinimumNorm),
                 _ => return Err(unknown),
             },
             position_limit: match settings.position_limit {
@@ -166,8 +168,8 @@ impl TryFrom<&StillpointSettings> for Settings {
     }
 }
 
-impl From<&Table<f64, 2>> for StillpointTable {
-    fn from(table: &Table<f64, 2>) -> Self {
+impl From<&Table<f64>> for StillpointTable {
+    fn from(table: &Table<f64>) -> Self {
         let mut length_unit = [0; 24];
         // A label has 16 bytes at most: the rest is 0.
         for (place, byte) in length_unit.iter_mut().zip(table.units.length.bytes()) {
@@ -176,10 +178,10 @@ impl From<&Table<f64, 2>> for StillpointTable {
         Self {
             scene_hash: table.scene_hash,
             length_unit,
-            paddle_index: table.paddle.index,
+            paddle_index: table.paddles[0].index,
             knots: table.knots.len() as u32,
-            max_displacement_lu: table.paddle.max_displacement,
-            max_rate_lu_per_s: table.paddle.max_rate,
+            max_displacement_lu: table.paddles[0].max_displacement,
+            max_rate_lu_per_s: table.paddles[0].max_rate,
             depth_start_lu: table.validity.depth_start,
             depth_end_lu: table.validity.depth_end,
             needle_speed_lu_per_s: table.validity.needle_speed,

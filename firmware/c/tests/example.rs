@@ -5,7 +5,7 @@ mod toolchain;
 use std::path::Path;
 use std::process::Command;
 
-use firmware::contract::frames::TARGET_VISIBLE;
+use firmware::contract::frames::{TARGET_VISIBLE, from_plane, to_plane};
 use firmware::{Controller, Inputs, Mode, NeedleSample, PaddleCommand, PaddleSample, Settings, State, TargetSample};
 
 /// The tissue of `example/loop.c`, operation by operation.
@@ -26,20 +26,20 @@ impl Tissue {
     fn sense(&mut self, tick: u32) -> Inputs {
         let time_ns = u64::from(tick) * 1_000_000;
         let needle = NeedleSample { sequence: tick, reserved: 0, time_ns, depth: self.depth, velocity: self.speed };
-        let paddle = PaddleSample { sequence: tick, paddle_index: 3, time_ns, displacement: self.paddle };
+        let paddle = PaddleSample { sequence: tick, paddle_index: 3, time_ns, displacement: from_plane(self.paddle) };
         let mut target = None;
         if tick.is_multiple_of(20) {
             let flags = if (2000..2100).contains(&tick) { 0 } else { TARGET_VISIBLE };
-            let seen = TargetSample { sequence: tick / 20, flags, time_ns, displacement: self.target() };
+            let seen = TargetSample { sequence: tick / 20, flags, time_ns, displacement: from_plane(self.target()) };
             target = self.late.replace(seen);
         }
         let needle = (!(3000..3400).contains(&tick)).then_some(needle);
-        Inputs { tick: tick.into(), time_ns, needle, target, paddle: Some(paddle) }
+        Inputs { tick: tick.into(), time_ns, needle, target, paddles: [Some(paddle), None] }
     }
 
     fn act(&mut self, command: &PaddleCommand) {
         if command.is_valid() {
-            self.paddle = command.displacement;
+            self.paddle = to_plane(command.displacement[0]);
         }
         self.depth += self.speed * 1e-3;
         if self.depth >= self.end {
@@ -51,7 +51,7 @@ impl Tissue {
 /// What the example prints with `--bits`, and the modes in it.
 fn expected(table: &[u8]) -> (Vec<String>, Vec<Mode>) {
     const MS: u64 = 1_000_000;
-    let table = firmware::decode::<f64, 2>(table).unwrap();
+    let table = firmware::decode::<f64, 2, 1, 1>(table).unwrap();
     let controller = Controller::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
     let mut state = State::new();
     let end = table.validity.depth_end;
@@ -64,7 +64,7 @@ fn expected(table: &[u8]) -> (Vec<String>, Vec<Mode>) {
             state.rearm();
         }
         tissue.act(&c);
-        let [x, y] = c.displacement.map(f64::to_bits);
+        let [x, y] = to_plane(c.displacement[0]).map(f64::to_bits);
         format!(
             "{} {} {} {} {:x} {x:016x} {y:016x} {} {} {} {}",
             c.sequence,
@@ -74,7 +74,7 @@ fn expected(table: &[u8]) -> (Vec<String>, Vec<Mode>) {
             c.faults,
             c.needle_sequence,
             c.target_sequence,
-            c.paddle_index,
+            c.paddle_index[0],
             c.flags
         )
     };

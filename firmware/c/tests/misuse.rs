@@ -217,7 +217,7 @@ fn settings_are_refused_and_may_be_corrected() {
 fn the_table_says_what_it_is_for() {
     let caller = Caller::configured();
     let facts = caller.facts().unwrap();
-    let known = firmware::decode::<f64, 2>(table()).unwrap();
+    let known = firmware::decode::<f64, 2, 1, 1>(table()).unwrap();
     // SAFETY: ends with 0, as the header says.
     let unit = unsafe { CStr::from_ptr(facts.length_unit.as_ptr()) };
     assert_eq!(unit.to_str().unwrap(), known.units.length.as_str());

@@ -4,7 +4,7 @@
 mod caller;
 
 use caller::{Caller, default_settings, table};
-use firmware::contract::frames::TARGET_VISIBLE;
+use firmware::contract::frames::{TARGET_VISIBLE, from_plane, to_plane};
 use firmware::{
     Controller, Direction, Faults, Feedback, Inputs, NeedleSample, PaddleCommand, PaddleSample, PositionLimit,
     Settings, State, TargetSample,
@@ -35,15 +35,15 @@ impl Run {
         let displacement = [0.30 * x + 0.05 * y + 0.2 * depth + breath, -0.04 * x + 0.25 * y - 0.1 * depth];
         let needle =
             NeedleSample { sequence, reserved: 0, time_ns, depth, velocity: if depth < 0.1 { 0.02 } else { 0.0 } };
-        let target = TargetSample { sequence, flags: TARGET_VISIBLE, time_ns, displacement };
-        let paddle = PaddleSample { sequence, paddle_index: 3, time_ns, displacement: self.paddle };
+        let target = TargetSample { sequence, flags: TARGET_VISIBLE, time_ns, displacement: from_plane(displacement) };
+        let paddle = PaddleSample { sequence, paddle_index: 3, time_ns, displacement: from_plane(self.paddle) };
         let target = tick.is_multiple_of(20).then_some(target);
-        Inputs { tick, time_ns, needle: Some(needle), target, paddle: Some(paddle) }
+        Inputs { tick, time_ns, needle: Some(needle), target, paddles: [Some(paddle), None] }
     }
 
     fn act(&mut self, command: &PaddleCommand) {
         if command.is_valid() {
-            let [x, y] = command.displacement;
+            let [x, y] = to_plane(command.displacement[0]);
             self.paddle = [0.99 * x, 0.99 * y];
         }
         self.tick += 1;
@@ -58,11 +58,12 @@ fn in_c(inputs: &Inputs) -> StillpointInputs {
         given.arrived |= STILLPOINT_NEEDLE_ARRIVED;
     }
     if let Some(TargetSample { sequence, flags, time_ns, displacement }) = inputs.target {
-        given.target = StillpointTargetSample { sequence, flags, time_ns, displacement_lu: displacement };
+        given.target = StillpointTargetSample { sequence, flags, time_ns, displacement_lu: to_plane(displacement) };
         given.arrived |= STILLPOINT_TARGET_ARRIVED;
     }
-    if let Some(PaddleSample { sequence, paddle_index, time_ns, displacement }) = inputs.paddle {
-        given.paddle = StillpointPaddleSample { sequence, paddle_index, time_ns, displacement_lu: displacement };
+    if let Some(PaddleSample { sequence, paddle_index, time_ns, displacement }) = inputs.paddles[0] {
+        given.paddle =
+            StillpointPaddleSample { sequence, paddle_index, time_ns, displacement_lu: to_plane(displacement) };
         given.arrived |= STILLPOINT_PADDLE_ARRIVED;
     }
     given
@@ -70,7 +71,7 @@ fn in_c(inputs: &Inputs) -> StillpointInputs {
 
 /// Displacements and faults of every command; equal in both languages.
 fn commands(settings: &Settings, given: &StillpointSettings) -> Vec<([u64; 2], u64)> {
-    let table = firmware::decode::<f64, 2>(table()).unwrap();
+    let table = firmware::decode::<f64, 2, 1, 1>(table()).unwrap();
     let controller = Controller::new(&table, settings).unwrap();
     let mut state = State::new();
     let mut caller = Caller::new();
@@ -85,7 +86,11 @@ fn commands(settings: &Settings, given: &StillpointSettings) -> Vec<([u64; 2], u
         assert_eq!(status, Status::Ok);
         let StillpointCommand { faults, displacement_lu, mode, flags, .. } = caller.command;
         let bits = displacement_lu.map(f64::to_bits);
-        assert_eq!((bits, faults), (expected.displacement.map(f64::to_bits), expected.faults), "{settings:?}");
+        assert_eq!(
+            (bits, faults),
+            (to_plane(expected.displacement[0]).map(f64::to_bits), expected.faults),
+            "{settings:?}"
+        );
         assert_eq!((mode, flags), (expected.state, expected.flags));
         run.act(&expected);
         (bits, faults)
@@ -142,7 +147,7 @@ fn every_setting_arrives() {
         ),
         (
             "direction",
-            Settings { direction: Direction::MinimumNorm, ..plain },
+            Settings { direction: Some(Direction::MinimumNorm), ..plain },
             StillpointSettings { direction: STILLPOINT_DIRECTION_MINIMUM_NORM, ..given },
         ),
         (

@@ -19,7 +19,8 @@ pub(crate) struct TableBounds<const P: usize = 1> {
 impl<const P: usize> TableBounds<P> {
     #[inline(never)]
     pub(crate) fn of<T: Scalar, const D: usize, const N: usize>(table: &Table<T, D, N, P>) -> Self {
-        let mut bounds = Self { target_displacement: 0.0, target_slope: 0.0, jacobian_norm: [0.0; P], path_lift: [0.0; P] };
+        let mut bounds =
+            Self { target_displacement: 0.0, target_slope: 0.0, jacobian_norm: [0.0; P], path_lift: [0.0; P] };
         let raise = |bound: &mut f64, value: T| *bound = bound.max(value.to_f64());
         for knot in &table.knots {
             raise(&mut bounds.target_displacement, knot.target_displacement.norm());

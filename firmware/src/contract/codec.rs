@@ -107,7 +107,9 @@ impl Header {
 /// # Errors
 /// [`TableError::BufferTooSmall`], or what [`Table::validate`] refuses: an invalid table is never written.
 pub fn encode<T: Scalar, const D: usize, const N: usize, const P: usize>(
-    table: &Table<T, D, N, P>, buffer: &mut [u8]) -> Result<usize, TableError> {
+    table: &Table<T, D, N, P>,
+    buffer: &mut [u8],
+) -> Result<usize, TableError> {
     table.validate()?;
     let too_small = TableError::BufferTooSmall { bytes: buffer.len() };
     let (header, body) = buffer.split_first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
@@ -132,7 +134,9 @@ pub fn encode<T: Scalar, const D: usize, const N: usize, const P: usize>(
 ///
 /// # Errors
 /// The first check that fails, as its own [`TableError`].
-pub fn decode<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: &[u8]) -> Result<Table<T, D, N, P>, TableError> {
+pub fn decode<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    bytes: &[u8],
+) -> Result<Table<T, D, N, P>, TableError> {
     let mut table = Table::empty();
     fill(bytes, &mut table, Labels::Keep)?;
     Ok(table)
@@ -144,7 +148,10 @@ pub fn decode<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: 
 ///
 /// # Errors
 /// As [`decode`].
-pub fn decode_into<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: &[u8], table: &mut Table<T, D, N, P>) -> Result<(), TableError> {
+pub fn decode_into<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    bytes: &[u8],
+    table: &mut Table<T, D, N, P>,
+) -> Result<(), TableError> {
     fill_again(bytes, table, Labels::Skip)
 }
 
@@ -175,7 +182,11 @@ enum Labels {
     Skip,
 }
 
-fn fill<T: Scalar, const D: usize, const N: usize, const P: usize>(bytes: &[u8], table: &mut Table<T, D, N, P>, labels: Labels) -> Result<(), TableError> {
+fn fill<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    bytes: &[u8],
+    table: &mut Table<T, D, N, P>,
+    labels: Labels,
+) -> Result<(), TableError> {
     let (header, payload) = split(bytes)?;
     if header.scalar != T::KIND {
         return Err(TableError::ScalarKind { found: header.scalar, expected: T::KIND });

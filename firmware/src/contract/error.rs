@@ -210,7 +210,10 @@ impl fmt::Display for TableError {
             Self::NotPositive { field } => write!(f, "{field} must be positive: correct the scene"),
             Self::NotUnit { field } => write!(f, "{field} is not a unit vector: normalise it before writing"),
             Self::NotOrthogonal => {
-                write!(f, "orthogonal directions and needle axis are not orthogonal to each other: project before writing")
+                write!(
+                    f,
+                    "orthogonal directions and needle axis are not orthogonal to each other: project before writing"
+                )
             }
             Self::TooFewKnots { found } => {
                 write!(f, "{found} knots in depth, at least 2 are needed")

@@ -24,5 +24,5 @@ pub use field::Field;
 pub use format::MAX_TABLE_BYTES;
 pub use frames::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 pub use table::{Gains, Knot, MAX_KNOTS, Paddle, PlanarTable, SpatialTable, Table, Units, Validity};
-pub use validate::{CONDITION_LIMIT, condition_number};
 pub(crate) use validate::relative_weights;
+pub use validate::{CONDITION_LIMIT, condition_number};

@@ -55,7 +55,8 @@ fn joint_condition_number<T: Scalar, const D: usize, const P: usize>(
 
 /// What a motion of each paddle may cost: the squares of their limits, over that of the largest.
 pub(crate) fn relative_weights<T: Scalar, const P: usize>(max_displacements: &[T; P]) -> [T; P] {
-    let largest = max_displacements.iter().fold(T::zero(), |largest, limit| if *limit > largest { *limit } else { largest });
+    let largest =
+        max_displacements.iter().fold(T::zero(), |largest, limit| if *limit > largest { *limit } else { largest });
     max_displacements.map(|limit| {
         let ratio = limit / largest;
         ratio * ratio

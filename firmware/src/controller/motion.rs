@@ -34,13 +34,7 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'_, T
     }
 
     /// Feed-forward plus feedback, within the limits of each paddle.
-    pub(super) fn move_paddles(
-        &self,
-        state: &mut State<T, D, N, P>,
-        tick: &Tick<D>,
-        depth: T,
-        faults: &mut Faults,
-    ) {
+    pub(super) fn move_paddles(&self, state: &mut State<T, D, N, P>, tick: &Tick<D>, depth: T, faults: &mut Faults) {
         let runtime = &self.runtime;
         let (Some(previous), Some(needle)) = (state.displacement(), state.needle.accepted) else {
             return;
@@ -108,7 +102,8 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'_, T
 
     /// Remembers where needle and paddles are once the command of this tick has acted.
     pub(super) fn remember(&self, state: &mut State<T, D, N, P>, time_ns: u64, depth: T) {
-        if let (Feedback::Observer | Feedback::Harmonic, Some(paddles)) = (self.runtime.feedback, state.displacement()) {
+        if let (Feedback::Observer | Feedback::Harmonic, Some(paddles)) = (self.runtime.feedback, state.displacement())
+        {
             let time_ns = time_ns.saturating_add(self.runtime.actuator_delay_ns);
             state.history.record(self.runtime.history_ns / INTERVALS, Moment { time_ns, depth, paddles });
         }

@@ -81,10 +81,10 @@ impl Plant {
             target: if arrived { self.pending.pop_front() } else { None },
             paddles: [
                 Some(PaddleSample {
-                sequence: self.sequence,
-                paddle_index: self.paddle_index,
-                time_ns,
-                displacement: from_plane(self.paddle.into()),
+                    sequence: self.sequence,
+                    paddle_index: self.paddle_index,
+                    time_ns,
+                    displacement: from_plane(self.paddle.into()),
                 }),
                 None,
             ],

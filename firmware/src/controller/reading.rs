@@ -30,7 +30,13 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'_, T
         inputs.target.as_ref().and_then(|sample| self.read_target(state, &checks, sample, faults))
     }
 
-    fn read_needle(&self, state: &mut State<T, D, N, P>, checks: &Checks<'_, T, P>, sample: &NeedleSample, faults: &mut Faults) {
+    fn read_needle(
+        &self,
+        state: &mut State<T, D, N, P>,
+        checks: &Checks<'_, T, P>,
+        sample: &NeedleSample,
+        faults: &mut Faults,
+    ) {
         let (sample, previous) = (Measurement::from(sample), state.needle.accepted.as_ref());
         let checked = checks.needle(&sample, previous, &state.needle_monitor);
         let travelled = previous.map_or(0.0, |previous| (sample.values[0] - previous.values[0]).abs());
@@ -131,8 +137,7 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'_, T
         *faults |= since.faults(&state.needle, runtime.needle_age, Faults::NEEDLE_STALE, Faults::NEEDLE_DEAD);
         *faults |= since.faults(&state.target, runtime.target_age, Faults::TARGET_STALE, Faults::TARGET_DEAD);
         for (place, paddle) in state.paddles.iter().enumerate() {
-            let mut found =
-                since.faults(&paddle.stream, runtime.paddle_age, Faults::PADDLE_STALE, Faults::PADDLE_DEAD);
+            let mut found = since.faults(&paddle.stream, runtime.paddle_age, Faults::PADDLE_STALE, Faults::PADDLE_DEAD);
             found.set_if(Faults::WAITING, paddle.displacement.is_none());
             *faults |= found;
             faults.set_if(Faults::SECOND_PADDLE, place > 0 && !found.is_empty());

@@ -16,6 +16,7 @@ mod attacks;
 mod bits;
 mod control;
 mod faults;
+mod space;
 
 fn settings() -> Settings {
     Settings::new(MS, 20 * MS, 20 * MS)

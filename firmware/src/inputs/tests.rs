@@ -165,7 +165,8 @@ fn times_are_after_the_last_one_and_at_most_a_period_ahead() {
     let table = table();
     let runtime = Runtime::new(&table, &Settings::new(MS, 20 * MS, 20 * MS)).unwrap();
     let checks = checks_of(&runtime);
-    let paddle = |time_ns, previous: Option<&Measurement>| checks.paddle(&runtime.paddles[0], &at(time_ns, [0.0; 2]), previous);
+    let paddle =
+        |time_ns, previous: Option<&Measurement>| checks.paddle(&runtime.paddles[0], &at(time_ns, [0.0; 2]), previous);
     assert_eq!(paddle(1001 * MS, None), Ok(()));
     assert_eq!(paddle(1001 * MS + 1, None), Err(Discard::Time));
     let previous = at(990 * MS, [0.0; 2]);

@@ -207,7 +207,6 @@ impl<T: Scalar, const P: usize> Runtime<T, P> {
     pub(crate) fn depth_range(&self) -> f64 {
         self.table_depth.1 - self.table_depth.0
     }
-
 }
 
 #[cfg(test)]

@@ -155,7 +155,7 @@ impl Examined<'_> {
             noise: (simulation.loop_settings.noise_for(simulation.depth).powi(2) + rounding).sqrt(),
         };
         // The paddle is attached and holds already where it does not move.
-        let held = AttachedPaddle::Held(table.paddle.index);
+        let held = AttachedPaddle::Held(table.paddles[0].index);
         let alone = self.inserted(&[], knowing, |insertion, _| insertion.moments(held))?;
         let pushed: Vec<f64> = alone.iter().map(|moment| moment.error).collect();
         let times_alone: Vec<f64> = alone.iter().map(|moment| moment.since_start_s).collect();
@@ -171,21 +171,21 @@ impl Examined<'_> {
     fn fastest(&self) -> f64 {
         let Self { table, simulation, .. } = self;
         let normal = self.model.scene().needle.orthogonal();
-        let across = |knot: &Knot<f64, 2>| knot.jacobian.tr_mul(&normal);
+        let across = |knot: &Knot<f64, 2>| knot.jacobian[0].tr_mul(&normal);
         let effect = table.knots.iter().map(|knot| across(knot).norm()).fold(0.0, f64::max);
         let per_depth = table.knots.windows(2).map(|pair| {
             let [shallow, deep] = [&pair[0], &pair[1]];
             (across(deep) - across(shallow)).norm() / (deep.depth - shallow.depth)
         });
         let change = per_depth.fold(0.0, f64::max);
-        let farthest = (simulation.actuator.max_rate * simulation.duration_s).min(table.paddle.max_displacement);
+        let farthest = (simulation.actuator.max_rate * simulation.duration_s).min(table.paddles[0].max_displacement);
         effect * simulation.actuator.max_rate + change * simulation.needle_speed() * farthest
     }
 
     /// A table of the simulated scene for the same paddle; none where the controller has it already.
     fn table_that_knows(&self) -> Result<Option<Table<f64, 2>>, SimError> {
         let options = TableOptions { needle_speed: self.simulation.needle_speed(), ..TableOptions::default() };
-        let table = build(self.model, self.table.paddle.index, &options)?;
+        let table = build(self.model, self.table.paddles[0].index, &options)?;
         Ok((table.knots != self.table.knots).then_some(table))
     }
 

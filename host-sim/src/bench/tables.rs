@@ -109,7 +109,7 @@ fn insert<T: Scalar>(
     // The controller expects a camera's noise, and gets next to none: what is left is the table's error.
     let noise = Some(NOISE * simulation.depth);
     let quiet = Simulation { loop_settings: LoopSettings { noise, ..simulation.loop_settings }, ..simulation.clone() };
-    let mut world = World::simulated(plant, table.paddle.index, &quiet);
+    let mut world = World::simulated(plant, table.paddles[0].index, &quiet);
     let normal = Vector2::new(table.orthogonal[0].to_f64(), table.orthogonal[1].to_f64());
     let (mut largest, mut seen) = (0.0_f64, Vec::with_capacity(simulation.ticks() as usize));
     let mut command: Option<PaddleCommand> = None;

@@ -40,11 +40,11 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
     check_outputs(&inputs, &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
     let Salvaged { recording, damage } =
         if args.salvage { Recording::salvage(&args.recording)? } else { Recording::read(&args.recording)?.into() };
-    let table = firmware::contract::decode::<f64, 2>(&recording.header.table)
+    let table = firmware::contract::decode::<f64, 2, 1, 1>(&recording.header.table)
         .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
     let mut said: Vec<String> = damage.map(|damage| format!("damaged: {damage}")).into_iter().collect();
     if let Some(path) = &args.mcap {
-        let stage = args.scene.as_deref().map(|scene| stage(scene, &recording, table.paddle.index)).transpose()?;
+        let stage = args.scene.as_deref().map(|scene| stage(scene, &recording, table.paddles[0].index)).transpose()?;
         let known = mcap::Known { stage: stage.as_ref(), ..mcap::Known::default() };
         let bytes = mcap::encode(&recording, table.orthogonal.into(), known)?;
         said.push(written(path, &bytes)?);

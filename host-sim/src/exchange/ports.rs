@@ -207,7 +207,11 @@ impl<S: Service> SampleSource for ControllerPorts<S> {
         self.keep(outcome)
     }
 
-    fn paddle(&mut self) -> Option<PaddleSample> {
+    /// One paddle so far: nothing is ever heard of a second one.
+    fn paddle(&mut self, place: usize) -> Option<PaddleSample> {
+        if place > 0 {
+            return None;
+        }
         let outcome = self.paddle.newest();
         self.keep(outcome)
     }

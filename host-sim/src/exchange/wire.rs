@@ -20,7 +20,7 @@ mod sealed {
 }
 
 // The names below carry the layout version: a new layout needs new names.
-const _: () = assert!(LAYOUT_VERSION == 1);
+const _: () = assert!(LAYOUT_VERSION == 2);
 
 macro_rules! frames {
     ($($frame:ty: $service:literal, $type_name:literal;)*) => {
@@ -35,11 +35,11 @@ macro_rules! frames {
 }
 
 frames! {
-    NeedleSample: "needle", "stillpoint.NeedleSample.v1";
-    TargetSample: "target", "stillpoint.TargetSample.v1";
-    PaddleSample: "paddle", "stillpoint.PaddleSample.v1";
-    PaddleCommand: "command", "stillpoint.PaddleCommand.v1";
-    ClockFrame: "clock", "stillpoint.ClockFrame.v1";
+    NeedleSample: "needle", "stillpoint.NeedleSample.v2";
+    TargetSample: "target", "stillpoint.TargetSample.v2";
+    PaddleSample: "paddle", "stillpoint.PaddleSample.v2";
+    PaddleCommand: "command", "stillpoint.PaddleCommand.v2";
+    ClockFrame: "clock", "stillpoint.ClockFrame.v2";
 }
 
 /// What a clock frame says.

@@ -1,5 +1,6 @@
 //! In what two commands differ.
 
+use firmware::contract::frames::MAX_DIMENSION;
 use std::fmt;
 
 use firmware::contract::PaddleCommand;
@@ -18,7 +19,9 @@ pub enum Difference {
     },
     /// A component of the displacement.
     Displacement {
-        /// Axis, 0 or 1.
+        /// Place of the paddle, 0 or 1.
+        paddle: usize,
+        /// Axis, 0 to 2.
         axis: usize,
         /// Recorded, length.
         was: f64,
@@ -31,9 +34,10 @@ impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
             Self::Integer { field, was, is } => write!(f, "{field} was {was}, is {is}"),
-            Self::Displacement { axis, was, is } => {
-                let axis = if axis == 0 { "x" } else { "y" };
-                write!(f, "displacement {axis} was {was:?}, is {is:?}")
+            Self::Displacement { paddle, axis, was, is } => {
+                let axis = ["x", "y", "z"].get(axis).unwrap_or(&"?");
+                let paddle = if paddle == 0 { "" } else { " of the second paddle" };
+                write!(f, "displacement {axis}{paddle} was {was:?}, is {is:?}")
             }
         }
     }
@@ -49,8 +53,17 @@ pub fn difference(recorded: &PaddleCommand, again: &PaddleCommand) -> Option<Dif
             })*
         };
     }
-    compare!(sequence, state, tick, time_ns, faults, needle_sequence, target_sequence, paddle_index, flags);
-    let pairs = recorded.displacement.into_iter().zip(again.displacement).enumerate();
+    compare!(sequence, state, tick, time_ns, faults, needle_sequence, target_sequence, flags);
+    if let Some((was, is)) = recorded.paddle_index.into_iter().zip(again.paddle_index).find(|(was, is)| was != is) {
+        return Some(Difference::Integer { field: "paddle_index", was: was.into(), is: is.into() });
+    }
+    let recorded = recorded.displacement.into_iter().flatten();
+    let pairs = recorded.zip(again.displacement.into_iter().flatten()).enumerate();
     let differs = |(_, (was, is)): &(usize, (f64, f64))| was.to_bits() != is.to_bits();
-    pairs.into_iter().find(differs).map(|(axis, (was, is))| Difference::Displacement { axis, was, is })
+    pairs.into_iter().find(differs).map(|(place, (was, is))| Difference::Displacement {
+        paddle: place / MAX_DIMENSION,
+        axis: place % MAX_DIMENSION,
+        was,
+        is,
+    })
 }

@@ -10,10 +10,10 @@
 //! | 8 | seed |
 //! | 32 | SHA-256 of the plant's scene |
 //! | 32 | SHA-256 of the table's bytes |
-//! | 100 | settings of the controller, see [`RecordingHeader`]; 96 in version 1, whose feedback is the integral |
+//! | 100 | settings of the controller, see [`RecordingHeader`] |
 //! | 4 + L | length of the table, and the table itself |
 //! | 32 | chain value h₀ = SHA-256 of everything above |
-//! | n · 288 | records: 256 bytes b, and hᵢ = SHA-256(hᵢ₋₁ ‖ b) |
+//! | n · 416 | records: 384 bytes b, and hᵢ = SHA-256(hᵢ₋₁ ‖ b) |
 //!
 //! The last record is an end mark with the number of ticks: nothing can be changed, dropped, exchanged or cut off
 //! without breaking the chain. Times of a lockstep recording come from its messages: no clock of the machine is in it.
@@ -36,10 +36,10 @@ pub mod stream;
 use layout::{decode_header, decode_record, encode_header, encode_record};
 
 const MAGIC: [u8; 8] = *b"STILLREC";
-const FORMAT_VERSION: u32 = 2;
-/// Before there was a choice of feedback: the integral.
-const FIRST_VERSION: u32 = 1;
-const BODY_BYTES: usize = 256;
+/// Versions 1 and 2 had frames of two components and one paddle, and hold tables that are refused: replay needs a run of its
+/// own build.
+const FORMAT_VERSION: u32 = 3;
+const BODY_BYTES: usize = 384;
 const HASH_BYTES: usize = 32;
 const RECORD_BYTES: usize = BODY_BYTES + HASH_BYTES;
 const END_MARK: u32 = u32::from_le_bytes(*b"END.");

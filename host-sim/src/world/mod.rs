@@ -16,6 +16,7 @@ pub mod simulation;
 pub mod tissue;
 pub mod truth;
 
+use firmware::contract::frames::to_plane;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::{Inputs, Mode};
 use model_offline::model::TissueModel;
@@ -159,7 +160,7 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
         let truth = self.advance(tick, time_ns)?;
         let (needle, paddle) = self.encoders(time_ns);
         let target = self.target_samples(&truth).last();
-        Ok((truth, Inputs { tick, time_ns, needle: Some(needle), target, paddle: Some(paddle) }))
+        Ok((truth, Inputs { tick, time_ns, needle: Some(needle), target, paddles: [Some(paddle), None] }))
     }
 
     /// Time goes on under `command`, if there is one. The first RUN starts the needle.
@@ -167,7 +168,9 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
         if command.is_some_and(|command| command.state == Mode::Run as u32) {
             self.start_needle(time_ns);
         }
-        let goal = command.filter(|command| command.is_valid()).map(|command| Vector2::from(command.displacement));
+        let goal = command
+            .filter(|command| command.is_valid())
+            .map(|command| Vector2::from(to_plane(command.displacement[0])));
         self.actuator.advance(goal, elapsed_ns as f64 * 1e-9);
     }
 

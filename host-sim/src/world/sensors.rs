@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 
-use firmware::contract::frames::TARGET_VISIBLE;
+use firmware::contract::frames::{TARGET_VISIBLE, from_plane};
 use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
 use model_offline::scene::{Outages, Sensor};
 use nalgebra::Vector2;
@@ -78,7 +78,7 @@ impl TargetSensor {
             sequence: self.sequence,
             flags: if sees { TARGET_VISIBLE } else { 0 },
             time_ns,
-            displacement: measured.into(),
+            displacement: from_plane(measured.into()),
         });
         self.sequence = self.sequence.wrapping_add(1);
     }
@@ -154,8 +154,12 @@ impl Encoders {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         let needle = NeedleSample { sequence, reserved: 0, time_ns, depth: needle.depth, velocity: needle.velocity };
-        let paddle =
-            PaddleSample { sequence, paddle_index: self.paddle_index, time_ns, displacement: (*paddle).into() };
+        let paddle = PaddleSample {
+            sequence,
+            paddle_index: self.paddle_index,
+            time_ns,
+            displacement: from_plane((*paddle).into()),
+        };
         (needle, paddle)
     }
 }
@@ -188,7 +192,7 @@ mod tests {
             assert_eq!(sample.sequence as usize, i);
             assert_eq!(sample.time_ns, 7 + 20 * MS * i as u64);
             assert_eq!(*time_ns, sample.time_ns + 25 * MS);
-            assert_eq!(sample.displacement, [20.0 * i as f64, 0.0]);
+            assert_eq!(sample.displacement, [20.0 * i as f64, 0.0, 0.0]);
         }
     }
 
@@ -205,7 +209,7 @@ mod tests {
         let mut sensor = TargetSensor::new(1, 0, 0.0, 1).with_defects_of(&defects, 1);
         sensor.measure(0, &Vector2::new(0.3, 0.3));
         let sample = sensor.arrived(0).unwrap();
-        assert_eq!(sample.displacement, [0.5, -0.75], "0.4 and −0.7 in steps of a quarter");
+        assert_eq!(sample.displacement, [0.5, -0.75, 0.0], "0.4 and −0.7 in steps of a quarter");
         assert!(sample.is_visible());
     }
 

@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 /// [`TableError`] says which check refused it.
 pub fn read(bytes: &[u8]) -> Result<Table<f64, 2>, TableError> {
     match Header::read(bytes)?.scalar {
-        ScalarKind::F32 => Ok(decode::<f32, 2>(bytes)?.cast()),
-        ScalarKind::F64 => decode::<f64, 2>(bytes),
+        ScalarKind::F32 => Ok(decode::<f32, 2, 1, 1>(bytes)?.cast()),
+        ScalarKind::F64 => decode::<f64, 2, 1, 1>(bytes),
     }
 }
 
@@ -29,21 +29,21 @@ pub fn summary(table: &Table<f64, 2>) -> String {
         "paddle {} · {} tissue · {} knots, depth {:.4} to {:.4}\nscene {}\n\
          limits: displacement {:.4}, rate {:.4} per s, needle speed {:.4} per s; loop gain {:.4} (delay {} samples, model error {:.2})\n\n\
             depth   paddle path            J⁻¹n norm   axial target  static orthogonal\n",
-        table.paddle.index,
+        table.paddles[0].index,
         table.tissue,
         table.knots.len(),
         table.validity.depth_start,
         table.validity.depth_end,
         hex(&table.scene_hash),
-        table.paddle.max_displacement,
-        table.paddle.max_rate,
+        table.paddles[0].max_displacement,
+        table.paddles[0].max_rate,
         table.validity.needle_speed,
         table.gains.loop_gain,
         table.gains.delay_samples,
         table.gains.lambda_max,
     );
     for knot in &table.knots {
-        let measure = knot.jacobian.try_inverse().map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
+        let measure = knot.jacobian[0].try_inverse().map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
         let _ = writeln!(
             out,
             "{:8.4}  ({:9.6}, {:9.6})  {:9.4}  {:12.6}  {:16.6}",
@@ -66,10 +66,10 @@ pub fn json(table: &Table<f64, 2>) -> serde_json::Value {
         "tissue": table.tissue.as_str(),
         "units": {"length": table.units.length.as_str(), "stress": table.units.stress.as_str()},
         "paddle": {
-            "index": table.paddle.index,
-            "segment": [v(&table.paddle.segment[0]), v(&table.paddle.segment[1])],
-            "max_displacement": table.paddle.max_displacement,
-            "max_rate": table.paddle.max_rate,
+            "index": table.paddles[0].index,
+            "segment": [v(&table.paddles[0].extent[0]), v(&table.paddles[0].extent[1])],
+            "max_displacement": table.paddles[0].max_displacement,
+            "max_rate": table.paddles[0].max_rate,
         },
         "needle_axis": v(&table.needle_axis),
         "orthogonal": v(&table.orthogonal),
@@ -86,7 +86,7 @@ pub fn json(table: &Table<f64, 2>) -> serde_json::Value {
         },
         "knots": table.knots.iter().map(|k| serde_json::json!({
             "depth": k.depth,
-            "jacobian": crate::placement::controllability::rows(&k.jacobian),
+            "jacobian": crate::placement::controllability::rows(&k.jacobian[0]),
             "paddle_path": v(&k.paddle_path),
             "paddle_path_slope": v(&k.paddle_path_slope),
             "target_displacement": v(&k.target_displacement),

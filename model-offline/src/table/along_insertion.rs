@@ -48,7 +48,7 @@ pub(super) fn knots(
             let jacobian = steered.actuation_jacobian()?;
             Ok::<_, TableBuildError>(Knot {
                 depth: steered.pose().depth,
-                jacobian,
+                jacobian: [jacobian],
                 paddle_path: steered.pose().paddle,
                 paddle_path_slope: Vector2::zeros(),
                 target_displacement: steered.target_displacement(),

@@ -27,7 +27,7 @@ pub(super) fn largest_amplification(
         let Ok(jacobian) = body.drive(knot.depth, knot.paddle_path).and_then(|()| body.actuation_jacobian()) else {
             break;
         };
-        let Some(believed) = knot.jacobian.try_inverse() else { break };
+        let Some(believed) = knot.jacobian[0].try_inverse() else { break };
         let values = (jacobian * believed).complex_eigenvalues();
         largest = values.iter().fold(largest, |m, value| m.max(value.norm()));
     }

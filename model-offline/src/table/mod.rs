@@ -120,12 +120,12 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
         scene_hash: scene.hash(),
         units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
         tissue: label(scene.tissue().name())?,
-        paddle: Paddle {
+        paddles: [Paddle {
             index: paddle_index,
-            segment: scene.paddles[position].segment,
+            extent: scene.paddles[position].segment,
             max_displacement: scene.actuator.max_displacement,
             max_rate: scene.actuator.max_rate,
-        },
+        }],
         needle_axis: scene.needle.axis,
         orthogonal: scene.needle.orthogonal(),
         target_position: scene.target,
@@ -148,7 +148,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
 
 /// Refuses a knot that no controller can work with.
 fn check(knot: &Knot<f64, 2>, paddle: u32, available: f64) -> Result<(), TableBuildError> {
-    let Knot { depth, jacobian, paddle_path, .. } = knot;
+    let Knot { depth, jacobian: [jacobian], paddle_path, .. } = knot;
     let condition = condition_number(jacobian);
     if condition > CONDITION_LIMIT {
         return Err(TableBuildError::IllConditioned { paddle, depth: *depth, condition });
@@ -221,7 +221,7 @@ fn knot(
     let slope = path_slope(direction, sensitivity, normal);
     Ok(Knot {
         depth,
-        jacobian,
+        jacobian: [jacobian],
         paddle_path: steered.paddle(),
         paddle_path_slope: slope,
         target_displacement: steered.target_displacement(),

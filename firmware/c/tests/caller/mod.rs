@@ -24,14 +24,14 @@ fn encoded<T: firmware::Scalar>(table: &Table<T, 2>) -> Vec<u8> {
 
 /// The same in single precision.
 pub(crate) fn table_in_f32() -> Vec<u8> {
-    encoded(&firmware::decode::<f64, 2>(table()).unwrap().cast::<f32>())
+    encoded(&firmware::decode::<f64, 2, 1, 1>(table()).unwrap().cast::<f32>())
 }
 
 /// Intact, with a Jacobian of zeros: no writer of tables would let it pass.
 pub(crate) fn singular_table() -> Vec<u8> {
-    let good = firmware::decode::<f64, 2>(table()).unwrap();
+    let good = firmware::decode::<f64, 2, 1, 1>(table()).unwrap();
     let mut bytes = encoded(&good);
-    let first: Vec<u8> = good.knots[0].jacobian.iter().flat_map(|number| number.to_le_bytes()).collect();
+    let first: Vec<u8> = good.knots[0].jacobian[0].iter().flat_map(|number| number.to_le_bytes()).collect();
     let place = bytes.windows(first.len()).position(|window| window == first).unwrap();
     bytes[place..place + first.len()].fill(0);
     let content = bytes.len() - 4;

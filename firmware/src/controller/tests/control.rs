@@ -172,7 +172,8 @@ fn a_command_is_the_path_ahead_of_the_needle_and_the_feedback() {
         let command = closed.tick(|inputs| inputs.needle = None);
         assert!(!closed.state.faults().contains(Faults::RATE_LIMITED));
         let ahead = depth + velocity * 1e-3 * f64::from(silence + 3);
-        let expected = table.knots[0].paddle_path_slope * ahead + Vector2::from(to_plane(closed.state.added().unwrap()[0]));
+        let expected =
+            table.knots[0].paddle_path_slope * ahead + Vector2::from(to_plane(closed.state.added().unwrap()[0]));
         let off = (Vector2::from(to_plane(command.displacement[0])) - expected).norm();
         assert!(off < 1e-15, "{silence} ticks after the last sample: {off}");
     }
@@ -270,7 +271,8 @@ fn single_precision_follows_double() {
         let command = closed.tick(|inputs| seen = *inputs);
         let other = single.step(&mut state, &seen);
         assert_eq!(other.state, command.state);
-        let distance = Vector2::from(to_plane(other.displacement[0])) - Vector2::from(to_plane(command.displacement[0]));
+        let distance =
+            Vector2::from(to_plane(other.displacement[0])) - Vector2::from(to_plane(command.displacement[0]));
         assert!(distance.norm() < 1e-6);
     }
 }

@@ -160,7 +160,8 @@ pub struct Scenario {
 /// # Errors
 /// [`MeasureError::TooShort`], or [`MeasureError::RecordedTable`] for another scalar than `f64`.
 pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, MeasureError> {
-    let table = firmware::contract::decode::<f64, 2>(&recording.header.table).map_err(MeasureError::RecordedTable)?;
+    let table =
+        firmware::contract::decode::<f64, 2, 1, 1>(&recording.header.table).map_err(MeasureError::RecordedTable)?;
     let settings = recording.header.settings;
     let recorded: Vec<Inputs> = recording.records.iter().map(|record| record.tick.inputs).collect();
     if recorded.len() < 2 * SCENARIO_TICKS {
@@ -175,8 +176,8 @@ pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, MeasureError> {
     };
     let mut slow = vary("paddle too slow and too weak", &|_, _| {});
     let longest = slow.table.knots.iter().map(|knot| knot.paddle_path.norm()).fold(0.0, f64::max);
-    slow.table.paddle.max_displacement = longest * (1.0 + 1e-9);
-    slow.table.paddle.max_rate *= 0.01;
+    slow.table.paddles[0].max_displacement = longest * (1.0 + 1e-9);
+    slow.table.paddles[0].max_rate *= 0.01;
     // The recorded paddle is faster than that: it would be a fault of its own.
     slow.settings.following_error = Some(1e3 * longest);
     Ok(vec![
@@ -187,7 +188,7 @@ pub fn scenarios(recording: &Recording) -> Result<Vec<Scenario>, MeasureError> {
             }
         }),
         vary("wrong paddle attached", &|i, tick| {
-            if let (true, Some(paddle)) = (i >= 100, &mut tick.paddle) {
+            if let (true, Some(paddle)) = (i >= 100, &mut tick.paddles[0]) {
                 paddle.paddle_index += 1;
             }
         }),

@@ -444,7 +444,7 @@ impl<'p> Comparison<'p> {
             table: TableResult {
                 hash: hex(&Sha256::digest(bytes)),
                 scene_hash: hex(&table.scene_hash),
-                paddle: table.paddle.index,
+                paddle: table.paddles[0].index,
                 knots: table.knots.len(),
                 bytes: bytes.len(),
                 loop_gain: controller.loop_gain(),

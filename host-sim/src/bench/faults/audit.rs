@@ -183,7 +183,7 @@ impl Audit {
     /// Everything that is not in both accounts: the controller's and this one.
     pub fn unaccounted(&self, state: &State<f64>) -> u64 {
         let ledger = state.ledger();
-        let ledgers = [&ledger.needle, &ledger.target, &ledger.paddle];
+        let ledgers = [&ledger.needle, &ledger.target, &ledger.paddles[0]];
         let samples: u64 = self.streams.iter().zip(ledgers).map(|(audit, ledger)| audit.unaccounted(ledger)).sum();
         let ticks = &ledger.ticks;
         let [hold, run, safe] = self.modes;

@@ -3,6 +3,7 @@
 //! The plant ticks every period. The controller follows its own [`Schedule`] in the same virtual time, so that a slow
 //! step makes it skip periods while the plant goes on.
 
+use firmware::contract::frames::to_plane;
 use std::collections::VecDeque;
 
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
@@ -65,7 +66,7 @@ impl Setup {
             noise,
             speed: depth / 5.0,
             depth_end: depth,
-            actuator: ActuatorModel { max_rate: table.paddle.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 },
+            actuator: ActuatorModel { max_rate: table.paddles[0].max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 },
             sequence: 0,
             shuttles: false,
             paddle: [0.0; 2],
@@ -86,7 +87,7 @@ impl Setup {
         let (period_ns, latency_ns) = (settings.target_period_ns, settings.target_latency_ns);
         let sensors = Sensors {
             target: TargetSensor::new(period_ns, latency_ns, self.noise, self.seed),
-            encoders: Encoders::new(table.paddle.index).starting_at(self.sequence),
+            encoders: Encoders::new(table.paddles[0].index).starting_at(self.sequence),
         };
         World::of(LinearTissue::new(table), drive, actuator, sensors)
     }
@@ -108,8 +109,8 @@ impl SampleSource for BenchLink {
     fn target(&mut self) -> Option<TargetSample> {
         self.target.take()
     }
-    fn paddle(&mut self) -> Option<PaddleSample> {
-        self.paddle.take()
+    fn paddle(&mut self, place: usize) -> Option<PaddleSample> {
+        if place == 0 { self.paddle.take() } else { None }
     }
 }
 
@@ -309,7 +310,8 @@ impl<'t> ClosedLoop<'t> {
         }
         self.world.actuator.set_gain(actuator.gain);
         if !stuck {
-            let goal = command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(command.displacement));
+            let goal =
+                command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(to_plane(command.displacement[0])));
             self.world.actuator.advance(goal, period_s);
         }
         self.world.drive.hurry = speed;
@@ -371,7 +373,7 @@ impl<'t> ClosedLoop<'t> {
         for (stream, sequence) in Stream::ALL.into_iter().zip([
             inputs.needle.map(|sample| sample.sequence),
             inputs.target.map(|sample| sample.sequence),
-            inputs.paddle.map(|sample| sample.sequence),
+            inputs.paddles[0].map(|sample| sample.sequence),
         ]) {
             if let Some(sequence) = sequence {
                 self.audit.stream(stream).read(sequence, accepted);

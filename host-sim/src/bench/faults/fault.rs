@@ -25,7 +25,10 @@ impl Stream {
         match self {
             Self::Needle => &ledger.needle,
             Self::Target => &ledger.target,
-            Self::Paddle => &ledger.paddle,
+            Self::Paddle => {
+                let [first, _] = &ledger.paddles;
+                first
+            }
         }
     }
 }

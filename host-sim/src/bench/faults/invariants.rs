@@ -1,5 +1,6 @@
 //! What must hold on every tick, whatever is injected.
 
+use firmware::contract::frames::to_plane;
 use firmware::contract::{PaddleCommand, Table};
 use firmware::{Faults, Inputs, Mode, Settings, State};
 use nalgebra::Vector2;
@@ -27,8 +28,8 @@ impl Invariants {
     /// Limits of this table and these settings.
     pub fn new(table: &Table<f64, 2>, settings: &Settings) -> Self {
         Self {
-            max_displacement: table.paddle.max_displacement,
-            max_step: table.paddle.max_rate * settings.loop_period_ns as f64 * 1e-9,
+            max_displacement: table.paddles[0].max_displacement,
+            max_step: table.paddles[0].max_rate * settings.loop_period_ns as f64 * 1e-9,
             last: None,
             forward: None,
             latched: false,
@@ -82,7 +83,7 @@ impl Invariants {
     /// Checks one tick of the controller.
     pub fn check(&mut self, before: &State<f64>, after: &State<f64>, inputs: &Inputs, command: &PaddleCommand) {
         let faults = Faults::from_bits(command.faults);
-        let displacement = Vector2::from(command.displacement);
+        let displacement = Vector2::from(to_plane(command.displacement[0]));
         let backwards = self.is_backwards(inputs);
         self.forward = Some(match self.forward {
             Some((tick, time_ns)) if backwards => (tick.max(inputs.tick), time_ns),
@@ -133,12 +134,13 @@ impl Invariants {
             self.require(!known, inputs, "a valid command was followed by an invalid one without a reason");
             return;
         }
-        let step = (displacement - Vector2::from(last.displacement)).norm();
+        let step = (displacement - Vector2::from(to_plane(last.displacement[0]))).norm();
         self.require(step <= self.max_step * (1.0 + ROUNDING), inputs, "command beyond the rate limit");
         // The tick that finds a reason in the law itself has moved already.
         let law = Faults::from_bits(command.faults).intersection(Faults::DIVERGENCE);
         if command.state != Mode::Run as u32 && law.is_empty() {
-            let same = command.displacement.map(f64::to_bits) == last.displacement.map(f64::to_bits);
+            let same = command.displacement.map(|place| place.map(f64::to_bits))
+                == last.displacement.map(|place| place.map(f64::to_bits));
             self.require(same, inputs, "the paddle was moved in HOLD or SAFE");
         }
     }
@@ -146,7 +148,7 @@ impl Invariants {
     /// Without a sample of the target that was accepted in RUN, the integral keeps its bits.
     fn check_integral(&mut self, before: &State<f64>, after: &State<f64>, inputs: &Inputs, command: &PaddleCommand) {
         let consumed = after.ledger().target.consumed > before.ledger().target.consumed;
-        let bits = |state: &State<f64>| state.integral().map(|integral| integral.map(f64::to_bits));
+        let bits = |state: &State<f64>| state.integral().map(|integral| integral[0].map(f64::to_bits));
         if let Some(old) = bits(before)
             && (!consumed || command.state == Mode::Hold as u32)
         {

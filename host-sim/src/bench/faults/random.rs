@@ -2,6 +2,7 @@
 
 use firmware::Mode;
 use firmware::contract::Table;
+use firmware::contract::frames::to_plane;
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -97,7 +98,7 @@ fn one(table: &Table<f64, 2>, seed: u64, sum: &mut Composed, digest: &mut Sha256
     while bench.now() < TICKS {
         if let Some(exchange) = bench.step() {
             hash = mix(hash, exchange.command.faults ^ u64::from(exchange.command.state) << 56);
-            hash = exchange.command.displacement.iter().fold(hash, |hash, part| mix(hash, part.to_bits()));
+            hash = to_plane(exchange.command.displacement[0]).iter().fold(hash, |hash, part| mix(hash, part.to_bits()));
         }
         safe_for = if bench.mode() == Mode::Safe { safe_for + 1 } else { 0 };
         // Somebody re-arms after a while, in vain as long as the fault lasts; and once more when all is over.

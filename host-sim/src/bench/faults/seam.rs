@@ -43,7 +43,7 @@ impl Sample for TargetSample {
         &mut self.time_ns
     }
     fn numbers(&mut self) -> [&mut f64; 2] {
-        let [x, y] = &mut self.displacement;
+        let [x, y, _] = &mut self.displacement;
         [x, y]
     }
 }
@@ -57,7 +57,7 @@ impl Sample for PaddleSample {
         &mut self.time_ns
     }
     fn numbers(&mut self) -> [&mut f64; 2] {
-        let [x, y] = &mut self.displacement;
+        let [x, y, _] = &mut self.displacement;
         [x, y]
     }
 }

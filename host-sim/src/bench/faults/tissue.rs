@@ -35,7 +35,7 @@ impl<'t> LinearTissue<'t> {
             return Vector2::zeros();
         };
         at.target_displacement()
-            + at.jacobian() * (self.turn * paddle * self.gain - at.paddle_path())
+            + at.jacobian()[0] * (self.turn * paddle * self.gain - at.paddle_path())
             + self.table.orthogonal * self.push
     }
 

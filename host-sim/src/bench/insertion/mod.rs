@@ -248,7 +248,7 @@ impl<'a> SimulatedInsertion<'a> {
         mut run: FinishedInsertion<'a>,
     ) -> Result<MeasuredInsertion, SimError> {
         let Self { model, simulation, label, .. } = *self;
-        let paddle = controller.table.paddle.index;
+        let paddle = controller.table.paddles[0].index;
         let mut result = measure(model, &mut run.plant, controller.mode, Some(paddle), simulation.seed);
         let recording = self.recording(controller, &run);
         let bytes = recording.encode();
@@ -307,14 +307,14 @@ impl<'a> SimulatedInsertion<'a> {
         if extras.mcap {
             let name = label.file("mcap");
             let needle = mcap::NeedleForces { started_ns, moments: plant.world().tissue.needle() };
-            let stage = Stage::new(model.scene(), controller.table.paddle.index);
+            let stage = Stage::new(model.scene(), controller.table.paddles[0].index);
             let known = mcap::Known { needle, stage: Some(&stage) };
             let bytes = mcap::encode(recording, controller.table.orthogonal.into(), known)?;
             artifacts.push(Artifact { name, bytes });
             artifacts.push(Artifact { name: label.file("foxglove.json"), bytes: stage.layout_file() });
         }
         if extras.vtu {
-            let paddle = controller.table.paddle.index;
+            let paddle = controller.table.paddles[0].index;
             artifacts.extend(paraview::series(model, Some(paddle), plant.truths(), started_ns, &label.stem()));
         }
         Ok(artifacts)
@@ -363,7 +363,7 @@ impl<'a> SimulatedInsertion<'a> {
         let Self { model, simulation, .. } = *self;
         let table = space.root().join("controller.table");
         std::fs::write(&table, controller.table_bytes).map_err(FileError::write(&table))?;
-        let paddle = controller.table.paddle.index;
+        let paddle = controller.table.paddles[0].index;
         let mut ports = PlantPorts::<ipc::Service>::open(space)?;
         let mut peer = Peer::Child(self.start(controller, space, &table)?);
         let mut patience = Patience::new(PEER_TIMEOUT);

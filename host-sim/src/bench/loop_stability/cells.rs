@@ -62,7 +62,7 @@ pub fn simulate(truth: &Matrix2<f64>, table: &Matrix2<f64>, gain: f64, delay: u3
     let mut paddle = Vector2::zeros();
     for sample in 0..SAMPLES as usize {
         let measured = history[sample % depth];
-        paddle -= Direction::Inverse.solve(table, &measured) * gain;
+        paddle -= Direction::Inverse.solve(&[*table], &measured, &[1.0])[0] * gain;
         history[sample % depth] = start + truth * paddle;
         if sample % JUDGED_EVERY != 0 {
             continue;

@@ -82,15 +82,15 @@ fn along_depth<'t>(
 }
 
 fn compare(table: &Table<f64, 2>, assumed: &Knot<f64, 2>, real: &Knot<f64, 2>, names: [TissueVariant; 2]) -> Mismatch {
-    let inverse = assumed.jacobian.try_inverse().unwrap_or_else(Matrix2::zeros);
-    let product = real.jacobian * inverse;
+    let inverse = assumed.jacobian[0].try_inverse().unwrap_or_else(Matrix2::zeros);
+    let product = real.jacobian[0] * inverse;
     let n: Vector2<f64> = table.orthogonal;
     let (gain, delay) = (table.gains.loop_gain, table.gains.delay_samples);
     let margin_of = |l: &Complex<f64>| gain_limit(l.arg(), delay) / (gain * l.norm());
     let [a, b] = eigenvalues(&product);
     let worst = if margin_of(&a) <= margin_of(&b) { a } else { b };
     Mismatch {
-        paddle: table.paddle.index,
+        paddle: table.paddles[0].index,
         table: names[0],
         tissue: names[1],
         depth: assumed.depth,
@@ -99,8 +99,8 @@ fn compare(table: &Table<f64, 2>, assumed: &Knot<f64, 2>, real: &Knot<f64, 2>, n
         orthogonal: n.dot(&(product * n)),
         gain: (gain, delay),
         margin: margin_of(&worst),
-        simulated_margin: simulated_margin(&real.jacobian, &assumed.jacobian, gain, delay),
-        behaviour: simulate(&real.jacobian, &assumed.jacobian, gain, delay),
+        simulated_margin: simulated_margin(&real.jacobian[0], &assumed.jacobian[0], gain, delay),
+        behaviour: simulate(&real.jacobian[0], &assumed.jacobian[0], gain, delay),
     }
 }
 

@@ -1,5 +1,6 @@
 //! A controller in this thread, with its samples.
 
+use firmware::contract::frames::to_plane;
 use firmware::contract::{PaddleCommand, Table};
 use firmware::inputs::TickLedger;
 use firmware::{Controller, Inputs, State};
@@ -51,8 +52,14 @@ impl<'c> Own<'c> {
 
     fn inputs_at(&mut self, tick: u64) -> Inputs {
         let time_ns = tick * self.period_ns;
-        let samples = self.stimulus.samples(time_ns, self.command.displacement);
-        Inputs { tick, time_ns, needle: Some(samples.needle), target: samples.target, paddle: Some(samples.paddle) }
+        let samples = self.stimulus.samples(time_ns, to_plane(self.command.displacement[0]));
+        Inputs {
+            tick,
+            time_ns,
+            needle: Some(samples.needle),
+            target: samples.target,
+            paddles: [Some(samples.paddle), None],
+        }
     }
 
     /// What arrives for this release since RUN.

@@ -1,5 +1,6 @@
 //! The whole exchange with another process: sample published → command received, with both sides polling.
 
+use firmware::contract::frames::to_plane;
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
@@ -163,7 +164,10 @@ impl Running {
     }
 
     fn at(&mut self, tick: u64) -> Result<Stamps, RuntimeError> {
-        let samples = self.stimulus.samples(tick * self.period_ns, self.last.unwrap_or_default().displacement);
+        let samples = {
+            let paddle = to_plane(self.last.unwrap_or_default().displacement[0]);
+            self.stimulus.samples(tick * self.period_ns, paddle)
+        };
         let exchanged_ns = match &mut self.ends {
             Ends::Link(ports) => over_link(ports, &samples, &mut self.last),
             Ends::Bare(bare) => over_bare(bare, tick),

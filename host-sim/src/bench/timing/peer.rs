@@ -96,7 +96,7 @@ impl Stepper<'_> {
     ) -> PaddleCommand {
         // Samples are measured at releases: their time says which, and skipped ones leave gaps.
         let (tick, time_ns) = (needle.time_ns / self.period_ns, needle.time_ns);
-        let inputs = Inputs { tick, time_ns, needle: Some(needle), target, paddle };
+        let inputs = Inputs { tick, time_ns, needle: Some(needle), target, paddles: [paddle, None] };
         self.controller.step(&mut self.state, &inputs)
     }
 }
@@ -111,7 +111,7 @@ fn over_link(options: &PeerOptions<'_>, stepper: &mut Stepper<'_>) -> Result<(),
     request_real_time_at(options.priority);
     poll(|look| {
         let Some(needle) = ports.needle() else { return Ok(nothing(!look || ports.has_peer())) };
-        let command = stepper.step((needle, ports.target(), ports.paddle()));
+        let command = stepper.step((needle, ports.target(), ports.paddle(0)));
         ports.send(&command)?;
         Ok(Polled::Answered)
     })

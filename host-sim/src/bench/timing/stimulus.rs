@@ -1,6 +1,6 @@
 //! Samples that keep a controller in RUN: an insertion, and a paddle that is where it should be.
 
-use firmware::contract::frames::TARGET_VISIBLE;
+use firmware::contract::frames::{TARGET_VISIBLE, from_plane};
 use firmware::contract::{NeedleSample, PaddleSample, Table, TargetSample};
 
 use crate::world::loop_settings::LoopSettings;
@@ -40,7 +40,7 @@ impl Stimulus {
         Self {
             trajectory: NeedleTrajectory::new(table.validity.depth_end, INSERTION_S),
             target_period_ns: target_ticks * loop_settings.period_ns(),
-            paddle_index: table.paddle.index,
+            paddle_index: table.paddles[0].index,
             sequence: 0,
             target_sequence: 0,
             next_target_ns: 0,
@@ -66,12 +66,17 @@ impl Stimulus {
             let wobble = if self.target_sequence.is_multiple_of(2) { 1e-6 } else { -1e-6 };
             let sequence = self.target_sequence;
             self.target_sequence = sequence.wrapping_add(1);
-            TargetSample { sequence, flags: TARGET_VISIBLE, time_ns, displacement: [wobble, 0.0] }
+            TargetSample { sequence, flags: TARGET_VISIBLE, time_ns, displacement: from_plane([wobble, 0.0]) }
         });
         Samples {
             needle: NeedleSample { sequence, reserved: 0, time_ns, depth, velocity },
             target,
-            paddle: PaddleSample { sequence, paddle_index: self.paddle_index, time_ns, displacement },
+            paddle: PaddleSample {
+                sequence,
+                paddle_index: self.paddle_index,
+                time_ns,
+                displacement: from_plane(displacement),
+            },
         }
     }
 }

@@ -75,6 +75,9 @@ impl Device {
             layout: LAYOUT_VERSION,
             table_format: FORMAT_VERSION,
             scalar: scalar as u8,
+            // What is simulated here is the plane.
+            dimension: 2,
+            paddles: 1,
             ..identity
         };
         if identity != expected {
@@ -132,8 +135,9 @@ impl Device {
     /// # Errors
     /// [`BoardError::Restarted`], [`BoardError::Closed`].
     pub fn step(&mut self, inputs: &Inputs, patience: Duration) -> Result<Option<Answer>, BoardError> {
-        let Inputs { tick, time_ns, needle, target, paddle } = *inputs;
-        let samples = [needle.map(Request::Needle), target.map(Request::Target), paddle.map(Request::Paddle)];
+        let Inputs { tick, time_ns, needle, target, paddles } = *inputs;
+        let [first, second] = paddles.map(|paddle| paddle.map(Request::Paddle));
+        let samples = [needle.map(Request::Needle), target.map(Request::Target), first, second];
         let requests: Vec<_> = samples.into_iter().flatten().chain([Request::Time { tick, time_ns }]).collect();
         self.line.send(&requests)?;
         let deadline = Instant::now() + patience;

@@ -1,5 +1,6 @@
 //! Tables with a time column, for PlotJuggler and spreadsheets.
 
+use firmware::contract::frames::to_plane;
 use firmware::{Faults, Mode};
 use model_offline::output::csv::table;
 use nalgebra::Vector2;
@@ -88,9 +89,9 @@ fn line(
     let true_depth = truth.map(|truth| text(truth.depth)).unwrap_or_default();
     let needle = inputs.and_then(|inputs| inputs.needle);
     let [depth, velocity] = pair(needle.map(|sample| [sample.depth, sample.velocity]));
-    let [mx, my] = pair(inputs.and_then(|inputs| inputs.target).map(|sample| sample.displacement));
-    let [mpx, mpy] = pair(inputs.and_then(|inputs| inputs.paddle).map(|sample| sample.displacement));
-    let [cx, cy] = pair(command.filter(|command| command.is_valid()).map(|command| command.displacement));
+    let [mx, my] = pair(inputs.and_then(|inputs| inputs.target).map(|sample| to_plane(sample.displacement)));
+    let [mpx, mpy] = pair(inputs.and_then(|inputs| inputs.paddles[0]).map(|sample| to_plane(sample.displacement)));
+    let [cx, cy] = pair(command.filter(|command| command.is_valid()).map(|command| to_plane(command.displacement[0])));
     let [state, faults] = command.map_or_else(Default::default, |command| verdict(command.state, command.faults));
     let time = format!("{time_s:.6}");
     let number = text(number);
@@ -237,9 +238,9 @@ mod tests {
         use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
         let mut whole = record(7, 1_000_000, Some(1_000_000));
         whole.tick.inputs.needle = Some(NeedleSample { depth: 0.51, velocity: 0.2, ..NeedleSample::default() });
-        whole.tick.inputs.target = Some(TargetSample { displacement: [1.1, 2.1], ..TargetSample::default() });
-        whole.tick.inputs.paddle = Some(PaddleSample { displacement: [3.1, 4.1], ..PaddleSample::default() });
-        whole.tick.command.displacement = [5.0, 6.0];
+        whole.tick.inputs.target = Some(TargetSample { displacement: [1.1, 2.1, 0.0], ..TargetSample::default() });
+        whole.tick.inputs.paddles[0] = Some(PaddleSample { displacement: [3.1, 4.1, 0.0], ..PaddleSample::default() });
+        whole.tick.command.displacement[0] = [5.0, 6.0, 0.0];
         whole.tick.command.flags = firmware::contract::frames::COMMAND_VALID;
         let said = recorded(vec![record(6, 0, None), whole]);
         let value = |line: usize, name: &str| {

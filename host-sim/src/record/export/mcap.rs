@@ -12,6 +12,7 @@
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
 //! free-run. A metadata record `stillpoint` says which, with seed and hashes.
 
+use firmware::contract::frames::to_plane;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -251,16 +252,16 @@ impl Topics {
             self.write(writer, "/needle", [now, s.time_ns], &message)?;
         }
         if let Some(s) = &inputs.target {
-            let [x, y] = s.displacement;
+            let [x, y] = to_plane(s.displacement);
             let message = TargetMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), x, y };
             self.write(writer, "/target", [now, s.time_ns], &message)?;
         }
-        if let Some(s) = &inputs.paddle {
-            let (paddle_index, [x, y]) = (s.paddle_index, s.displacement);
+        if let Some(s) = &inputs.paddles[0] {
+            let (paddle_index, [x, y]) = (s.paddle_index, to_plane(s.displacement));
             let message = PaddleMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), paddle_index, x, y };
             self.write(writer, "/paddle", [now, s.time_ns], &message)?;
         }
-        let place = command.is_valid().then_some(command.displacement);
+        let place = command.is_valid().then_some(to_plane(command.displacement[0]));
         let message = CommandMessage {
             tick: inputs.tick,
             state: Mode::from_wire(command.state).map_or("?", Mode::name).to_owned(),

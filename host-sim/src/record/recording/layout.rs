@@ -5,7 +5,7 @@ use firmware::law::{Direction, Feedback};
 use firmware::limits::PositionLimit;
 use sha2::{Digest, Sha256};
 
-use super::{BODY_BYTES, FIRST_VERSION, FORMAT_VERSION, MAGIC, Record, RecordingError, RecordingHeader, TICK_MARK};
+use super::{BODY_BYTES, FORMAT_VERSION, MAGIC, Record, RecordingError, RecordingHeader, TICK_MARK};
 use crate::exchange::bytes::{ByteReader, ByteWriter};
 use crate::runtime::accounting::tick::{ControllerTick, TICK_BYTES};
 use crate::runtime::time::mode::RunMode;
@@ -32,8 +32,9 @@ pub(super) fn encode_header(header: &RecordingHeader, writer: &mut ByteWriter) {
         writer.f64(optional.unwrap_or(0.0));
     }
     writer.u32(match settings.direction {
-        Direction::Inverse => 1,
-        Direction::MinimumNorm => 2,
+        Some(Direction::Inverse) => 1,
+        Some(Direction::MinimumNorm) => 2,
+        None => 3,
     });
     writer.u32(match settings.position_limit {
         PositionLimit::Norm => 1,
@@ -53,13 +54,13 @@ pub(super) fn decode_header(reader: &mut ByteReader<'_>) -> Result<RecordingHead
         return Err(RecordingError::NotARecording);
     }
     let found = reader.u32().ok_or(RecordingError::Header)?;
-    if !(FIRST_VERSION..=FORMAT_VERSION).contains(&found) {
+    if found != FORMAT_VERSION {
         return Err(RecordingError::Version { found, known: FORMAT_VERSION });
     }
-    decode_header_fields(reader, found).ok_or(RecordingError::Header)
+    decode_header_fields(reader).ok_or(RecordingError::Header)
 }
 
-fn decode_header_fields(reader: &mut ByteReader<'_>, version: u32) -> Option<RecordingHeader> {
+fn decode_header_fields(reader: &mut ByteReader<'_>) -> Option<RecordingHeader> {
     let mode = match reader.u32()? {
         1 => RunMode::Lockstep,
         2 => RunMode::FreeRun,
@@ -80,8 +81,9 @@ fn decode_header_fields(reader: &mut ByteReader<'_>, version: u32) -> Option<Rec
     settings.lambda_max = optional()?;
     settings.following_error = optional()?;
     settings.direction = match reader.u32()? {
-        1 => Direction::Inverse,
-        2 => Direction::MinimumNorm,
+        1 => Some(Direction::Inverse),
+        2 => Some(Direction::MinimumNorm),
+        3 => None,
         _ => return None,
     };
     settings.position_limit = match reader.u32()? {
@@ -89,7 +91,7 @@ fn decode_header_fields(reader: &mut ByteReader<'_>, version: u32) -> Option<Rec
         2 => PositionLimit::Box,
         _ => return None,
     };
-    settings.feedback = match if version == FIRST_VERSION { 1 } else { reader.u32()? } {
+    settings.feedback = match reader.u32()? {
         1 => Feedback::Integral,
         2 => Feedback::Observer,
         3 => Feedback::Harmonic,

@@ -16,9 +16,14 @@ fn recording(ticks: u64) -> Recording {
                         ..NeedleSample::default()
                     }),
                     target: tick.is_multiple_of(2).then(TargetSample::default),
-                    paddle: None,
+                    paddles: [None; 2],
                 },
-                command: PaddleCommand { tick, displacement: [0.1, -0.0], faults: 1 << 40, ..PaddleCommand::default() },
+                command: PaddleCommand {
+                    tick,
+                    displacement: [[0.1, -0.0, 0.0], [0.0; 3]],
+                    faults: 1 << 40,
+                    ..PaddleCommand::default()
+                },
             },
             truth: (tick > 0).then_some(Truth {
                 tick,

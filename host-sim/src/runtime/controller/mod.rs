@@ -243,8 +243,8 @@ impl<'c> ControlLoop<'c> {
                 if asked && self.last.state == Mode::Safe as u32 {
                     self.executor.rearm()?;
                 }
-                let inputs =
-                    Inputs { tick, time_ns, needle: ports.needle(), target: ports.target(), paddle: ports.paddle() };
+                let (needle, target) = (ports.needle(), ports.target());
+                let inputs = Inputs { tick, time_ns, needle, target, paddles: [ports.paddle(0), None] };
                 self.executor.step(&inputs).map(|command| (inputs, command))
             };
             catch_unwind(AssertUnwindSafe(step)).ok()
@@ -264,7 +264,7 @@ impl<'c> ControlLoop<'c> {
         let sequences = [
             inputs.needle.map(|sample| sample.sequence),
             inputs.target.map(|sample| sample.sequence),
-            inputs.paddle.map(|sample| sample.sequence),
+            inputs.paddles[0].map(|sample| sample.sequence),
         ];
         for (span, sequence) in self.spans.iter_mut().zip(sequences) {
             if let Some(sequence) = sequence {
@@ -318,7 +318,7 @@ impl<'c> ControlLoop<'c> {
     ) -> Result<(ControllerAccounts, Vec<ControllerTick>), RuntimeError> {
         let ledger = self.executor.ledger()?;
         let [needle, target, paddle] = self.spans;
-        let waiting = (ports.needle(), ports.target(), ports.paddle());
+        let waiting = (ports.needle(), ports.target(), ports.paddle(0));
         let ticks = &ledger.ticks;
         let (due, skipped) = self.scheduled.unwrap_or((ticks.due, ticks.skipped));
         let [hold, run, safe] = self.modes;
@@ -332,7 +332,7 @@ impl<'c> ControlLoop<'c> {
         let accounts = ControllerAccounts {
             needle: needle.account(&ledger.needle, waiting.0.map(|sample| sample.sequence)),
             target: target.account(&ledger.target, waiting.1.map(|sample| sample.sequence)),
-            paddle: paddle.account(&ledger.paddle, waiting.2.map(|sample| sample.sequence)),
+            paddle: paddle.account(&ledger.paddles[0], waiting.2.map(|sample| sample.sequence)),
             ticks: TickResult { due, run, hold, safe, skipped, unaccounted: due.abs_diff(entries) + own },
             commands: ports.command.published(),
             final_state: Some(Mode::from_wire(self.last.state).unwrap_or_default()),

@@ -65,7 +65,7 @@ impl AttachedPaddle<'_> {
         match self {
             Self::None => None,
             Self::Held(index) | Self::Moved(index) => Some(*index),
-            Self::Steered(table) => Some(table.paddle.index),
+            Self::Steered(table) => Some(table.paddles[0].index),
         }
     }
 

@@ -78,7 +78,8 @@ fn table_distance(a: &Table<f64, 2>, b: &Table<f64, 2>) -> f64 {
         .filter_map(|k| {
             let depth = end * f64::from(k) / 200.0;
             let (a, b) = (a.locate(depth)?, b.locate(depth)?);
-            let jacobian = (a.jacobian() - b.jacobian()).norm() / b.jacobian().norm();
+            let ([a_jacobian], [b_jacobian]) = (a.jacobian(), b.jacobian());
+            let jacobian = (a_jacobian - b_jacobian).norm() / b_jacobian.norm();
             Some(jacobian.max((a.paddle_path() - b.paddle_path()).norm() / farthest))
         })
         .fold(0.0, f64::max)

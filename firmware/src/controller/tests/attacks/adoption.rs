@@ -16,7 +16,10 @@ fn a_measurement_from_long_ago_is_not_adopted() {
             (paddle.time_ns, paddle.displacement) = (paddle.time_ns - 10_000 * MS, [RANGE, 0.0, 0.0]);
         }
         let command = controller.step(&mut state, &inputs);
-        assert!(!command.is_valid() || distance(to_plane(command.displacement[0]), [0.0; 2]) < 0.1 * RANGE, "tick {tick}");
+        assert!(
+            !command.is_valid() || distance(to_plane(command.displacement[0]), [0.0; 2]) < 0.1 * RANGE,
+            "tick {tick}"
+        );
         plant.act(&command);
     }
     assert_eq!(state.mode(), Mode::Run, "{}", state.faults());

@@ -134,8 +134,8 @@ fn takes_over_gently(records: &[Record], evidence: &mut Evidence, what: &dyn Fn(
         evidence.require(false, || format!("{}: never heard where the paddle is", what()));
         return;
     };
-    let measured = tick.inputs.paddle.map(|sample| sample.displacement.map(f64::to_bits));
-    let commanded = Some(tick.command.displacement.map(f64::to_bits));
+    let measured = tick.inputs.paddles[0].map(|sample| sample.displacement.map(f64::to_bits));
+    let commanded = Some(tick.command.displacement[0].map(f64::to_bits));
     evidence.require(measured == commanded, || format!("{}: its first command is a motion", what()));
     evidence.detected += u64::from(measured == commanded);
 }
@@ -189,7 +189,7 @@ pub(crate) fn controller_restarted(stage: &Stage<'_>, evidence: &mut Evidence) -
         let explained = state != Some(Mode::Safe) || faults.contains(Faults::OVERRUN);
         evidence.require(explained, || format!("ended in {state:?}: {faults}"));
     }
-    let limit = stage.table.paddle.max_rate * 1e-3 * (1.0 + 1e-6);
+    let limit = stage.table.paddles[0].max_rate * 1e-3 * (1.0 + 1e-6);
     match read_json::<PlantResult>(&json) {
         Some(result) => {
             evidence.max_error = Some(result.largest_error);

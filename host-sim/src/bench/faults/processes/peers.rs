@@ -4,7 +4,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 use std::time::Duration;
 
-use firmware::contract::frames::TARGET_VISIBLE;
+use firmware::contract::frames::{TARGET_VISIBLE, from_plane, to_plane};
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::{Faults, Mode};
 use iceoryx2::node::NodeBuilder;
@@ -209,13 +209,13 @@ fn garbage_samples(tick: u64, time_ns: u64, random: &mut Pcg64) -> (NeedleSample
         sequence: sequence(random),
         paddle_index: if below(random, 100) == 0 { any_u32(random) } else { 3 },
         time_ns: time(random),
-        displacement: [any_number(random), any_number(random)],
+        displacement: from_plane([any_number(random), any_number(random)]),
     };
     let target = TargetSample {
         sequence: sequence(random),
         flags: any_u32(random) | TARGET_VISIBLE,
         time_ns: time(random),
-        displacement: [any_number(random), any_number(random)],
+        displacement: from_plane([any_number(random), any_number(random)]),
     };
     (needle, target, paddle)
 }
@@ -227,8 +227,8 @@ fn garbage_among(tick: u64, time_ns: u64, needle: &NeedleSample, target: &Target
         u64::from(number != tick as u32 || stamp != time_ns || !plausible)
     };
     is_garbage(needle.sequence, needle.time_ns, [needle.depth, needle.velocity])
-        + is_garbage(paddle.sequence, paddle.time_ns, paddle.displacement)
-        + is_garbage(target.sequence, target.time_ns, target.displacement)
+        + is_garbage(paddle.sequence, paddle.time_ns, to_plane(paddle.displacement))
+        + is_garbage(target.sequence, target.time_ns, to_plane(target.displacement))
 }
 
 fn garbage_on(
@@ -243,7 +243,7 @@ fn garbage_on(
     let (mut controller, _, json) = stage.controller(space.name(), &["--mode", "lockstep"])?;
     evidence.require(wait_until(TIMEOUT, || ports.has_peer()), || controller.message());
     ports.connect()?;
-    let limits = (stage.table.paddle.max_displacement, stage.table.paddle.max_rate * 1e-3);
+    let limits = (stage.table.paddles[0].max_displacement, stage.table.paddles[0].max_rate * 1e-3);
     let mut last: Option<PaddleCommand> = None;
     for tick in 0..TICKS {
         signals::check()?;
@@ -263,13 +263,13 @@ fn garbage_on(
             evidence.require(false, || format!("tick {tick}: no answer: {}", controller.message()));
             return Ok(());
         };
-        let displacement = Vector2::from(command.displacement);
+        let displacement = Vector2::from(to_plane(command.displacement[0]));
         evidence.require(command.tick == tick && displacement.norm() <= limits.0 * (1.0 + 1e-9), || {
             format!("tick {tick}: {command:?}")
         });
         // A command that is not valid is none.
         if let Some(last) = last.filter(|last| last.is_valid() && command.is_valid()) {
-            let step = (displacement - Vector2::from(last.displacement)).norm();
+            let step = (displacement - Vector2::from(to_plane(last.displacement[0]))).norm();
             evidence.require(step <= limits.1 * (1.0 + 1e-9), || format!("tick {tick}: step of {step}"));
         }
         last = Some(command);

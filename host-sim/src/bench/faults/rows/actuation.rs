@@ -1,5 +1,6 @@
 //! Rows 19 to 25: saturation, the actuator, the sign and the identity of the plant, Jacobians near singularity.
 
+use firmware::contract::frames::to_plane;
 use firmware::contract::{MAX_TABLE_BYTES, Table, encode};
 use firmware::detection::{FOLLOWING_FRACTION, FOLLOWING_SAMPLES, FROZEN_TRAVEL};
 use firmware::{Faults, Feedback, Mode, Settings, loop_stability};
@@ -16,10 +17,10 @@ const MS: u64 = 1_000_000;
 /// Orthogonal target displacement that the paddle can take away at most, length.
 fn reach(table: &Table<f64, 2>) -> f64 {
     let measure = |knot: &firmware::contract::Knot<f64, 2>| {
-        knot.jacobian.try_inverse().map_or(f64::INFINITY, |inverse| (inverse * table.orthogonal).norm())
+        knot.jacobian[0].try_inverse().map_or(f64::INFINITY, |inverse| (inverse * table.orthogonal).norm())
     };
     let worst = table.knots.iter().map(measure).fold(0.0, f64::max);
-    table.paddle.max_displacement / worst
+    table.paddles[0].max_displacement / worst
 }
 
 /// Row 19: the paddle at the end of its range: clamped, no windup, back without overshoot.
@@ -61,11 +62,11 @@ pub(crate) fn rate_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
     let mut table = trial.table.clone();
     let setup = Setup { noise: 0.0, ..trial.setup() };
     let steepest = table.knots.iter().map(|knot| knot.paddle_path_slope.norm()).fold(0.0, f64::max);
-    table.paddle.max_rate = 0.5 * steepest * setup.speed;
+    table.paddles[0].max_rate = 0.5 * steepest * setup.speed;
     let mut bench = ClosedLoop::new(
         &table,
         Setup {
-            actuator: crate::world::actuator::ActuatorModel { max_rate: table.paddle.max_rate, ..setup.actuator },
+            actuator: crate::world::actuator::ActuatorModel { max_rate: table.paddles[0].max_rate, ..setup.actuator },
             ..setup
         },
     )?;
@@ -100,16 +101,16 @@ pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
         let table = trial.table;
         let delay_s = (settings.actuator_delay_ns + settings.loop_period_ns) as f64 * 1e-9;
         let part = if fault == Fault::Stuck { FROZEN_TRAVEL } else { FOLLOWING_FRACTION };
-        let admitted = part * table.paddle.max_displacement + table.paddle.max_rate * delay_s;
+        let admitted = part * table.paddles[0].max_displacement + table.paddles[0].max_rate * delay_s;
         let mut off_since = None;
         let mut tripped = None;
         for tick in 1..=6000u64 {
-            let commanded = bench.last.map(|last| Vector2::from(last.command.displacement));
+            let commanded = bench.last.map(|last| Vector2::from(to_plane(last.command.displacement[0])));
             if let Some(exchange) = bench.step()
-                && let (Some(sample), Some(commanded)) = (exchange.inputs.paddle, commanded)
+                && let (Some(sample), Some(commanded)) = (exchange.inputs.paddles[0], commanded)
             {
                 // What is past it for a moment only is jitter of the command.
-                let off = (Vector2::from(sample.displacement) - commanded).norm() > admitted;
+                let off = (Vector2::from(to_plane(sample.displacement)) - commanded).norm() > admitted;
                 off_since = if off { off_since.or(Some(tick)) } else { None };
                 let faults = Faults::from_bits(exchange.command.faults);
                 if !faults.intersection(Faults::FOLLOWING_ERROR | Faults::FROZEN).is_empty() {
@@ -132,7 +133,7 @@ pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
 /// the default gain always.
 pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut table = trial.table.clone();
-    table.paddle.max_rate = 1e3;
+    table.paddles[0].max_rate = 1e3;
     let start = 1e-5 * table.validity.depth_end;
     let mut growth = |delay: u32, lag_s: f64, gain: Option<f64>| -> Result<f64, crate::bench::error::SimError> {
         let mut setup = Setup { noise: 0.0, speed: 0.0, ..trial.setup() };
@@ -212,7 +213,7 @@ pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
         evidence.expect_mode(&bench, Mode::Safe, what);
         evidence.close(&bench, what);
     }
-    let follow = reach(trial.table) / trial.table.paddle.max_displacement * trial.table.paddle.max_rate;
+    let follow = reach(trial.table) / trial.table.paddles[0].max_displacement * trial.table.paddles[0].max_rate;
     for gain in [0.3, 0.7, 1.0, 1.5] {
         for push in [0.0, 0.1, -0.1, 0.33, -0.33] {
             let what = || format!("response × {gain}, push {push}");
@@ -237,7 +238,7 @@ pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
 /// unstable. A wrong one with which the loop is stable is no danger.
 pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     let mut random = trial.random(24);
-    for index in [0, trial.table.paddle.index + 1, u32::MAX] {
+    for index in [0, trial.table.paddles[0].index + 1, u32::MAX] {
         let what = || format!("paddle {index}");
         let mut bench = trial.running(&mut random)?;
         let found = bench.inject(Fault::PaddleIdentity(index), 10).until(1, carries(Faults::PADDLE_IDENTITY));
@@ -276,7 +277,7 @@ pub(crate) fn near_singular(trial: &Trial<'_>, evidence: &mut Evidence) -> Resul
             let (left, right) = (Rotation2::new(angle), Rotation2::new(2.0 * angle + 0.1));
             for knot in &mut table.knots {
                 let singular_values = Matrix2::new(0.3, 0.0, 0.0, 0.3 * 10f64.powi(-exponent));
-                knot.jacobian = left.matrix() * singular_values * right.matrix();
+                knot.jacobian = [left.matrix() * singular_values * right.matrix()];
                 (knot.paddle_path, knot.paddle_path_slope) = (Vector2::zeros(), Vector2::zeros());
             }
             evidence.injected += 1;

@@ -33,7 +33,7 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
 }
 
 fn refusal(bytes: &[u8]) -> Option<TableError> {
-    decode::<f64, 2>(bytes).err()
+    decode::<f64, 2, 1, 1>(bytes).err()
 }
 
 fn demand(evidence: &mut Evidence, refused: Option<TableError>, what: impl Fn() -> String) {
@@ -126,31 +126,33 @@ fn forged(trial: &Trial<'_>, change: impl FnOnce(&mut Table<f64, 2>)) -> Result<
 pub(crate) fn impossible(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
     type Change = fn(&mut Table<f64, 2>);
     let cases: [(&str, Change); 22] = [
-        ("NaN in a Jacobian", |table| table.knots[1].jacobian[(0, 1)] = f64::NAN),
+        ("NaN in a Jacobian", |table| table.knots[1].jacobian[0][(0, 1)] = f64::NAN),
         ("infinite path", |table| table.knots[2].paddle_path.x = f64::INFINITY),
-        ("NaN as a limit", |table| table.paddle.max_rate = f64::NAN),
-        ("negative limit", |table| table.paddle.max_displacement = -1.0),
+        ("NaN as a limit", |table| table.paddles[0].max_rate = f64::NAN),
+        ("negative limit", |table| table.paddles[0].max_displacement = -1.0),
         ("unsorted depths", |table| table.knots.swap(1, 2)),
         ("equal depths", |table| table.knots[1].depth = table.knots[0].depth),
         ("one knot", |table| table.knots.truncate(1)),
         ("no unit vector", |table| table.orthogonal *= 2.0),
-        ("singular Jacobian", |table| table.knots[3].jacobian.fill(0.0)),
+        ("singular Jacobian", |table| table.knots[3].jacobian[0].fill(0.0)),
         ("gain of 5", |table| table.gains.loop_gain = 5.0),
         // Finite, but out of all proportion: with these the monitors that follow from them would never trip.
-        ("huge rate", |table| table.paddle.max_rate = 1e300),
+        ("huge rate", |table| table.paddles[0].max_rate = 1e300),
         ("huge needle speed", |table| table.validity.needle_speed = 1e300),
         ("huge paddle range", |table| {
-            (table.paddle.max_displacement, table.validity.paddle_displacement) = (1e300, 1e300);
+            (table.paddles[0].max_displacement, table.validity.paddle_displacement) = (1e300, 1e300);
         }),
         ("huge valid range", |table| table.validity.paddle_displacement = 1e300),
         ("huge path slope", |table| table.knots[1].paddle_path_slope.x = 1e300),
         ("huge target slope", |table| table.knots[1].target_displacement_slope.y = -1e300),
         ("huge target displacement", |table| table.knots[1].target_displacement.x = 1e300),
         ("huge static displacement", |table| table.knots[1].static_target_displacement.y = 1e300),
-        ("huge Jacobian", |table| table.knots[1].jacobian *= 1e300),
+        ("huge Jacobian", |table| table.knots[1].jacobian[0] *= 1e300),
         ("target far away", |table| table.target_position.x = 1e300),
-        ("paddle far away", |table| table.paddle.segment[1].y = 1e300),
-        ("rate of 200 ranges per second", |table| table.paddle.max_rate = 200.0 * table.paddle.max_displacement),
+        ("paddle far away", |table| table.paddles[0].extent[1].y = 1e300),
+        ("rate of 200 ranges per second", |table| {
+            table.paddles[0].max_rate = 200.0 * table.paddles[0].max_displacement
+        }),
     ];
     for (name, change) in cases {
         let bytes = forged(trial, change)?;
@@ -176,7 +178,7 @@ pub(crate) fn impossible(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
         let mut flipped = bytes.clone();
         flipped[bit / 8] ^= 1 << (bit % 8);
         sealed += 1;
-        match decode::<f64, 2>(&resealed(flipped)) {
+        match decode::<f64, 2, 1, 1>(&resealed(flipped)) {
             Err(_) => refused += 1,
             Ok(table) => {
                 evidence.require(table.validate().is_ok(), || format!("bit {bit}: a bad table was accepted"));

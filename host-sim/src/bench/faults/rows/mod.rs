@@ -63,13 +63,13 @@ impl<'t> Trial<'t> {
 /// Lets both pass the same ticks; whether all displacements have the same bits.
 fn same_motion(twins: &mut [ClosedLoop<'_>; 2], ticks: u64) -> bool {
     (0..ticks).all(|_| {
-        let [a, b] = twins.each_mut().map(|bench| bench.step().map(|e| e.command.displacement.map(f64::to_bits)));
+        let [a, b] = twins.each_mut().map(|bench| bench.step().map(|e| e.command.displacement[0].map(f64::to_bits)));
         a == b
     })
 }
 
-fn integral_bits(state: &State<f64>) -> Option<[u64; 2]> {
-    state.integral().map(|integral| integral.map(f64::to_bits))
+fn integral_bits(state: &State<f64>) -> Option<[u64; 3]> {
+    state.integral().map(|integral| integral[0].map(f64::to_bits))
 }
 
 /// Everything is over: within `limit` ticks the loop is in RUN again by itself.

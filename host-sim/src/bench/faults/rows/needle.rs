@@ -1,5 +1,6 @@
 //! Rows 30 to 32: a needle that leaves the table, turns back, or is too fast.
 
+use firmware::contract::frames::to_plane;
 use firmware::{Faults, Mode};
 use nalgebra::Vector2;
 
@@ -39,8 +40,8 @@ pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Re
         if faults.intersection(Faults::POSITION_LIMITED | Faults::RATE_LIMITED).is_empty()
             && let Some(added) = bench.state.added()
         {
-            let expected = last.paddle_path + Vector2::from(added);
-            let off = (Vector2::from(command.displacement) - expected).norm();
+            let expected = last.paddle_path + Vector2::from(to_plane(added[0]));
+            let off = (Vector2::from(to_plane(command.displacement[0])) - expected).norm();
             evidence.require(off < 1e-12, || format!("depth {}: {off} off the last knot's path", needle.depth));
         }
     }
@@ -60,9 +61,9 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(),
         bench.inject(Fault::NeedleSpeed(factor), 400);
         let (started_at, mut least, mut turned, mut heard) = (bench.depth(), bench.depth(), None, None);
         // A step: more than feed-forward at this speed and one correction of the feedback explain.
-        let direction = trial.table.knots.iter().filter_map(|knot| knot.jacobian.try_inverse());
+        let direction = trial.table.knots.iter().filter_map(|knot| knot.jacobian[0].try_inverse());
         let measure = direction.map(|inverse| (inverse * trial.table.orthogonal).norm()).fold(0.0, f64::max);
-        let mut last = bench.last.map(|last| Vector2::from(last.command.displacement));
+        let mut last = bench.last.map(|last| Vector2::from(to_plane(last.command.displacement[0])));
         for tick in 1..=600u64 {
             let (error, before) = (bench.max_error, bench.depth());
             let Some(exchange) = bench.step() else { continue };
@@ -73,7 +74,7 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(),
                 heard = heard.or(Some(tick));
             }
             least = least.min(bench.depth());
-            let now = Vector2::from(exchange.command.displacement);
+            let now = Vector2::from(to_plane(exchange.command.displacement[0]));
             let speed = bench.setup().speed * factor.abs();
             let noise = 8.0 * bench.setup().noise;
             let explained = 2.0 * slope * speed * period_s + bench.loop_gain() * measure * (error + noise);

@@ -42,7 +42,8 @@ fn refused(
     let mut found = None;
     let mut same = true;
     for tick in 1..=ticks {
-        let [a, b] = [&mut lost, &mut hit].map(|bench| bench.step().map(|e| e.command.displacement.map(f64::to_bits)));
+        let [a, b] =
+            [&mut lost, &mut hit].map(|bench| bench.step().map(|e| e.command.displacement[0].map(f64::to_bits)));
         same &= a == b;
         let after: u64 = reasons.iter().map(|reason| refusals(&hit, stream, *reason)).sum();
         if found.is_none() && after > before {
@@ -115,7 +116,7 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
 
 /// The start: HOLD until the paddle is known to rest where it may be commanded to.
 fn not_adopted(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
-    let range = trial.table.paddle.max_displacement;
+    let range = trial.table.paddles[0].max_displacement;
     let at = |part: f64| Setup { paddle: [part * range, 0.0], ..trial.setup() };
     let mut healthy = ClosedLoop::new(trial.table, at(0.5))?;
     let first = healthy.step().map(|exchange| exchange.command);
