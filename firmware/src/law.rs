@@ -94,11 +94,11 @@ fn weighted<T: Scalar, const D: usize, const R: usize, const N: usize, const P: 
     let size = joint.trace();
     let limit = T::of(DAMPING_CONDITION * DAMPING_CONDITION);
     let inverse = joint.try_inverse();
-    let condition = inverse.as_ref().map(|inverse| size * inverse.trace());
+    // In squares. What is singular up to rounding may have any inverse, even a negative one.
+    let condition = inverse.as_ref().map(|inverse| size * inverse.trace()).filter(|condition| *condition > T::zero());
     let inverse = match condition {
         Some(condition) if condition <= limit => inverse,
         _ => {
-            // Singular: the condition number is infinite.
             let undamped = condition.map_or(T::zero(), |condition| limit / condition);
             let damping = size / limit * (T::one() - undamped);
             (joint + SMatrix::identity() * damping).try_inverse()

@@ -63,3 +63,5 @@ pub const STILLPOINT_FAULT_INNOVATION: u64 = 0x200000000;
 pub const STILLPOINT_FAULT_FROZEN: u64 = 0x400000000;
 /// Periods before this tick were skipped. Goes on until too many in a row.
 pub const STILLPOINT_FAULT_TICKS_SKIPPED: u64 = 0x800000000;
+/// What another code of this step says of a paddle, it says of the second one, at least. Never set in the plane.
+pub const STILLPOINT_FAULT_SECOND_PADDLE: u64 = 0x1000000000;

@@ -72,15 +72,18 @@ fn constants_are_the_controllers() {
     assert_eq!(value("STILLPOINT_MEMORY_BYTES"), STILLPOINT_MEMORY_BYTES as u64);
 }
 
-/// The structs of C are those of the sample frames: one layout for memory, line and library.
+/// The structs of C are those of the plane: a frame without its third component and its second paddle. What was compiled
+/// against version 1 of the interface finds every field where it was.
 #[test]
-fn samples_and_commands_lie_in_memory_as_the_frames() {
+fn samples_and_commands_lie_in_memory_as_in_the_first_version() {
     assert_eq!(size_of::<StillpointNeedleSample>(), size_of::<firmware::NeedleSample>());
-    assert_eq!(size_of::<StillpointTargetSample>(), size_of::<firmware::TargetSample>());
-    assert_eq!(size_of::<StillpointPaddleSample>(), size_of::<firmware::PaddleSample>());
-    assert_eq!(size_of::<StillpointCommand>(), size_of::<firmware::PaddleCommand>());
+    let component = size_of::<f64>();
+    assert_eq!(size_of::<StillpointTargetSample>(), size_of::<firmware::TargetSample>() - component);
+    assert_eq!(size_of::<StillpointPaddleSample>(), size_of::<firmware::PaddleSample>() - component);
+    assert_eq!(size_of::<StillpointCommand>(), 64);
     assert_eq!(std::mem::offset_of!(StillpointCommand, faults), std::mem::offset_of!(firmware::PaddleCommand, faults));
-    assert_eq!(std::mem::offset_of!(StillpointCommand, flags), std::mem::offset_of!(firmware::PaddleCommand, flags));
+    assert_eq!(std::mem::offset_of!(StillpointCommand, displacement_lu), 32);
+    assert_eq!(std::mem::offset_of!(StillpointCommand, flags), 60);
 }
 
 /// The control of the comparison: what is changed in the sources shows in the header.
