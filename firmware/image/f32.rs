@@ -5,7 +5,7 @@
 mod board;
 
 #[cfg(target_os = "none")]
-board::image!(f32);
+board::image!(firmware::serial::Memory<f32>);
 
 #[cfg(not(target_os = "none"))]
 fn main() {

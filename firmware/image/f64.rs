@@ -5,7 +5,7 @@
 mod board;
 
 #[cfg(target_os = "none")]
-board::image!(f64);
+board::image!(firmware::serial::Memory<f64>);
 
 #[cfg(not(target_os = "none"))]
 fn main() {

@@ -4,7 +4,8 @@
 
 pub(crate) mod hardware;
 
-use firmware::serial::{Board, ResetCause};
+use firmware::scalar::Scalar;
+use firmware::serial::{Board, Memory, ResetCause};
 
 use hardware::{Counter, Uart, Watchdog};
 
@@ -54,7 +55,9 @@ impl Board for Mps2 {
 }
 
 /// Runs the device for ever.
-pub(crate) fn run<T: firmware::scalar::Scalar>(memory: &mut firmware::serial::Memory<T>) {
+pub(crate) fn run<T: Scalar, const D: usize, const N: usize, const P: usize, const BYTES: usize>(
+    memory: &mut Memory<T, D, N, P, BYTES>,
+) {
     // The control of the proof that no panic can be reached: with this, the image must not link.
     #[cfg(panic_control)]
     core::hint::black_box(None::<u32>).unwrap();
@@ -65,11 +68,10 @@ pub(crate) fn run<T: firmware::scalar::Scalar>(memory: &mut firmware::serial::Me
     }
 }
 
-/// The entry point of an image that computes in this scalar.
+/// The entry point of an image with this memory, whose type says what it computes in, and for which space.
 macro_rules! image {
-    ($scalar:ty) => {
-        static MEMORY: static_cell::ConstStaticCell<firmware::serial::Memory<$scalar>> =
-            static_cell::ConstStaticCell::new(firmware::serial::Memory::new());
+    ($memory:ty) => {
+        static MEMORY: static_cell::ConstStaticCell<$memory> = static_cell::ConstStaticCell::new(<$memory>::new());
 
         #[cortex_m_rt::entry]
         fn main() -> ! {

@@ -4,8 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use host_sim::SimError;
+use host_sim::bench::board::space;
 use host_sim::bench::board::measure::{self, Budget, Complaint, Figures, MeasureError};
 use host_sim::bench::usage::UsageError;
+use host_sim::exchange::board::Control;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
@@ -39,10 +41,17 @@ pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
     let scenarios = measure::scenarios(&recording)?;
     let mut measured = Budget::new();
     let mut complaints = Vec::new();
-    for image in measure::images().map_err(MeasureError::from)? {
+    let mut images = measure::images().map_err(MeasureError::from)?;
+    images.push(measure::spatial_image().map_err(MeasureError::from)?);
+    let in_space = space::scenarios();
+    for image in images {
         let name = measure::name(&image);
-        let figures = measure::measure(&image, &scenarios)?;
-        if args.twice && measure::measure(&image, &scenarios)? != figures {
+        let measure = || match image.control {
+            Control::Plane => measure::measure(&image, &scenarios),
+            Control::SpacePair => measure::measure(&image, &in_space),
+        };
+        let figures = measure()?;
+        if args.twice && measure()? != figures {
             complaints.push(Complaint::Unsteady { image: name.clone() });
         }
         print!("{}", table(&name, &figures));

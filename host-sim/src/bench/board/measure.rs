@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::exchange::board::BoardError;
 use crate::exchange::board::device::Device;
-use crate::exchange::board::image::{Image, MemoryUse, Processor};
+use crate::exchange::board::image::{Control, Image, MemoryUse, Processor};
 use crate::exchange::board::qemu::ICOUNT_SHIFT;
 use crate::record::difference::{Difference, difference};
 use crate::record::recording::Recording;
@@ -147,12 +147,12 @@ pub enum BudgetItem {
 
 /// Inputs for the controller, with the table and settings that it runs with.
 #[derive(Clone, Debug)]
-pub struct Scenario {
+pub struct Scenario<const D: usize = 2, const N: usize = 1, const P: usize = 1> {
     /// What it is about.
     pub name: &'static str,
-    table: Table<f64, 2>,
-    settings: Settings,
-    inputs: Vec<Inputs>,
+    pub(super) table: Table<f64, D, N, P>,
+    pub(super) settings: Settings,
+    pub(super) inputs: Vec<Inputs>,
 }
 
 /// The recorded run, and variations of its end that reach the other branches of the step.
@@ -266,10 +266,10 @@ pub type Budget = BTreeMap<String, Figures>;
 
 /// Name of an image in a budget.
 pub fn name(image: &Image) -> String {
-    format!("{}-{}", image.scalar.name(), image.processor.name())
+    format!("{}{}-{}", image.scalar.name(), image.control.suffix(), image.processor.name())
 }
 
-/// Builds all four images.
+/// Builds all four images of the plane.
 ///
 /// # Errors
 /// As [`Image::build`].
@@ -280,11 +280,22 @@ pub fn images() -> Result<Vec<Image>, BoardError> {
     kinds.map(|(scalar, processor)| Image::build(scalar, processor)).collect()
 }
 
+/// Builds the image of two paddles in space.
+///
+/// # Errors
+/// As [`Image::build`].
+pub fn spatial_image() -> Result<Image, BoardError> {
+    Image::build_for(Control::SpacePair, ScalarKind::F64, Processor::Double)
+}
+
 /// Runs all scenarios on an image. Every command must be the host's, bit by bit.
 ///
 /// # Errors
 /// [`MeasureError`]; [`MeasureError::Differs`] for a command that is not the host's.
-pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, MeasureError> {
+pub fn measure<const D: usize, const N: usize, const P: usize>(
+    image: &Image,
+    scenarios: &[Scenario<D, N, P>],
+) -> Result<Figures, MeasureError> {
     let mut device = Device::emulate(image)?;
     let mut counted: BTreeMap<Branch, Vec<u32>> = BTreeMap::new();
     let mut stack = 0;
@@ -312,10 +323,10 @@ pub fn measure(image: &Image, scenarios: &[Scenario]) -> Result<Figures, Measure
     Ok(Figures { flash, ram, stack, steps, instructions })
 }
 
-fn run<T: Scalar>(
+fn run<T: Scalar, const D: usize, const N: usize, const P: usize>(
     device: &mut Device,
-    table: &Table<T, 2>,
-    scenario: &Scenario,
+    table: &Table<T, D, N, P>,
+    scenario: &Scenario<D, N, P>,
     counted: &mut BTreeMap<Branch, Vec<u32>>,
 ) -> Result<(), MeasureError> {
     let name = scenario.name;
@@ -323,7 +334,7 @@ fn run<T: Scalar>(
     let length = encode(table, &mut bytes).map_err(|reason| MeasureError::Table { scenario: name, reason })?;
     let controller = Controller::new(table, &scenario.settings)
         .map_err(|reason| MeasureError::Settings { scenario: name, reason })?;
-    let mut state = State::<T>::new();
+    let mut state = State::new();
     device.begin(&bytes[..length], &scenario.settings)?;
     let counter_hz = device.identity().counter_hz;
     for inputs in &scenario.inputs {

@@ -1,3 +1,4 @@
 //! What the images cost on the board.
 
 pub mod measure;
+pub mod space;

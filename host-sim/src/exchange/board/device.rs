@@ -11,7 +11,7 @@ use firmware::serial::{Account, ClockSource, Identity, LineLedger, Refusal, Repl
 use firmware::{Inputs, Settings};
 
 use super::error::BoardError;
-use super::image::Image;
+use super::image::{Control, Image};
 use super::line::SerialLine;
 use super::qemu::Qemu;
 use super::tamper::Tamper;
@@ -61,23 +61,35 @@ impl Device {
     /// [`BoardError`].
     pub fn emulate(image: &Image) -> Result<Self, BoardError> {
         let (qemu, line) = Qemu::start(&image.elf)?;
-        Self::connect(line, image.scalar, Some(qemu))
+        Self::connect_to(line, image.scalar, image.control, Some(qemu))
     }
 
-    /// Asks who is at the other end of the line.
+    /// Asks who is at the other end of the line: it must be a controller of the plane.
     ///
     /// # Errors
     /// [`BoardError::Silent`], [`BoardError::Identity`].
-    pub fn connect(mut line: SerialLine, scalar: ScalarKind, qemu: Option<Qemu>) -> Result<Self, BoardError> {
+    pub fn connect(line: SerialLine, scalar: ScalarKind, qemu: Option<Qemu>) -> Result<Self, BoardError> {
+        Self::connect_to(line, scalar, Control::Plane, qemu)
+    }
+
+    /// The same for a controller of this.
+    ///
+    /// # Errors
+    /// As [`Device::connect`].
+    pub fn connect_to(
+        mut line: SerialLine,
+        scalar: ScalarKind,
+        control: Control,
+        qemu: Option<Qemu>,
+    ) -> Result<Self, BoardError> {
         let identity = hello(&mut line)?;
         let expected = Identity {
             protocol: PROTOCOL_VERSION,
             layout: LAYOUT_VERSION,
             table_format: FORMAT_VERSION,
             scalar: scalar as u8,
-            // What is simulated here is the plane.
-            dimension: 2,
-            paddles: 1,
+            dimension: control.dimension(),
+            paddles: control.paddles(),
             ..identity
         };
         if identity != expected {

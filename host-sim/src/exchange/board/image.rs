@@ -47,9 +47,47 @@ impl Processor {
     }
 }
 
+/// What an image controls: the table's dimension of space and number of paddles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Control {
+    /// One paddle in the plane.
+    #[default]
+    Plane,
+    /// Two paddles in space.
+    SpacePair,
+}
+
+impl Control {
+    /// What follows the scalar in the names of images and budgets.
+    pub const fn suffix(self) -> &'static str {
+        match self {
+            Self::Plane => "",
+            Self::SpacePair => "-space",
+        }
+    }
+
+    /// Dimension of space.
+    pub const fn dimension(self) -> u8 {
+        match self {
+            Self::Plane => 2,
+            Self::SpacePair => 3,
+        }
+    }
+
+    /// Paddles that are moved.
+    pub const fn paddles(self) -> u8 {
+        match self {
+            Self::Plane => 1,
+            Self::SpacePair => 2,
+        }
+    }
+}
+
 /// An image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
+    /// What it controls.
+    pub control: Control,
     /// What it computes in.
     pub scalar: ScalarKind,
     /// What it was compiled for.
@@ -68,11 +106,19 @@ pub struct MemoryUse {
 }
 
 impl Image {
-    /// Builds the image, or finds that it is up to date. Linking proves that no panic can be reached.
+    /// Builds the planar image, or finds that it is up to date. Linking proves that no panic can be reached.
     ///
     /// # Errors
     /// [`BoardError::NoTarget`], [`BoardError::Build`], [`BoardError::Io`].
     pub fn build(scalar: ScalarKind, processor: Processor) -> Result<Self, BoardError> {
+        Self::build_for(Control::Plane, scalar, processor)
+    }
+
+    /// The same for what is to be controlled; in space, in `f64` only.
+    ///
+    /// # Errors
+    /// As [`Image::build`].
+    pub fn build_for(control: Control, scalar: ScalarKind, processor: Processor) -> Result<Self, BoardError> {
         if !has_target() {
             return Err(BoardError::NoTarget { target: TARGET });
         }
@@ -80,7 +126,7 @@ impl Image {
         let base = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| workspace.join("target"), PathBuf::from);
         // Apart from the host's: this may run while cargo holds the lock of that one.
         let directory = base.join(format!("board-{}", processor.name()));
-        let name = format!("stillpoint-{}", scalar.name());
+        let name = format!("stillpoint-{}{}", scalar.name(), control.suffix());
         let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
         cargo
             .current_dir(&workspace)
@@ -97,7 +143,7 @@ impl Image {
         if !output.status.success() {
             return Err(BoardError::Build { log: String::from_utf8_lossy(&output.stderr).into_owned() });
         }
-        Ok(Self { scalar, processor, elf: directory.join(TARGET).join(PROFILE).join(name) })
+        Ok(Self { control, scalar, processor, elf: directory.join(TARGET).join(PROFILE).join(name) })
     }
 
     /// What it takes of the board's memory.

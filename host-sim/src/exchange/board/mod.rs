@@ -17,6 +17,6 @@ pub mod tamper;
 
 pub use device::{Answer, Device};
 pub use error::BoardError;
-pub use image::{Image, Processor};
+pub use image::{Control, Image, Processor};
 pub use line::SerialLine;
 pub use qemu::Qemu;
