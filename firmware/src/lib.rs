@@ -1,6 +1,6 @@
 //! Fixed-rate controller that holds a soft-tissue target still while a needle goes in.
 //!
-//! A needle goes into soft tissue and drags a target along. A paddle on the skin moves so that the displacement of
+//! A needle goes into soft tissue and drags a target along. A paddle on the skin (in space: one or two) moves so that the displacement of
 //! the target orthogonal to the needle axis stays 0 (model based stabilization of soft tissue targets, dynamic
 //! paddle). What the tissue does is computed offline and comes as a [table](contract::Table); this crate reads
 //! samples, checks them, and gives one paddle command per tick.
@@ -26,15 +26,30 @@
 //!
 //! ```text
 //! feed-forward    f = path(z)                        table, cubic Hermite in depth
-//! left over       m = n·y − n·J(z)·(u − f)           once per target sample; z, u: when y was measured
+//! left over       m = Nᵀy − NᵀJ(z)·(u − f)           once per target sample; z, u: when y was measured
 //! estimate        l, s ← observer(m)                 level and slope in depth of what the table leaves
-//! feedback        n·J·w = −(l + s·Δz), w along d     d = J⁻¹n, or the minimum-norm direction Jₙᵀ/(Jₙ·Jₙᵀ)
-//! command         u ← towards f + w                  |u| ≤ u_max, |Δu| ≤ Δ_max on every tick
+//! feedback        NᵀJ·w = −(l + s·Δz), w along G     G = J⁺N, or the minimum-norm directions (NᵀJ)⁺
+//! command         u ← towards f + w                  |u| ≤ u_max, |Δu| ≤ Δ_max on every tick, of each paddle
 //! ```
 //!
+//! # Dimension and paddles
+//! [`Table`], [`Controller`] and [`State`] have three numbers: the dimension of space D, the number N = D − 1 of directions
+//! orthogonal to the needle, and the number of paddles P. They stand for one paddle in the plane unless said otherwise; a
+//! [`SpatialTable`](contract::SpatialTable) is one in space. Frames have three components and two paddles whatever the
+//! controller has.
+//!
+//! In the plane N is one unit vector n, and one paddle leaves the target's position along the needle alone (G = J⁻¹n). In space
+//! two directions are to be held, each with an observer of its own, and what happens along the needle is left free
+//! ([`Direction::default_in`]). Of two paddles, one that may go twice as far goes four times as far for the same effect
+//! ([`law`]); what one cannot give because it is at its limit, the other gives as long as it can.
+//!
+//! Every paddle has its own stream of samples, limits and monitors. **If one of them is lost, both keep their positions**
+//! (HOLD), and SAFE follows as it does for one: what the other alone could still control, the table does not say, and where
+//! the lost one is, nobody knows. [`Faults::SECOND_PADDLE`] tells which.
+//!
 //! [`observer`] tells how sensor and table are weighed, and how [`Feedback::Harmonic`] adds a patient's breath to what is
-//! removed: `n·J·w = −(l + s·Δz + c(t))`. [`Feedback::Integral`] is the plain law, w ← w − g·d·e with
-//! the error e = n·y: no estimate, fewer instructions.
+//! removed: `NᵀJ·w = −(l + s·Δz + c(t))`. [`Feedback::Integral`] is the plain law, w ← w − g·G·e with
+//! the error e = Nᵀy: no estimate, fewer instructions.
 //!
 //! The gain g, of an observer the largest, follows from the delay of the loop, see [`loop_stability`]; the limits and their anti-windup are in
 //! [`limits`].
@@ -44,13 +59,13 @@
 //! |---|---|---|
 //! | z | needle depth | length of the scene |
 //! | y | target displacement from rest | length |
-//! | n | unit vector orthogonal to the needle axis | – |
-//! | u | paddle displacement | length |
+//! | N | unit vectors orthogonal to the needle axis and each other, a column each; n in the plane | – |
+//! | u | displacements of all paddles | length |
 //! | w | what the feedback adds to the feed-forward | length |
-//! | J | actuation Jacobian dy/du | – |
+//! | J | actuation Jacobian dy/du, of all paddles side by side | – |
 //! | g | loop gain per target sample | – |
 //! | d | delay of the loop | target samples |
-//! | λ | eigenvalue of J·Ĵ⁻¹: true over assumed tissue | – |
+//! | λ | eigenvalue of J·Ĵ⁻¹: true over assumed tissue; in space of (NᵀJ)·(NᵀĴ)⁺ | – |
 //!
 //! Times are nanoseconds (`_ns`) of one monotonic clock, speeds length per second.
 //!

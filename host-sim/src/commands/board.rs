@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use host_sim::SimError;
-use host_sim::bench::board::space;
 use host_sim::bench::board::measure::{self, Budget, Complaint, Figures, MeasureError};
+use host_sim::bench::board::space;
 use host_sim::bench::usage::UsageError;
 use host_sim::exchange::board::Control;
 use host_sim::record::error::FileError;

@@ -83,7 +83,7 @@ pub(crate) fn mismatches(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
     };
     let cases = [
         (with(0, b'X'), TableError::NotATable),
-        (with(8, 2), TableError::FormatVersion { found: 2 }),
+        (with(8, 1), TableError::FormatVersion { found: 1 }),
         (with(8, 0), TableError::FormatVersion { found: 0 }),
         (with(10, 4), TableError::ScalarKind { found: ScalarKind::F32, expected: ScalarKind::F64 }),
         (with(10, 7), TableError::UnknownScalar { found: 7 }),
