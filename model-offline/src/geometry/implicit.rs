@@ -4,6 +4,9 @@
 use super::point::Point;
 use std::fmt::Debug;
 
+/// Steps along each side of the grids on which a common point is looked for: most have one on the first.
+const GRIDS: [i32; 2] = [12, 48];
+
 /// A body given by a function that is negative inside of it.
 pub trait Implicit: Debug + Send + Sync {
     /// Negative inside, 0 on the boundary, near which it is about the signed distance (Lipschitz constant about 1);
@@ -44,6 +47,19 @@ pub trait Implicit: Debug + Send + Sync {
     fn holds(&self, x: &Point<3>, tolerance: f64) -> bool {
         self.patch_level(x) <= tolerance
     }
+}
+
+/// Whether a region and a body share a point that is `wanted`, of a grid over the region's bounds: one fine enough to find
+/// what is meant. A region without bounds is taken to share one.
+pub fn share(region: &dyn Implicit, body: &dyn Implicit, wanted: &dyn Fn(&Point<3>) -> bool) -> bool {
+    let Some((low, high)) = region.bounds() else { return true };
+    let found = |steps: i32| {
+        let at = |k: usize, i: i32| low[k] + (high[k] - low[k]) * (f64::from(i) + 0.5) / f64::from(steps);
+        let all = (0..steps).flat_map(|i| (0..steps).flat_map(move |j| (0..steps).map(move |k| [i, j, k])));
+        all.map(|cell| Point::from_fn(|k, _| at(k, cell[k])))
+            .any(|x| region.level(&x) < 0.0 && body.level(&x) < 0.0 && wanted(&x))
+    };
+    GRIDS.into_iter().any(found)
 }
 
 /// A smooth surface without edges: where its level vanishes. Sharp edges of a body are where two sheets vanish.

@@ -33,7 +33,7 @@ pub enum SurfaceError {
         vertices: usize,
     },
     /// A coordinate is infinite, no number, or too large to compute with.
-    #[error("vertex {vertex} has the coordinate {value}: coordinates are finite and at most 1e12, export it again")]
+    #[error("vertex {vertex} has the coordinate {value:e}: coordinates are finite and at most 1e12, export it again")]
     Coordinate {
         /// Which vertex, from 0.
         vertex: usize,

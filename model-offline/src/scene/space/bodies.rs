@@ -8,7 +8,7 @@ use crate::scene::error::{SceneError, Source};
 use crate::scene::schema::Located;
 use std::collections::BTreeSet;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 type Checked<T> = Result<T, SceneError>;
@@ -30,6 +30,8 @@ pub(super) struct Bodies<'a> {
     unit: &'a str,
     segmentation: Option<Segmentation>,
     pub(super) notes: Vec<String>,
+    /// All files that were read.
+    pub(super) files: Vec<PathBuf>,
 }
 
 /// The labels of the domain, and which of them are the body.
@@ -42,7 +44,7 @@ struct Segmentation {
 impl<'a> Bodies<'a> {
     /// For files relative to `folder`, in a scene whose unit of length is `unit`.
     pub(super) fn new(source: Source<'a>, folder: &'a Path, unit: &'a str) -> Self {
-        Self { source, folder, unit, segmentation: None, notes: Vec::new() }
+        Self { source, folder, unit, segmentation: None, notes: Vec::new(), files: Vec::new() }
     }
 
     /// The scene's body.
@@ -62,12 +64,13 @@ impl<'a> Bodies<'a> {
     }
 
     fn solid_body(&self, solid: &SolidSection, span: Range<usize>) -> Checked<Body> {
+        let body = self.solid(solid, span.clone(), "domain")?;
         if let SolidSection::Box { min, max } = solid
             && (0..3).any(|k| min[k] >= max[k])
         {
             return Err(self.source.error(span, "the body is flat", "min must be below max in every coordinate"));
         }
-        Ok(Arc::new(self.solid(solid, span, "domain")?))
+        Ok(Arc::new(body))
     }
 
     /// The region of an inclusion. The domain has to be read before.
@@ -101,6 +104,7 @@ impl<'a> Bodies<'a> {
 
     /// What a file's surface encloses.
     fn surface(&mut self, name: &Located<String>) -> Checked<Body> {
+        self.named(name, "an STL, OBJ or PLY file")?;
         let read = import::surface(&self.folder.join(name.get()));
         let read = read.map_err(|wrong| self.unreadable(name, &wrong, "an STL, OBJ or PLY file"))?;
         let checked = read.value.check().map_err(|wrong| {
@@ -117,6 +121,7 @@ impl<'a> Bodies<'a> {
     /// The body of a segmentation, which is kept for the inclusions.
     fn labelled(&mut self, located: &Located<LabelsSection>) -> Checked<Body> {
         let LabelsSection { file, body } = located.get();
+        self.named(file, "a NIfTI or NRRD file")?;
         let read = import::labels(&self.folder.join(file.get()));
         let read = read.map_err(|wrong| self.unreadable(file, &wrong, "a NIfTI or NRRD file"))?;
         self.note(file.get(), read.notes);
@@ -162,6 +167,15 @@ impl<'a> Bodies<'a> {
             self.source.error(span, format!("labels: {wrong}"), "give a label that the file has, e.g. body = [1, 2]")
         })?;
         Ok(Arc::new(body))
+    }
+
+    /// Notes a file that the scene is made of; it needs a name.
+    fn named(&mut self, name: &Located<String>, wanted: &str) -> Checked<()> {
+        if name.get().trim().is_empty() {
+            return Err(self.source.error(name.span(), "the file has no name", format!("give the path of {wanted}")));
+        }
+        self.files.push(self.folder.join(name.get()));
+        Ok(())
     }
 
     /// A file that cannot be used, at its name in the scene.

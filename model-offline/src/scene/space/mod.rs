@@ -13,7 +13,7 @@ use crate::discretization::{Discretization, Method};
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::Law;
 use nalgebra::Matrix3x2;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A scene of either dimension.
@@ -97,6 +97,8 @@ pub struct SpaceScene {
     pub discretization: Discretization,
     /// What was changed or assumed in files that the scene names, a sentence each.
     pub notes: Vec<String>,
+    /// Files that the scene names.
+    pub files: Vec<PathBuf>,
 }
 
 /// A region of another stiffness or material.

@@ -186,7 +186,7 @@ pub struct LabelsSection {
 
 /// One label, or several.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a label, or a list of labels: whole numbers from 0 to 65535")]
 pub enum LabelSet {
     /// One label.
     One(u16),
@@ -297,7 +297,7 @@ pub struct PairsSection {
 
 /// All pairs, none, or some.
 #[derive(Debug, Clone, PartialEq, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected \"all\", \"none\", or a list of pairs of paddle indices like [[1, 4], [2, 6]]")]
 pub enum PairsOf {
     /// "all" or "none".
     Word(String),

@@ -4,6 +4,7 @@ use super::bodies::Bodies;
 use super::schema::{DiscretizationSection, InclusionSection, PairsOf, SolidSection, SpaceSceneFile};
 use super::{SpaceInclusion, SpaceNeedle, SpacePaddle, SpaceScene};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
+use crate::geometry::implicit::share;
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::{Law, MaterialSection};
 use crate::scene::Actuator;
@@ -15,6 +16,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 type Checked<T> = Result<T, SceneError>;
+
+/// Bodies are at least this long, and their coordinates at most so large, in units of the scene.
+const SMALLEST: f64 = 1e-12;
+const LARGEST: f64 = 1e12;
 
 /// A scene whose files are relative to `folder`.
 pub(super) fn parse(source: Source<'_>, folder: &Path) -> Checked<SpaceScene> {
@@ -46,7 +51,7 @@ impl Validator<'_> {
                 "intersect half spaces with a box, a sphere, an ellipsoid or a cylinder",
             )
         })?;
-        let size = (high - low).norm();
+        let size = self.size(low, high)?;
         let needle = self.needle(size)?;
         let paddles = self.paddles()?;
         let mut inclusions = Vec::with_capacity(file.inclusion.len());
@@ -62,6 +67,7 @@ impl Validator<'_> {
             material: self.material(&file.material)?,
             inclusions,
             notes: bodies.notes,
+            files: bodies.files,
             immobile: self.immobile()?,
             pairs: self.pairs(&paddles)?,
             actuator: self.actuator(&needle)?,
@@ -70,6 +76,20 @@ impl Validator<'_> {
             paddles,
             body,
         })
+    }
+
+    /// The diagonal of the body's bounding box; products of three such lengths have to be numbers.
+    fn size(&self, low: Point<3>, high: Point<3>) -> Checked<f64> {
+        let farthest = low.amax().max(high.amax());
+        let size = (high - low).amax();
+        if size >= SMALLEST && farthest <= LARGEST {
+            return Ok((high - low).norm());
+        }
+        Err(self.error(
+            self.file.domain.span(),
+            format!("the body is {size:e} long, its farthest coordinate {farthest:e}"),
+            format!("choose a unit of length in which numbers are between {SMALLEST:e} and {LARGEST:e}"),
+        ))
     }
 
     /// What scenes in the plane have and scenes in space have not yet is refused by name.
@@ -130,7 +150,9 @@ impl Validator<'_> {
     fn needle(&self, size: f64) -> Checked<SpaceNeedle> {
         let section = &self.file.needle;
         let axis = self.point(&section.axis, "needle axis")?;
-        if axis.norm() < 1e-12 {
+        // Divided first: the square of a very long or short axis is no number.
+        let longest = axis.amax();
+        if longest == 0.0 {
             let help = "e.g. axis = [0.0, 0.0, -1.0]";
             return Err(self.error(section.axis.span(), "the needle axis has no direction", help));
         }
@@ -150,7 +172,7 @@ impl Validator<'_> {
         }
         Ok(SpaceNeedle {
             region: self.region(&section.region, "needle region")?,
-            axis: axis.normalize(),
+            axis: (axis / longest).normalize(),
             depth,
             increments,
             speed: section.speed.as_ref().map_or(Ok(0.2 * depth), |speed| self.positive(speed, "speed"))?,
@@ -245,11 +267,11 @@ impl Validator<'_> {
             let message = format!("stiffness is {}", section.stiffness);
             return Err(self.error(located.span(), message, "stiffness must be a positive finite number"));
         }
-        if !meet(region.as_ref(), body) {
+        if !share(region.as_ref(), body, &|_| true) {
             return Err(self.error(
                 located.span(),
-                "this inclusion covers nothing of the body",
-                "move it inside of the body or remove it",
+                "this inclusion covers nothing of the body, or too thin a part of it",
+                "move it inside of the body, make it thicker, or remove it",
             ));
         }
         Ok(SpaceInclusion {
@@ -273,7 +295,7 @@ impl Validator<'_> {
             return Err(self.error(
                 located.span(),
                 "material: tissue that relaxes is of simulations, and scenes in space are not simulated yet",
-                "take [material.relaxation] out",
+                "write [material.relaxation] g = [], tau = []: without terms a preset's relaxation is left out, too",
             ));
         }
         Ok(law)
@@ -300,7 +322,7 @@ impl Validator<'_> {
             _ => {
                 return Err(self.error(
                     located.span(),
-                    "one of spacing, tolerance and level is needed",
+                    "one of spacing, tolerance and level is needed, and only one",
                     "e.g. tolerance = 0.05",
                 ));
             }
@@ -323,16 +345,4 @@ impl Validator<'_> {
 
 fn all_pairs(paddles: usize) -> Vec<[usize; 2]> {
     (0..paddles).flat_map(|a| (a + 1..paddles).map(move |b| [a, b])).collect()
-}
-
-/// Whether two solids share a point of a grid over the first one's bounds: fine enough to find what is meant.
-fn meet(region: &dyn Implicit, body: &dyn Implicit) -> bool {
-    const STEPS: i32 = 12;
-    let Some((low, high)) = region.bounds() else { return true };
-    let at = |k: usize, i: i32| low[k] + (high[k] - low[k]) * (f64::from(i) + 0.5) / f64::from(STEPS);
-    let steps = || 0..STEPS;
-    steps().flat_map(|i| steps().flat_map(move |j| steps().map(move |k| (i, j, k)))).any(|(i, j, k)| {
-        let x = Point::<3>::new(at(0, i), at(1, j), at(2, k));
-        region.level(&x) < 0.0 && body.level(&x) < 0.0
-    })
 }
