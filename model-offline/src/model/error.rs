@@ -3,6 +3,7 @@
 use crate::discretization::meshing::StuffingError;
 use crate::discretization::{DiscretizationError, ShapeError, SpatialError};
 use crate::material::MaterialError;
+use crate::number::length;
 use crate::scene::NoSuchPaddle;
 use crate::solver::equilibrium::{Failure, FailureReason};
 
@@ -17,12 +18,36 @@ pub enum ModelError {
     Spatial(#[from] SpatialError),
     /// A body in space cannot be meshed.
     #[error("the body cannot be meshed: {0}")]
-    Mesh(#[from] StuffingError),
+    Mesh(StuffingError),
+    /// An inclusion between the nodes.
+    #[error(
+        "inclusion {number} is lost between the elements: it is too small or too thin for them; ask for smaller ones, make it \
+         larger, or take it out"
+    )]
+    UnseenInclusion {
+        /// Which one, from 1 in the scene's order.
+        number: usize,
+    },
+    /// A part of the body that nothing holds.
+    #[error(
+        "a part of the body around {} hangs on nothing: neither the immobile part nor the needle holds it; join it to the rest, \
+         take it out, or let [immobile] reach it",
+        place(at)
+    )]
+    LoosePart {
+        /// A point of it, length units.
+        at: [f64; 3],
+    },
     /// A region without any of the surface in it.
-    #[error("the region of the {0} catches no surface of the body: move it onto the surface, or make it larger")]
+    #[error(
+        "the region of the {0} catches no surface of the body: move it onto the surface, let it reach into the body, or make it larger"
+    )]
     NothingCaught(BoundaryPart),
     /// Two patches claim the same nodes.
-    #[error("the {part} touches the {other} at ({:.4}, {:.4}, {:.4}): tissue cannot follow both; move one of them or make it smaller", at[0], at[1], at[2])]
+    #[error(
+        "the {part} touches the {other} at {}: tissue cannot follow both; move one of them or make it smaller",
+        place(at)
+    )]
     PatchesTouch {
         /// One of them.
         part: BoundaryPart,
@@ -35,7 +60,7 @@ pub enum ModelError {
     #[error(transparent)]
     Discretization(#[from] DiscretizationError),
     /// The tangent at rest cannot be solved with, or a Jacobian cannot be computed.
-    #[error("{0}")]
+    #[error(transparent)]
     Solve(#[from] Failure),
     /// A constrained feature has no node on it.
     #[error("no node lies on the {0}; refine the discretization")]
@@ -63,7 +88,7 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; ask for less, or use a method that converges faster (fem-t6)"
+        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; ask for less, or use a method that converges faster (fem-t6, in space fem-t10)"
     )]
     ToleranceNotReached {
         /// Asked for.
@@ -104,6 +129,18 @@ pub enum ModelError {
     /// A law that was changed on the way is none.
     #[error(transparent)]
     Material(#[from] MaterialError),
+}
+
+impl From<StuffingError> for ModelError {
+    fn from(error: StuffingError) -> Self {
+        Self::Mesh(error)
+    }
+}
+
+/// A point in words.
+fn place(at: &[f64; 3]) -> String {
+    let [x, y, z] = at.map(length);
+    format!("({x}, {y}, {z})")
 }
 
 /// What kind of thing went wrong, by the name that results have for it.
@@ -161,6 +198,7 @@ impl ModelError {
                 | Self::NeedleSlips
                 | Self::PatchesTouch { .. }
                 | Self::NothingCaught(_)
+                | Self::LoosePart { .. }
                 | Self::Spatial(SpatialError::Planar(_))
                 | Self::Material(_)
         )

@@ -20,6 +20,8 @@ const RECONNECTED: f64 = 0.34;
 /// Steps of a search begin at this part of the distance to the neighbours, and end after so many halvings.
 const FIRST_STEP: f64 = 0.25;
 const HALVINGS: usize = 5;
+/// A tetrahedron is divided by a point that is to be a node only if its parts are better than this (sin 1°).
+const FLATTEST: f64 = 0.02;
 /// A position must be better by this much in the sine.
 const GAIN: f64 = 1e-4;
 
@@ -145,7 +147,7 @@ impl Star {
 }
 
 /// Puts nodes on points that lie in the body: of the corners of the tetrahedron around a point the one that suffers
-/// least, or a new one. Returns these nodes in increasing order.
+/// least, or a new one; none where either would spoil the mesh. Returns these nodes in increasing order.
 pub(super) fn pin(fitted: &mut Fitted<'_>, points: &[Point<3>]) -> Vec<u32> {
     let mut fixed: Vec<u32> = Vec::new();
     for x in points {
@@ -161,6 +163,12 @@ pub(super) fn pin(fitted: &mut Fitted<'_>, points: &[Point<3>]) -> Vec<u32> {
             if (stays && quality > 0.1 || close) && best.is_none_or(|(q, _)| quality > q) {
                 best = Some((quality, n));
             }
+        }
+        // A point all but on a face or on the surface would leave a tetrahedron without volume: it is no node then.
+        let corners = fitted.complex.corners(nodes);
+        let part = |end: usize| worst_sine(&std::array::from_fn(|i| if i == end { *x } else { corners[i] }));
+        if best.is_none() && (0..4).any(|end| part(end) < FLATTEST) {
+            continue;
         }
         let node = best.map(|(_, n)| n).unwrap_or_else(|| {
             let m = fitted.complex.add_node(*x);

@@ -16,7 +16,8 @@ pub struct Request<'a> {
     pub size: &'a dyn Fn(&Point<3>) -> f64,
     /// More nodes than this are refused.
     pub most_nodes: usize,
-    /// Points that shall be nodes. Those outside of the body are ignored.
+    /// Points that shall be nodes. Those outside of the body are ignored, and those so close to a face or to the surface
+    /// that a tetrahedron would lose its volume.
     pub pinned: &'a [Point<3>],
 }
 

@@ -1,6 +1,6 @@
 //! Isosurface stuffing: a graded lattice, cut along every sheet, improved.
 
-use super::alignment::{AxisPlane, axis_planes, place};
+use super::alignment::{self, AxisPlane, axis_planes};
 use super::complex::Complex;
 use super::cutting::Fitted;
 use super::features::Features;
@@ -11,6 +11,7 @@ use super::octree::{Cube, Octree};
 use super::quality::{EDGES, worst_sine};
 use super::request::Request;
 use crate::geometry::{Implicit, Point};
+use crate::number::length;
 
 /// The body cannot be meshed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -30,7 +31,7 @@ pub enum StuffingError {
     #[error("the body has no bounds: intersect it with a box")]
     Unbounded,
     /// A wanted length of edges that is no positive number.
-    #[error("the size of elements at ({}, {}, {}) is {size}: it must be positive", .at.x, .at.y, .at.z)]
+    #[error("the size of elements at {} is {size}: it must be positive", place(.at))]
     BadSize {
         /// Where.
         at: Point<3>,
@@ -49,11 +50,16 @@ pub enum StuffingError {
         patch: usize,
     },
     /// Something is too small, or too sharp, for the elements around it.
-    #[error("elements are too large for what is near ({}, {}, {}): ask for smaller ones there", .at.x, .at.y, .at.z)]
+    #[error("elements are too large for what is near {}: ask for smaller ones there", place(.at))]
     Unresolved {
         /// Where.
         at: Point<3>,
     },
+}
+
+/// A point in words.
+fn place(at: &Point<3>) -> String {
+    format!("({}, {}, {})", length(at.x), length(at.y), length(at.z))
 }
 
 /// Leaves wider than this multiple of the wanted size are split: sizes are rounded to the nearest power of two.
@@ -76,7 +82,7 @@ pub fn stuff(request: &Request<'_>) -> Result<TetMesh, StuffingError> {
     }
     let features = Features::new(request, extent);
     let planes = axis_planes(&features);
-    let placement = place(bounds, &planes, sample_size(request, bounds)?);
+    let placement = alignment::place(bounds, &planes, sample_size(request, bounds)?);
     let tree = grow(request, &features, &planes, &placement)?;
     let complex = background(request, &tree, &placement);
     if complex.nodes.len() > 2 * request.most_nodes {

@@ -3,8 +3,9 @@
 use super::super::error::{BoundaryPart, ModelError};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::{Grading, Request, StuffingError, rim_points, stuff, surface_points};
+use crate::geometry::implicit::share;
 use crate::geometry::{Implicit, Point};
-use crate::scene::space::SpaceScene;
+use crate::scene::space::{SpaceInclusion, SpaceScene};
 
 /// How long edges are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,12 +16,16 @@ pub struct MeshSize {
     pub inclusion: f64,
     /// At most, over the longest side of the body's bounding box.
     pub coarsest: f64,
+    /// At most, over its shortest side: slabs and plates have more than one element across.
+    pub thickest: f64,
     /// What they grow by per length of distance.
     pub growth: f64,
 }
 
 /// Nodes of a mesh at most.
 const MOST_NODES: usize = 400_000;
+/// So often elements are made smaller where they turn out too large.
+const MOST_TRIES: usize = 24;
 /// Points on rims and surfaces are this share of the size there apart.
 const SAMPLED: f64 = 0.5;
 /// Patches at an even spacing have at least this many edges across.
@@ -30,7 +35,13 @@ impl MeshSize {
     /// That of a refinement level: each halves the edges at the rims.
     pub fn level(level: i32) -> Self {
         let finer = 2.0_f64.powi(-level);
-        Self { rim: 0.4 * finer, inclusion: 0.8 * finer, coarsest: 0.2 * finer.sqrt(), growth: 0.5 }
+        Self {
+            rim: 0.4 * finer,
+            inclusion: 0.8 * finer,
+            coarsest: 0.2 * finer.sqrt(),
+            thickest: finer.sqrt(),
+            growth: 0.5,
+        }
     }
 }
 
@@ -63,7 +74,8 @@ fn width(points: &[Point<3>]) -> Option<f64> {
 pub fn mesh(scene: &SpaceScene, size: &MeshSize) -> Result<TetMesh, ModelError> {
     let body: &dyn Implicit = scene.body.as_ref();
     let extent = extent(scene);
-    let mut grading = Grading::new(size.coarsest * extent, size.growth);
+    let coarsest = (size.coarsest * extent).min(size.thickest * shortest(scene));
+    let mut grading = Grading::new(coarsest, size.growth);
     for region in patches(scene) {
         let rim = |spacing: f64| rim_points(body, region, spacing);
         if let Some(asking) = Asking::new(rim, 0.02 * extent, size.rim) {
@@ -72,11 +84,11 @@ pub fn mesh(scene: &SpaceScene, size: &MeshSize) -> Result<TetMesh, ModelError> 
     }
     for inclusion in &scene.inclusions {
         let surface = |spacing: f64| surface_points(body, inclusion.region.as_ref(), spacing);
-        if let Some(asking) = Asking::new(surface, 0.05 * extent, size.inclusion) {
+        if let Some(asking) = Asking::new(surface, sampling(inclusion, extent), size.inclusion) {
             grading = grading.with(&asking.points, size.inclusion * asking.width);
         }
     }
-    stuffed(scene, &|x| grading.size(x))
+    stuffed(scene, grading)
 }
 
 /// Meshes a scene evenly, but so that every patch and inclusion is seen.
@@ -87,16 +99,26 @@ pub fn even_mesh(scene: &SpaceScene, spacing: f64) -> Result<TetMesh, ModelError
     let (body, extent): (&dyn Implicit, f64) = (scene.body.as_ref(), extent(scene));
     let mut grading = Grading::new(spacing, 1.0);
     let rims = patches(scene).map(|region| Asking::new(|s| rim_points(body, region, s), 0.02 * extent, 0.2));
-    let surfaces = scene.inclusions.iter();
-    let surfaces = surfaces.map(|i| Asking::new(|s| surface_points(body, i.region.as_ref(), s), 0.05 * extent, 0.2));
+    let points = |i: &SpaceInclusion, spacing: f64| surface_points(body, i.region.as_ref(), spacing);
+    let surfaces = scene.inclusions.iter().map(|i| Asking::new(|s| points(i, s), sampling(i, extent), 0.2));
     for asking in rims.chain(surfaces).flatten() {
         grading = grading.with(&asking.points, (asking.width / ACROSS).min(spacing));
     }
-    stuffed(scene, &|x| grading.size(x))
+    stuffed(scene, grading)
+}
+
+/// How far apart an inclusion's surface is looked for first, in a body of this extent: the smallest is to be found.
+fn sampling(inclusion: &SpaceInclusion, extent: f64) -> f64 {
+    let width = inclusion.region.bounds().map_or(f64::INFINITY, |(low, high)| (high - low).max());
+    0.05 * extent.min(5.0 * width)
 }
 
 fn extent(scene: &SpaceScene) -> f64 {
     scene.body.bounds().map_or(1.0, |(low, high)| (high - low).max())
+}
+
+fn shortest(scene: &SpaceScene) -> f64 {
+    scene.body.bounds().map_or(f64::INFINITY, |(low, high)| (high - low).min())
 }
 
 /// Regions of needle, paddles and immobile part.
@@ -105,7 +127,37 @@ fn patches(scene: &SpaceScene) -> impl Iterator<Item = &dyn Implicit> {
     held.chain(&scene.immobile).map(|region| region as &dyn Implicit)
 }
 
-fn stuffed(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<TetMesh, ModelError> {
+/// Meshes at these sizes, and at smaller ones around points where elements turn out too large.
+fn stuffed(scene: &SpaceScene, mut grading: Grading) -> Result<TetMesh, ModelError> {
+    let mut tries = 0;
+    loop {
+        match stuffed_once(scene, &|x| grading.size(x)) {
+            Err(ModelError::Mesh(StuffingError::Unresolved { at })) if tries < MOST_TRIES => {
+                let size = 0.5 * grading.size(&at);
+                grading = grading.with(&[at], size);
+                tries += 1;
+            }
+            Err(error) => return Err(error),
+            Ok(mesh) => {
+                return unseen(scene, &mesh).map_or(Ok(mesh), |number| Err(ModelError::UnseenInclusion { number }));
+            }
+        }
+    }
+}
+
+/// The number, from 1, of an inclusion that no element lies in, though it has a volume that no later one takes.
+fn unseen(scene: &SpaceScene, mesh: &TetMesh) -> Option<usize> {
+    let mut seen = vec![false; scene.inclusions.len() + 1];
+    mesh.part.iter().for_each(|part| seen[*part as usize] = true);
+    let has_volume = |number: usize| {
+        let (inclusion, later) = (&scene.inclusions[number - 1], &scene.inclusions[number..]);
+        let free = |x: &Point<3>| later.iter().all(|i| i.region.level(x) > 0.0);
+        share(inclusion.region.as_ref(), scene.body.as_ref(), &free)
+    };
+    (1..seen.len()).find(|number| !seen[*number] && has_volume(*number))
+}
+
+fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<TetMesh, ModelError> {
     let interfaces: Vec<&dyn Implicit> = scene.inclusions.iter().map(|i| i.region.as_ref()).collect();
     let patches: Vec<&dyn Implicit> = patches(scene).collect();
     let request = Request {

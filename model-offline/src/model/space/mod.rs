@@ -5,7 +5,7 @@ mod middles;
 mod patches;
 
 use self::middles::Middles;
-use self::patches::{Surface, nodes_of};
+use self::patches::{Surface, loose, nodes_of};
 use super::error::{BoundaryPart, ModelError};
 use super::tissue::{Mixing, Phase, mixture};
 use crate::discretization::{Spatial, Stencil, TetMesh};
@@ -93,6 +93,9 @@ impl SpaceModel {
                 patch => Ok(patch),
             })
             .collect::<Result<Vec<_>, _>>()?;
+        if let Some(at) = loose(mesh, patches[..2].iter().flatten().flatten()) {
+            return Err(ModelError::LoosePart { at: at.into() });
+        }
         let regions = immobile.iter().copied().chain([&scene.needle.region as &dyn Implicit]);
         let regions = regions.chain(scene.paddles.iter().map(|p| &p.region as &dyn Implicit));
         let rimmed: Vec<(Vec<[u32; 3]>, &dyn Implicit)> = regions.map(|region| (patch_of(region), region)).collect();

@@ -68,6 +68,28 @@ pub(super) fn nodes_of(patch: &[[u32; 3]], middles: &BTreeMap<(u32, u32), u32>) 
     corners.chain(between).collect::<BTreeSet<u32>>().into_iter().collect()
 }
 
+/// A corner of a part of the mesh that has none of these nodes; none where every part has one.
+pub(super) fn loose<'n>(mesh: &TetMesh, held: impl Iterator<Item = &'n u32>) -> Option<Point<3>> {
+    // Nodes of one part lead to one and the same node.
+    let mut leads: Vec<u32> = (0..mesh.nodes.len() as u32).collect();
+    fn end(leads: &mut [u32], mut node: u32) -> u32 {
+        while leads[node as usize] != node {
+            leads[node as usize] = leads[leads[node as usize] as usize];
+            node = leads[node as usize];
+        }
+        node
+    }
+    for [first, others @ ..] in &mesh.tetrahedra {
+        for other in others {
+            let (a, b) = (end(&mut leads, *first), end(&mut leads, *other));
+            leads[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let held: BTreeSet<u32> = held.map(|node| end(&mut leads, *node)).collect();
+    let mut corners = mesh.tetrahedra.iter().map(|t| t[0]);
+    corners.find(|node| !held.contains(&end(&mut leads, *node))).map(|node| mesh.nodes[node as usize])
+}
+
 /// Edges of a triangle, the lower number first.
 pub(super) fn edges(t: &[u32; 3]) -> [(u32, u32); 3] {
     [0, 1, 2].map(|k| {

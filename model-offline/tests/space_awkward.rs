@@ -1,0 +1,139 @@
+//! Scenes in space that are unusual, or wrong in a way that is easily overlooked: a right result, or an error that says what
+//! to do.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+const BOX: &str = "box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }";
+const TARGET: &str = "position = [0.5, 0.5, 0.5]";
+const INCLUSION: &str = "box = { min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4] }";
+
+/// `block` on a coarse mesh, one paddle, with replacements.
+fn scene(changes: &[(&str, &str)]) -> String {
+    let text = include_str!("../scenes/block.toml");
+    let (before, after) = (text.find("[[paddle]]\nindex = 2").unwrap(), text.find("[pairs]").unwrap());
+    let text = format!("{}{}", &text[..before], &text[after..]);
+    let text = text.replacen("tolerance = 0.05", "level = 0\nintegration = \"fem-t4\"", 1);
+    changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    })
+}
+
+/// Places on a scene; exit code, what was said in one line, and what was written.
+fn place(text: &str, options: &[&str], folder: &Path) -> (i32, String, Option<Value>) {
+    let (scene, json) = (folder.join("scene.toml"), folder.join("place.json"));
+    let _ = std::fs::remove_file(&json);
+    std::fs::write(&scene, text).unwrap();
+    let mut command = Command::cargo_bin("model-offline").unwrap();
+    command.arg("place").arg(&scene).arg("--json").arg(&json).arg("--quiet").args(options);
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    let written = std::fs::read_to_string(&json).ok().map(|text| serde_json::from_str(&text).unwrap());
+    (output.status.code().unwrap(), said, written)
+}
+
+/// The measure of the only paddle.
+fn measure(changes: &[(&str, &str)]) -> f64 {
+    let folder = tempfile::tempdir().unwrap();
+    let (code, said, written) = place(&scene(changes), &[], folder.path());
+    assert_eq!((code, said.as_str()), (0, ""), "{changes:?}");
+    written.unwrap()["paddles"][0]["controllability_measure"].as_f64().unwrap_or(f64::INFINITY)
+}
+
+#[test]
+fn a_needle_axis_has_any_length() {
+    let expected = measure(&[]);
+    for axis in ["axis = [0.0, 0.0, -1e200]", "axis = [0.0, 0.0, -1e-200]", "axis = [0, 0, -3]"] {
+        assert_eq!(measure(&[("axis = [0.0, 0.0, -1.0]", axis)]), expected, "{axis}");
+    }
+}
+
+#[test]
+fn a_target_all_but_on_the_surface_moves_like_the_one_beside_it() {
+    // Beside the paddle's corner, beside the needle contact, and within it.
+    for (near, inside) in [
+        ("[0.0000001, 0.7, 0.3]", "[0.0005, 0.7, 0.3]"),
+        ("[0.3, 0.7, 0.9999]", "[0.3, 0.7, 0.9995]"),
+        ("[0.97, 0.5, 0.9999999]", "[0.97, 0.5, 0.9995]"),
+    ] {
+        let at = |place: &str| measure(&[(TARGET, &format!("position = {place}"))]);
+        let (near, inside) = (at(near), at(inside));
+        assert!((near / inside - 1.0).abs() < 0.02, "{near} {inside}");
+    }
+}
+
+#[test]
+fn slabs_and_plates_are_meshed_with_elements_as_thin_as_they_are() {
+    // Far sides do not matter: a slab 100 times as wide is the one ten times as wide.
+    let wide = |half: &str| {
+        let body = format!("box = {{ min = [0.0, -{half}, 0.0], max = [1.0, {half}, 1.0] }}");
+        let held = format!("box = {{ min = [1.0, -{half}, 0.0], max = [1.0, {half}, 1.0] }}");
+        measure(&[(BOX, &body), ("box = { min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }", &held)])
+    };
+    let (ten, hundred) = (wide("5.0"), wide("50.0"));
+    assert!((ten / hundred - 1.0).abs() < 0.1, "{ten} {hundred}");
+}
+
+#[test]
+fn inclusions_of_any_size_are_seen_or_said_to_be_missing() {
+    // Stiff, and so small that only what is at the target can feel it.
+    let tiny = "sphere = { centre = [0.5, 0.5, 0.5], radius = 1e-4 }";
+    assert!(measure(&[(INCLUSION, tiny)]).is_finite());
+    // Three of them across each other.
+    let three = "sphere = { centre = [0.5, 0.5, 0.25], radius = 0.15 }\nstiffness = 9.0\n[[inclusion]]\n\
+                 sphere = { centre = [0.6, 0.5, 0.25], radius = 0.15 }\nstiffness = 0.1\n[[inclusion]]\n\
+                 box = { min = [0.45, 0.42, 0.17], max = [0.65, 0.58, 0.38] }";
+    assert!(measure(&[(INCLUSION, three)]).is_finite());
+    let folder = tempfile::tempdir().unwrap();
+    let shell = "solid = { difference = [{ sphere = { centre = [0.5, 0.5, 0.3], radius = 0.2 } }, \
+                 { sphere = { centre = [0.5, 0.5, 0.3], radius = 0.1999 } }] }";
+    let (code, said, _) = place(&scene(&[(INCLUSION, shell)]), &[], folder.path());
+    assert!(code == 2 && said.contains("too thin"), "{code} {said}");
+}
+
+#[test]
+fn what_is_easily_overlooked_is_said() {
+    let law = "model = \"fung\"\nlambda = 383.0\nmu = 318.5\nc = 0.779\nlambda_c = 1.5\nmu_c = 1.0";
+    let cut = "solid = { difference = [{ box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }, \
+               { box = { min = [0.2, -1.0, -1.0], max = [0.25, 2.0, 2.0] } }] }";
+    for (from, to, expected) in [
+        // The paddle's side of it would float.
+        (BOX, cut, "hangs on nothing"),
+        (BOX, "box = { min = [0.0, 0.0, 0.0], max = [1e-160, 1e-160, 1e-160] }", "unit of length"),
+        (BOX, "box = { min = [0.0, 0.0, 0.0], max = [1e160, 1.0, 1.0] }", "unit of length"),
+        (BOX, "box = { min = [1.0, 0.0, 0.0], max = [0.0, 1.0, 1.0] }", "min of a box must not be above its max"),
+        (BOX, "surface = \" \"", "has no name"),
+        (BOX, "labels = { file = \"a.nrrd\", body = -1 }", "whole numbers from 0"),
+        ("of = \"all\"", "of = [[1, 2, 3]]", "list of pairs"),
+        // A box that only touches the face from outside.
+        ("min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]", "min = [-1.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]", "reach into"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (code, said, written) = place(&scene(&[(from, to)]), &[], folder.path());
+        assert!(code == 2 && said.contains(expected) && written.is_none(), "{to}: {code} {said}");
+    }
+    // A preset that relaxes; what is said to help does.
+    let folder = tempfile::tempdir().unwrap();
+    let kpa = ("stress = \"1\"", "stress = \"kPa\"");
+    let (code, said, _) = place(&scene(&[kpa, (law, "preset = \"liver\"")]), &[], folder.path());
+    assert!(code == 2 && said.contains("g = [], tau = []"), "{code} {said}");
+    assert!(measure(&[kpa, (law, "preset = \"liver\"\nrelaxation = { g = [], tau = [] }")]).is_finite());
+}
+
+#[test]
+fn an_output_over_the_bodys_file_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let surface = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+    let body = folder.path().join("place.obj");
+    std::fs::write(&body, surface).unwrap();
+    let path = folder.path().join("scene.toml");
+    let text = scene(&[(BOX, "surface = \"place.obj\""), (TARGET, "position = [0.2, 0.2, 0.2]")]);
+    std::fs::write(&path, text).unwrap();
+    let mut command = Command::cargo_bin("model-offline").unwrap();
+    let output = command.arg("place").arg(&path).arg("--json").arg(&body).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(std::fs::read_to_string(&body).unwrap(), surface);
+}
