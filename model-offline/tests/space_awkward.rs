@@ -124,6 +124,22 @@ fn what_is_easily_overlooked_is_said() {
 }
 
 #[test]
+fn paddles_that_overlap_are_no_pair() {
+    // The second is a part of the first and the first is the better one: together they seem to be what both are.
+    let second = "[[paddle]]\nindex = 2\nregion = { box = { min = [0.0, 0.3, 0.2], max = [0.0, 0.5, 0.4] } }\n\n\
+                  [[paddle]]\nindex = 3\nregion = { box = { min = [0.0, 0.4, 0.4], max = [0.0, 0.6, 0.6] } }\n\n[pairs]";
+    let folder = tempfile::tempdir().unwrap();
+    let (code, said, written) = place(&scene(&[("[pairs]", second)]), &[], folder.path());
+    assert_eq!((code, said.as_str()), (0, ""));
+    let study = written.unwrap();
+    // Those that touch are one.
+    assert_eq!(study["overlapping"], serde_json::json!([[1, 2]]));
+    for best in ["static", "dynamic"] {
+        assert_ne!(study["optimum"][best], serde_json::json!([1, 2]));
+    }
+}
+
+#[test]
 fn an_output_over_the_bodys_file_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let surface = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";

@@ -36,6 +36,9 @@ fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), C
     bar.get().into_iter().for_each(|bar| bar.finish_and_clear());
     write_json(json, &document(&study))?;
     if !run.quiet {
+        for [a, b] in overlapping(&study) {
+            eprintln!("note: paddles {a} and {b} overlap, and cannot be attached together: no such pair is the best");
+        }
         print!("{}", summary(&study));
     }
     Ok(())
@@ -61,10 +64,16 @@ fn document(study: &SpaceStudy) -> Value {
         "static_nodes": placement.profile_nodes,
         "paddles": paddles,
         "pairs": pairs,
+        "overlapping": overlapping(study),
         "no_paddle": placement.no_paddle,
         "optimum": placement.optimum,
         "optimum_single": placement.optimum_single,
     })
+}
+
+/// Pairs of paddles that cannot be attached together, by index.
+fn overlapping(study: &SpaceStudy) -> Vec<[u32; 2]> {
+    study.model.overlapping().iter().map(|pair| pair.map(|p| study.model.scene().paddles[p].index)).collect()
 }
 
 /// The study on a screen.

@@ -17,7 +17,7 @@ pub(crate) use synthetic::synthetic_breast;
 
 use crate::geometry::point::Point;
 use nalgebra::{Matrix3, Matrix4};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// So many voxels at most: 512 in every direction, 256 MiB.
 pub const MOST_VOXELS: u64 = 1 << 27;
@@ -90,6 +90,33 @@ impl Labels {
             LabelCount { label, name, voxels, volume: voxels as f64 * volume }
         };
         counts.into_iter().map(count).collect()
+    }
+
+    /// Numbers of voxels of the separate parts of the labels `wanted`, the largest first: voxels of one part share faces.
+    pub fn parts(&self, wanted: &BTreeSet<u16>) -> Vec<usize> {
+        let steps = [1, self.size[0], self.size[0] * self.size[1]];
+        let mut left: Vec<bool> = self.data.iter().map(|label| wanted.contains(label)).collect();
+        let mut parts = Vec::new();
+        let mut found = Vec::new();
+        for first in 0..left.len() {
+            if !std::mem::take(&mut left[first]) {
+                continue;
+            }
+            found.push(first);
+            let mut voxels = 0;
+            while let Some(place) = found.pop() {
+                voxels += 1;
+                for (axis, step) in steps.into_iter().enumerate() {
+                    let along = place / step % self.size[axis];
+                    let before = (along > 0).then(|| place - step);
+                    let behind = (along + 1 < self.size[axis]).then(|| place + step);
+                    found.extend(before.into_iter().chain(behind).filter(|next| std::mem::take(&mut left[*next])));
+                }
+            }
+            parts.push(voxels);
+        }
+        parts.sort_unstable_by(|a, b| b.cmp(a));
+        parts
     }
 }
 

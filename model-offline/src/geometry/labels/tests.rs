@@ -171,3 +171,25 @@ fn distances_are_those_to_the_nearest() {
         }
     }
 }
+
+#[test]
+fn parts_are_what_hangs_together_by_faces() {
+    // Two balls apart, a speck, and one voxel that touches it by an edge alone.
+    let inside = |x: &Point<3>| {
+        (x - Point::<3>::new(4.0, 4.0, 4.0)).norm() < 2.5 || (x - Point::<3>::new(11.0, 4.0, 4.0)).norm() < 1.5
+    };
+    let mut labels = image([16, 9, 9], Matrix4::identity(), inside);
+    let voxels = |r: f64| {
+        let near = |n: i32| (-n..=n).map(f64::from);
+        near(3)
+            .flat_map(|i| near(3).flat_map(move |j| near(3).map(move |k| i * i + j * j + k * k)))
+            .filter(|d| *d < r * r)
+            .count()
+    };
+    for (i, j, k) in [(0, 0, 0), (1, 1, 0), (15, 8, 8)] {
+        labels.data[i + 16 * (j + 9 * k)] = 2;
+    }
+    assert_eq!(labels.parts(&set(&[1, 2])), [voxels(2.5), voxels(1.5), 1, 1, 1]);
+    assert_eq!(labels.parts(&set(&[2])), [1, 1, 1]);
+    assert_eq!(labels.parts(&set(&[3])), [0; 0]);
+}

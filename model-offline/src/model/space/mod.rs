@@ -5,7 +5,7 @@ mod middles;
 mod patches;
 
 use self::middles::Middles;
-use self::patches::{Surface, loose, nodes_of};
+use self::patches::{Surface, loose, nodes_of, overlap};
 use super::error::{BoundaryPart, ModelError};
 use super::tissue::{Mixing, Phase, mixture};
 use crate::discretization::{Spatial, Stencil, TetMesh};
@@ -28,6 +28,7 @@ pub struct SpaceModel {
     spacing: f64,
     held: Arc<HeldNodes>,
     target: Stencil<3>,
+    overlapping: Vec<[usize; 2]>,
     analysis: Arc<OnceLock<Analysis>>,
 }
 
@@ -107,6 +108,12 @@ impl SpaceModel {
         Ok(Self {
             tissue: tissue_of(scene, &spatial),
             target: spatial.value_stencil(&scene.target)?,
+            overlapping: scene
+                .pairs
+                .iter()
+                .copied()
+                .filter(|&[a, b]| overlap(&patches[2 + a], &patches[2 + b]))
+                .collect(),
             scene: Arc::new(scene.clone()),
             spacing: typical,
             held: Arc::new(held),
@@ -181,6 +188,11 @@ impl SpaceModel {
     /// Nodes on which a paddle is attached, by its place in the scene's list, ascending.
     pub fn paddle_nodes(&self, paddle: usize) -> &[u32] {
         &self.held.paddles[paddle]
+    }
+
+    /// Those of the scene's pairs whose patches have a piece of the surface in common, where two paddles cannot both be.
+    pub fn overlapping(&self) -> &[[usize; 2]] {
+        &self.overlapping
     }
 
     /// The row of a held node.

@@ -90,6 +90,12 @@ pub(super) fn loose<'n>(mesh: &TetMesh, held: impl Iterator<Item = &'n u32>) -> 
     corners.find(|node| !held.contains(&end(&mut leads, *node))).map(|node| mesh.nodes[node as usize])
 }
 
+/// Whether two patches have triangles in common, and not just an edge or a corner.
+pub(super) fn overlap(a: &[[u32; 3]], b: &[[u32; 3]]) -> bool {
+    let of_a: BTreeSet<&[u32; 3]> = a.iter().collect();
+    b.iter().any(|triangle| of_a.contains(triangle))
+}
+
 /// Edges of a triangle, the lower number first.
 pub(super) fn edges(t: &[u32; 3]) -> [(u32, u32); 3] {
     [0, 1, 2].map(|k| {

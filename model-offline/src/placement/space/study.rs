@@ -101,7 +101,7 @@ pub struct SpacePlacement {
     pub pairs: Vec<SpacePairResult>,
     /// The insertion without a paddle.
     pub no_paddle: SpaceNoPaddle,
-    /// The best pairs; the best paddles where there are no pairs.
+    /// The best pairs of paddles that do not overlap; the best paddles where there are none.
     pub optimum: SpaceOptimum,
     /// The best single paddles.
     pub optimum_single: SpaceOptimum,
@@ -163,9 +163,13 @@ pub fn place_in_space(
         .map(|(pair, answer)| SpacePairResult { paddles: pair.map(|p| scene.paddles[p].index), answer })
         .collect();
     let optimum_single = best(paddles.iter().map(|p| (vec![p.index], &p.answer)));
-    let optimum = match pairs.is_empty() {
+    // Two paddles cannot be in one place.
+    let apart = |pair: &[usize; 2]| !model.overlapping().contains(pair);
+    let apart: Vec<&SpacePairResult> =
+        scene.pairs.iter().zip(&pairs).filter(|(pair, _)| apart(pair)).map(|(_, result)| result).collect();
+    let optimum = match apart.is_empty() {
         true => optimum_single.clone(),
-        false => best(pairs.iter().map(|p| (p.paddles.to_vec(), &p.answer))),
+        false => best(apart.iter().map(|p| (p.paddles.to_vec(), &p.answer))),
     };
     let per_depth = rest.last().map_or_else(Vector3::zeros, |r| r.target_per_depth);
     let no_paddle = SpaceNoPaddle { target_per_depth: per_depth.into(), static_study: without };

@@ -138,6 +138,16 @@ impl<'a> Bodies<'a> {
             LabelSet::Several(labels) => labels.iter().copied().collect(),
         };
         let region = self.region_of(&read.value, &wanted, body.span())?;
+        if let [largest, others @ ..] = read.value.parts(&wanted).as_slice()
+            && !others.is_empty()
+        {
+            let (count, voxels) = (others.len(), others.iter().sum::<usize>());
+            let told = format!(
+                "the body has {count} separate parts beside the largest of {largest} voxels, {voxels} voxels together; what is \
+                 smaller than elements is lost, the rest has to be held: take specks out of the segmentation"
+            );
+            self.note(file.get(), [told]);
+        }
         self.segmentation = Some(Segmentation { labels: read.value, body: wanted });
         Ok(region)
     }
