@@ -1,5 +1,6 @@
 //! `model-offline check`: a scene's numbers, and what of it is seldom meant, without solving.
 
+use super::check_space;
 use super::common::{DiscretizationArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
@@ -23,6 +24,11 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn run(args: &CheckArgs) -> Result<(), CliError> {
+    if let Some(scene) = args.scene.read_in_space()? {
+        let scene = args.discretization.over_space(scene)?;
+        check_outputs(&args.scene.files(&scene), &[("--json", args.json.as_deref())])?;
+        return check_space::run(&scene, args.json.as_deref());
+    }
     let scene = args.discretization.over(args.scene.read_any()?)?;
     check_outputs(&[&args.scene.scene], &[("--json", args.json.as_deref())])?;
     let (facts, warnings) = (scene.facts(), scene.told_warnings());

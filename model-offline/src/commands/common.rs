@@ -9,13 +9,13 @@ use model_offline::output::terminal;
 use model_offline::parallel;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::scene::{Scene, limits};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A scene file, with or without its inclusions.
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
     /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, breast-world, prostate, prostate-world,
-    /// tethered; in space, for `place`: block, mound).
+    /// tethered; in space, for `check`, `solve` and `place`: block, mound).
     pub(super) scene: PathBuf,
     /// Leave the inclusions out: homogeneous tissue.
     #[arg(long)]
@@ -45,6 +45,11 @@ impl SceneArgs {
             AnyScene::Space(scene) if self.without_inclusion => Ok(Some(scene.without_inclusions())),
             AnyScene::Space(scene) => Ok(Some(*scene)),
         }
+    }
+
+    /// The scene's file and those that it names, over which nothing may be written.
+    pub(super) fn files<'a>(&'a self, scene: &'a SpaceScene) -> Vec<&'a Path> {
+        scene.files.iter().chain([&self.scene]).map(PathBuf::as_path).collect()
     }
 
     /// Whether the inclusions are to be left out.

@@ -1,6 +1,7 @@
 //! The command line of `model-offline`: one file per command.
 
 mod check;
+mod check_space;
 mod common;
 mod compare;
 mod completions;
@@ -18,6 +19,7 @@ mod place_space;
 mod place_text;
 mod schema;
 mod solve;
+mod solve_space;
 mod stability;
 mod sweep;
 mod table;
@@ -78,7 +80,7 @@ enum Command {
     Compare(compare::CompareArgs),
     /// A commented scene to start from, also from an SVG drawing or a Gmsh mesh.
     #[command(
-        after_help = "Examples:\n  model-offline new -o my.toml\n  model-offline new --svg outline.svg --size 120 -o my.toml\n  model-offline new --msh body.msh -o my.toml"
+        after_help = "Examples:\n  model-offline new -o my.toml\n  model-offline new --dimension 3 -o body.toml\n  model-offline new --svg outline.svg --size 120 -o my.toml\n  model-offline new --msh body.msh -o my.toml"
     )]
     New(new::NewArgs),
     /// Prints a completion script for a shell.

@@ -13,7 +13,7 @@ use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;
 use model_offline::table::{self, TableOptions};
 use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Options of `place`.
 #[derive(Debug, clap::Args)]
@@ -36,8 +36,7 @@ pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
     let outputs = [("--json", args.json.as_deref()), ("--table", args.table.as_deref())];
     if let Some(scene) = args.scene.read_in_space()? {
         let scene = args.discretization.over_space(scene)?;
-        let read: Vec<&Path> = scene.files.iter().map(PathBuf::as_path).chain([args.scene.scene.as_path()]).collect();
-        check_outputs(&read, &outputs)?;
+        check_outputs(&args.scene.files(&scene), &outputs)?;
         if args.table.is_some() {
             return Err(CliError::usage(
                 "--table: tables of paddles in space are not written yet",

@@ -3,6 +3,7 @@
 use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
+use super::solve_space;
 use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
@@ -23,43 +24,60 @@ const ROUNDING: f64 = 1e-6;
 pub(super) struct SolveArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Index of the paddle that is attached [default: none]
+    /// Index of the paddle that is attached [default: none]; in space once more for a second one
     #[arg(long)]
-    paddle: Option<u32>,
+    pub(super) paddle: Vec<u32>,
     /// Needle depth, length units.
     #[arg(long)]
-    depth: f64,
-    /// Paddle displacement, length units.
+    pub(super) depth: f64,
+    /// Paddle displacement, length units; in space three numbers, and once for every paddle, in their order.
     #[arg(
         long,
         requires = "paddle",
-        value_name = "X,Y",
+        value_name = "X,Y[,Z]",
         value_delimiter = ',',
         num_args = 1,
         allow_hyphen_values = true
     )]
-    paddle_displacement: Option<Vec<f64>>,
+    pub(super) paddle_displacement: Option<Vec<f64>>,
     /// Hold needle and paddle there for so many seconds: tissue that relaxes goes on.
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
-    dwell: f64,
+    pub(super) dwell: f64,
     /// Write the result as JSON.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
     /// Write displacement, strain and stress for ParaView; beside it needle, target and paddles (-parts.vtu) and a script that
     /// shows all of it (.py).
     #[arg(long, value_name = "FILE")]
-    vtu: Option<PathBuf>,
+    pub(super) vtu: Option<PathBuf>,
     /// Draw the deformed body.
     #[arg(long, value_name = "FILE")]
-    svg: Option<PathBuf>,
+    pub(super) svg: Option<PathBuf>,
     #[command(flatten)]
     discretization: DiscretizationArgs,
     #[command(flatten)]
-    run: RunArgs,
+    pub(super) run: RunArgs,
 }
 
 pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
+    if !args.depth.is_finite() || args.depth < 0.0 {
+        return Err(CliError::usage(format!("--depth is {}", args.depth), "give a depth of 0 or more"));
+    }
+    if let Some(scene) = args.scene.read_in_space()? {
+        let scene = args.discretization.over_space(scene)?;
+        let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref())];
+        check_outputs(&args.scene.files(&scene), &outputs)?;
+        return solve_space::run(&scene, args);
+    }
     let scene = args.discretization.over(args.scene.read_still()?)?;
+    let paddle = match args.paddle[..] {
+        [] => None,
+        [index] => Some(index),
+        _ => {
+            let help = "give --paddle once: in the plane one paddle is attached at a time";
+            return Err(CliError::usage("--paddle is given more than once", help));
+        }
+    };
     let displacement = match args.paddle_displacement.as_deref() {
         None => Vector2::zeros(),
         Some([x, y]) if x.is_finite() && y.is_finite() => Vector2::new(*x, *y),
@@ -70,9 +88,6 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
             ));
         }
     };
-    if !args.depth.is_finite() || args.depth < 0.0 {
-        return Err(CliError::usage(format!("--depth is {}", args.depth), "give a depth of 0 or more"));
-    }
     if !args.dwell.is_finite() || args.dwell < 0.0 {
         return Err(CliError::usage(format!("--dwell is {}", args.dwell), "give seconds, 0 or more"));
     }
@@ -93,12 +108,20 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     let [json, vtu, svg] = [&args.json, &args.vtu, &args.svg].map(Option::as_deref);
     let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg), parts, script];
     check_outputs(&[&args.scene.scene], &outputs)?;
-    solve(&scene, displacement, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
+    solve(&scene, Held { paddle, displacement }, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
 }
 
-fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<(), CliError> {
+/// The paddle, and where it is.
+#[derive(Debug, Clone, Copy)]
+struct Held {
+    paddle: Option<u32>,
+    displacement: Vector2<f64>,
+}
+
+fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
     let (model, _) = discretise(scene)?;
-    let position = args.paddle.map(|index| scene.paddle_position(index)).transpose().map_err(ModelError::from)?;
+    let Held { paddle, displacement } = held;
+    let position = paddle.map(|index| scene.paddle_position(index)).transpose().map_err(ModelError::from)?;
     // Nodes are placed along a shaft: it ends where they end.
     let depth = if scene.needle.shaft.is_some() { args.depth.min(scene.needle.depth) } else { args.depth };
     // In pieces of the scene's increment: the path matters near the limits of stability, and to a needle that slips.
@@ -122,9 +145,9 @@ fn solve(scene: &Scene, displacement: Vector2<f64>, args: &SolveArgs) -> Result<
         }
     };
     solved.dwell(args.dwell)?;
-    write(&model, &mut solved, displacement, args)?;
+    write(&model, &mut solved, held, args)?;
     if !args.run.quiet {
-        print(scene, &solved, displacement, args);
+        print(scene, &solved, held, args);
     }
     Ok(())
 }
@@ -205,9 +228,10 @@ impl Solved<'_> {
     }
 }
 
-fn print(scene: &Scene, solved: &Solved<'_>, displacement: Vector2<f64>, args: &SolveArgs) {
+fn print(scene: &Scene, solved: &Solved<'_>, held: Held, args: &SolveArgs) {
+    let Held { displacement, .. } = held;
     let target = solved.target_displacement();
-    let paddle = match args.paddle {
+    let paddle = match held.paddle {
         Some(index) => format!("paddle {index} at ({}, {})", displacement.x, displacement.y),
         None => "no paddle".to_owned(),
     };
@@ -235,22 +259,18 @@ fn print(scene: &Scene, solved: &Solved<'_>, displacement: Vector2<f64>, args: &
 }
 
 /// Writes the files that are asked for.
-fn write(
-    model: &TissueModel,
-    solved: &mut Solved<'_>,
-    displacement: Vector2<f64>,
-    args: &SolveArgs,
-) -> Result<(), CliError> {
+fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveArgs) -> Result<(), CliError> {
+    let Held { paddle, displacement } = held;
     let scene = model.scene();
     let target = solved.target_displacement();
-    let jacobian = args.paddle.map(|_| solved.jacobian()).transpose()?;
+    let jacobian = paddle.map(|_| solved.jacobian()).transpose()?;
     let nodal = model.nodal_displacements(solved.coefficients()).map_err(ModelError::from)?;
     let point = |p: &Vector2<f64>| [p.x, p.y];
     let fields = NodalFields::new(model, solved.coefficients());
     let mut document = serde_json::json!({
         "scene": scene.name, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
         "integration": scene.discretization.method.integration,
-        "paddle": args.paddle, "depth": args.depth, "paddle_displacement": point(&displacement),
+        "paddle": paddle, "depth": args.depth, "paddle_displacement": point(&displacement),
         "target_displacement": point(&target), "orthogonal": target.dot(&scene.needle.orthogonal()),
         "axial": target.dot(&scene.needle.axis),
         "jacobian": jacobian.as_ref().map(controllability::rows),

@@ -38,6 +38,7 @@ pub struct Spatial {
     /// Shares of every cell in the parts of the mesh.
     shares: Arc<Vec<BTreeMap<u32, f64>>>,
     volumes: Arc<Vec<f64>>,
+    tetrahedra: Arc<Vec<[u32; 4]>>,
     rule: Arc<Quadrature<3>>,
     method: Method,
 }
@@ -65,6 +66,7 @@ impl Spatial {
                 approximation: Arc::new(Approximation::Elements(elements)),
                 shares: Arc::new(mesh.part.iter().map(|&part| BTreeMap::from([(part, 1.0)])).collect()),
                 volumes: Arc::new(mesh.volumes()),
+                tetrahedra: Arc::new(mesh.tetrahedra.clone()),
                 rule,
                 method,
             });
@@ -83,6 +85,7 @@ impl Spatial {
         Ok(Self {
             shares: Arc::new((0..mesh.nodes.len()).map(|node| cells.shares(node)).collect()),
             volumes: Arc::new(cells.volumes().to_vec()),
+            tetrahedra: Arc::new(mesh.tetrahedra.clone()),
             approximation: Arc::new(Approximation::Kernels(cloud)),
             rule: Arc::new(rule),
             method,
@@ -103,6 +106,11 @@ impl Spatial {
             Approximation::Kernels(_) => BTreeMap::new(),
             Approximation::Elements(elements) => elements.middles(),
         }
+    }
+
+    /// Nodes at the corners of the mesh's tetrahedra.
+    pub fn tetrahedra(&self) -> &[[u32; 4]] {
+        &self.tetrahedra
     }
 
     /// Volumes of the cells.

@@ -40,7 +40,8 @@ pub enum ModelError {
     },
     /// A region without any of the surface in it.
     #[error(
-        "the region of the {0} catches no surface of the body: move it onto the surface, let it reach into the body, or make it larger"
+        "the region of the {0} catches no surface of the body: move it onto the surface, let it reach into the body, or \
+         make it larger; where it does, take smaller elements"
     )]
     NothingCaught(BoundaryPart),
     /// Two patches claim the same nodes.

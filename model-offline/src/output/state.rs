@@ -1,8 +1,10 @@
 //! A state of a body, as its pictures and files show it.
 
+use crate::discretization::Quadrature;
 use crate::discretization::cells::nodal_cells::NodalCell;
 use crate::geometry::{Point2, cross};
 use crate::material::{Law, Material as _, Matrix, green_lagrange};
+use crate::mechanics::Tissue;
 use crate::mechanics::assembly::displacement_gradient;
 use crate::model::TissueModel;
 
@@ -19,10 +21,19 @@ pub struct State<'a> {
 
 /// Displacement gradient of every cell: the average over its integration points.
 pub(crate) fn cell_gradients(model: &TissueModel, coefficients: &[f64]) -> Vec<Matrix<2>> {
-    let mut sums = vec![(Matrix::<2>::zeros(), 0.0); model.cells().len()];
-    for (q, point) in model.rule().points().enumerate() {
+    mean_gradients(model.rule(), model.cells().len(), coefficients)
+}
+
+/// The same of so many cells with this rule.
+pub(crate) fn mean_gradients<const D: usize>(
+    rule: &Quadrature<D>,
+    cells: usize,
+    coefficients: &[f64],
+) -> Vec<Matrix<D>> {
+    let mut sums = vec![(Matrix::<D>::zeros(), 0.0); cells];
+    for (q, point) in rule.points().enumerate() {
         let (sum, weight) = &mut sums[point.cell as usize];
-        *sum += displacement_gradient(model.rule(), q, coefficients) * point.weight;
+        *sum += displacement_gradient(rule, q, coefficients) * point.weight;
         *weight += point.weight;
     }
     sums.into_iter().map(|(sum, weight)| sum / weight).collect()
@@ -39,9 +50,8 @@ pub fn has_stress(model: &TissueModel) -> bool {
 }
 
 /// Cauchy stress of a cell in space, of all of its materials by their parts.
-pub(crate) fn cauchy_stress(model: &TissueModel, cell: usize, h: &Matrix<2>) -> Matrix<3> {
-    let parts = model.tissue().parts(cell as u32);
-    parts.fold(Matrix::zeros(), |sum, (law, factor)| sum + law.cauchy_stress(&in_space(h)) * factor)
+pub(crate) fn cauchy_stress(tissue: &Tissue, cell: usize, h: &Matrix<3>) -> Matrix<3> {
+    tissue.parts(cell as u32).fold(Matrix::zeros(), |sum, (law, factor)| sum + law.cauchy_stress(h) * factor)
 }
 
 /// √(3/2) times the norm of the deviator.
@@ -64,7 +74,7 @@ impl NodalFields {
         let gradients = cell_gradients(model, coefficients);
         let strains: Vec<f64> = gradients.iter().map(|h| green_lagrange(h).norm()).collect();
         let stresses = has_stress(model).then(|| {
-            let of = |(cell, h)| von_mises(&cauchy_stress(model, cell, h));
+            let of = |(cell, h)| von_mises(&cauchy_stress(model.tissue(), cell, &in_space(h)));
             gradients.iter().enumerate().map(of).collect::<Vec<f64>>()
         });
         Self { strain: at_nodes(model, &strains), von_mises: stresses.map(|stresses| at_nodes(model, &stresses)) }

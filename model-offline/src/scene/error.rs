@@ -60,3 +60,12 @@ pub struct NoSuchPaddle {
     /// Those that there are.
     pub known: String,
 }
+
+impl NoSuchPaddle {
+    /// The place of an index among those that there are.
+    pub(super) fn find(index: u32, mut all: impl Iterator<Item = u32> + Clone) -> Result<usize, Self> {
+        let known = || all.clone().map(|index| index.to_string()).collect::<Vec<_>>().join(", ");
+        let error = Self { index, known: known() };
+        all.position(|other| other == index).ok_or(error)
+    }
+}

@@ -14,7 +14,7 @@ pub mod space;
 pub mod starter;
 mod tissue;
 mod validate;
-mod warning;
+pub(crate) mod warning;
 
 pub use effect::Effect;
 pub use error::{NoSuchPaddle, SceneError};
@@ -307,11 +307,7 @@ impl Scene {
     /// # Errors
     /// [`NoSuchPaddle`] names those that there are.
     pub fn paddle_position(&self, index: u32) -> Result<usize, NoSuchPaddle> {
-        let known = || self.paddles.iter().map(|paddle| paddle.index.to_string()).collect::<Vec<_>>().join(", ");
-        self.paddles
-            .iter()
-            .position(|paddle| paddle.index == index)
-            .ok_or_else(|| NoSuchPaddle { index, known: known() })
+        NoSuchPaddle::find(index, self.paddles.iter().map(|paddle| paddle.index))
     }
 
     /// Its tissue: whether it has inclusions.

@@ -4,8 +4,8 @@ mod interactive;
 
 use super::error::CliError;
 use model_offline::output;
-use model_offline::scene::Scene;
 use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
+use model_offline::scene::space::{self, AnyScene};
 use model_offline::scene::starter::{self, StarterNames, starter};
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
@@ -24,6 +24,9 @@ pub(super) struct NewArgs {
     /// the body.
     #[arg(long, value_name = "FILE")]
     msh: Option<PathBuf>,
+    /// Dimension of the scene: 2 for plane strain, 3 for space.
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(2..=3))]
+    dimension: u8,
     /// Ask on the terminal for the few numbers that matter: size, material, target, depth.
     #[arg(long, conflicts_with_all = ["svg", "msh"])]
     interactive: bool,
@@ -55,6 +58,11 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
             return Err(usage("--size belongs to --svg or --msh".into(), "the starter block has its own size"));
         }
     }
+    let planar = [(args.svg.is_some(), "--svg"), (args.msh.is_some(), "--msh"), (args.interactive, "--interactive")];
+    if let Some((_, option)) = planar.into_iter().find(|(given, _)| *given && args.dimension == 3) {
+        let help = "leave it out, and name the body's file in the scene: [domain] surface = \"body.stl\"";
+        return Err(usage(format!("{option} gives scenes in the plane, and --dimension is 3"), help));
+    }
     // Before anybody is asked anything.
     if let Some(path) = &args.output {
         if path.exists() && !args.force {
@@ -69,11 +77,12 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
     let names = StarterNames { name, length: args.length.clone(), stress: args.stress.clone() };
     let (text, summary) = match args.svg.as_ref().or(args.msh.as_ref()) {
         Some(file) => import(file, args, &names)?,
+        None if args.dimension == 3 => (space::starter::starter(&names), String::new()),
         None if args.interactive => (asked_for(&names)?, String::new()),
         None => (starter(&names, None), String::new()),
     };
     // A suggestion that validation refuses would only be found out by the next command.
-    Scene::parse(&text, "<new scene>")?;
+    AnyScene::parse(&text, "<new scene>")?;
     match &args.output {
         None => {
             print!("{text}");

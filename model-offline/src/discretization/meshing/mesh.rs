@@ -2,6 +2,7 @@
 
 use super::quality::{FACES, dihedral_angles, volume6};
 use crate::geometry::Point;
+use serde::Serialize;
 
 /// Tetrahedra that tile a body.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -27,7 +28,32 @@ pub struct Quality {
     pub worst: usize,
 }
 
+/// A tetrahedron, and how good it is.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Element {
+    /// Its middle, length units.
+    pub at: [f64; 3],
+    /// Smallest dihedral angle, degrees.
+    pub dihedral: f64,
+    /// Volume, length units cubed.
+    pub volume: f64,
+}
+
 impl TetMesh {
+    /// So many tetrahedra with the smallest dihedral angles, the worst first.
+    pub fn worst(&self, count: usize) -> Vec<Element> {
+        let element = |t: usize| {
+            let corners = self.corners(t);
+            let dihedral = dihedral_angles(&corners).into_iter().fold(f64::INFINITY, f64::min).to_degrees();
+            let at = corners.iter().sum::<Point<3>>() / 4.0;
+            Element { at: at.into(), dihedral, volume: volume6(&corners) / 6.0 }
+        };
+        let mut all: Vec<Element> = (0..self.tetrahedra.len()).map(element).collect();
+        all.sort_by(|a, b| a.dihedral.total_cmp(&b.dihedral));
+        all.truncate(count);
+        all
+    }
+
     /// Corners of a tetrahedron.
     pub fn corners(&self, tetrahedron: usize) -> [Point<3>; 4] {
         self.tetrahedra[tetrahedron].map(|n| self.nodes[n as usize])

@@ -1,9 +1,9 @@
 //! The mesh of a scene in space: small tetrahedra at the rims of patches, where the solution is singular, large ones elsewhere.
 
 use super::super::error::{BoundaryPart, ModelError};
+use super::seen::poorly_seen;
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::{Grading, Request, StuffingError, rim_points, stuff, surface_points};
-use crate::geometry::implicit::share;
 use crate::geometry::{Implicit, Point};
 use crate::scene::space::{SpaceInclusion, SpaceScene};
 
@@ -127,34 +127,39 @@ fn patches(scene: &SpaceScene) -> impl Iterator<Item = &dyn Implicit> {
     held.chain(&scene.immobile).map(|region| region as &dyn Implicit)
 }
 
-/// Meshes at these sizes, and at smaller ones around points where elements turn out too large.
+/// Meshes at these sizes, and at smaller ones where elements turn out too large for the surface or for an inclusion.
 fn stuffed(scene: &SpaceScene, mut grading: Grading) -> Result<TetMesh, ModelError> {
-    let mut tries = 0;
-    loop {
+    for left in (0..=MOST_TRIES).rev() {
         match stuffed_once(scene, &|x| grading.size(x)) {
-            Err(ModelError::Mesh(StuffingError::Unresolved { at })) if tries < MOST_TRIES => {
+            Err(ModelError::Mesh(StuffingError::Unresolved { at })) if left > 0 => {
                 let size = 0.5 * grading.size(&at);
                 grading = grading.with(&[at], size);
-                tries += 1;
             }
             Err(error) => return Err(error),
-            Ok(mesh) => {
-                return unseen(scene, &mesh).map_or(Ok(mesh), |number| Err(ModelError::UnseenInclusion { number }));
-            }
+            Ok(mesh) => match poorly_seen(scene, &mesh)[..] {
+                [] => return Ok(mesh),
+                [first, ..] if left == 0 => return Err(ModelError::UnseenInclusion { number: first + 1 }),
+                ref places => {
+                    for place in places {
+                        grading = finer(scene, grading, *place)?;
+                    }
+                }
+            },
         }
     }
+    Err(ModelError::Mesh(StuffingError::Vanishes))
 }
 
-/// The number, from 1, of an inclusion that no element lies in, though it has a volume that no later one takes.
-fn unseen(scene: &SpaceScene, mesh: &TetMesh) -> Option<usize> {
-    let mut seen = vec![false; scene.inclusions.len() + 1];
-    mesh.part.iter().for_each(|part| seen[*part as usize] = true);
-    let has_volume = |number: usize| {
-        let (inclusion, later) = (&scene.inclusions[number - 1], &scene.inclusions[number..]);
-        let free = |x: &Point<3>| later.iter().all(|i| i.region.level(x) > 0.0);
-        share(inclusion.region.as_ref(), scene.body.as_ref(), &free)
-    };
-    (1..seen.len()).find(|number| !seen[*number] && has_volume(*number))
+/// Half the size on the surface of an inclusion.
+fn finer(scene: &SpaceScene, grading: Grading, place: usize) -> Result<Grading, ModelError> {
+    let (inclusion, lost) = (&scene.inclusions[place], ModelError::UnseenInclusion { number: place + 1 });
+    let points = |spacing: f64| surface_points(scene.body.as_ref(), inclusion.region.as_ref(), spacing);
+    let few = points(sampling(inclusion, extent(scene)));
+    let size = 0.5 * few.iter().map(|x| grading.size(x)).fold(f64::INFINITY, f64::min);
+    let all = if size.is_finite() { points(SAMPLED * size) } else { return Err(lost) };
+    // Without a point nothing changes; few are where a cube of the search misses a small surface.
+    let all = if all.is_empty() { few } else { all };
+    Ok(grading.with(&all, size))
 }
 
 fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<TetMesh, ModelError> {

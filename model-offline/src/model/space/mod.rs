@@ -3,6 +3,8 @@
 pub mod meshing;
 mod middles;
 mod patches;
+mod seen;
+pub mod survey;
 
 use self::middles::Middles;
 use self::patches::{Surface, loose, nodes_of, overlap};
@@ -81,23 +83,10 @@ impl SpaceModel {
     /// [`ModelError`] for patches without nodes or that claim the same ones, and methods that do not combine.
     pub fn on(scene: &SpaceScene, mesh: &TetMesh) -> Result<Self, ModelError> {
         let surface = Surface::new(mesh, scene.size());
-        let immobile: Vec<&dyn Implicit> = scene.immobile.iter().map(|r| r as &dyn Implicit).collect();
+        let patches = patches_of(scene, &surface)?;
+        loose_part(mesh, &patches)?;
         let patch_of = |region: &'_ _| surface.patch(&[region]);
-        let held =
-            [(immobile.clone(), BoundaryPart::Immobile), (vec![&scene.needle.region as _], BoundaryPart::Needle)];
-        let paddles = scene.paddles.iter().map(|p| (vec![&p.region as &dyn Implicit], BoundaryPart::Paddle(p.index)));
-        let patches = held
-            .into_iter()
-            .chain(paddles)
-            .map(|(regions, part)| match surface.patch(&regions) {
-                patch if patch.is_empty() => Err(ModelError::NothingConstrained(part)),
-                patch => Ok(patch),
-            })
-            .collect::<Result<Vec<_>, _>>()?;
-        if let Some(at) = loose(mesh, patches[..2].iter().flatten().flatten()) {
-            return Err(ModelError::LoosePart { at: at.into() });
-        }
-        let regions = immobile.iter().copied().chain([&scene.needle.region as &dyn Implicit]);
+        let regions = scene.immobile.iter().map(|r| r as &dyn Implicit).chain([&scene.needle.region as &dyn Implicit]);
         let regions = regions.chain(scene.paddles.iter().map(|p| &p.region as &dyn Implicit));
         let rimmed: Vec<(Vec<[u32; 3]>, &dyn Implicit)> = regions.map(|region| (patch_of(region), region)).collect();
         let inclusions: Vec<&dyn Implicit> = scene.inclusions.iter().map(|i| i.region.as_ref()).collect();
@@ -108,12 +97,7 @@ impl SpaceModel {
         Ok(Self {
             tissue: tissue_of(scene, &spatial),
             target: spatial.value_stencil(&scene.target)?,
-            overlapping: scene
-                .pairs
-                .iter()
-                .copied()
-                .filter(|&[a, b]| overlap(&patches[2 + a], &patches[2 + b]))
-                .collect(),
+            overlapping: overlapping(scene, &patches),
             scene: Arc::new(scene.clone()),
             spacing: typical,
             held: Arc::new(held),
@@ -280,6 +264,30 @@ impl HeldNodes {
     }
 }
 
+/// Triangles of the immobile part, of the needle's contact and of every paddle.
+fn patches_of(scene: &SpaceScene, surface: &Surface<'_>) -> Result<Vec<Vec<[u32; 3]>>, ModelError> {
+    let immobile = scene.immobile.iter().map(|region| region as &dyn Implicit).collect();
+    let held = [(immobile, BoundaryPart::Immobile), (vec![&scene.needle.region as _], BoundaryPart::Needle)];
+    let paddles = scene.paddles.iter().map(|p| (vec![&p.region as &dyn Implicit], BoundaryPart::Paddle(p.index)));
+    let all = held.into_iter().chain(paddles);
+    all.map(|(regions, part): (Vec<&dyn Implicit>, _)| match surface.patch(&regions) {
+        patch if patch.is_empty() => Err(ModelError::NothingConstrained(part)),
+        patch => Ok(patch),
+    })
+    .collect()
+}
+
+/// Refuses a part of the body that neither of the first two patches holds, immobile part and needle.
+fn loose_part(mesh: &TetMesh, patches: &[Vec<[u32; 3]>]) -> Result<(), ModelError> {
+    let at = loose(mesh, patches[..2].iter().flatten().flatten());
+    at.map_or(Ok(()), |at| Err(ModelError::LoosePart { at: at.into() }))
+}
+
+/// Those of the scene's pairs whose patches overlap.
+fn overlapping(scene: &SpaceScene, patches: &[Vec<[u32; 3]>]) -> Vec<[usize; 2]> {
+    scene.pairs.iter().copied().filter(|&[a, b]| overlap(&patches[2 + a], &patches[2 + b])).collect()
+}
+
 /// The materials of a scene's cells, by the parts of the mesh that they lie in.
 fn tissue_of(scene: &SpaceScene, spatial: &Spatial) -> Tissue {
     let mut materials: Vec<Law> = vec![scene.material.clone()];
@@ -360,6 +368,13 @@ impl SpaceBody<'_> {
             *at += (to - *at) * reached;
         }
         outcome
+    }
+
+    /// Force that pushes the contact along the needle's axis.
+    pub fn contact_force(&self) -> f64 {
+        let forces: Vec<f64> = self.equilibrium.reactions().collect();
+        let on_needle = forces.chunks_exact(3).zip(&self.held.holders).filter(|(_, holder)| **holder == Holder::Needle);
+        on_needle.map(|(force, _)| Vector3::from_column_slice(force).dot(&self.model.scene.needle.axis)).sum()
     }
 
     /// Target displacement.

@@ -50,6 +50,11 @@ impl<'m> Surface<'m> {
         rim.map(|(edge, _)| edge).collect()
     }
 
+    /// All triangles, outwards.
+    pub(super) fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+
     /// All edges of the surface.
     pub(super) fn edges(&self) -> BTreeSet<(u32, u32)> {
         self.triangles.iter().flat_map(edges).collect()

@@ -1,6 +1,6 @@
 //! Unstructured grids as ParaView reads them, in one text file.
 
-use crate::geometry::Point2;
+use crate::geometry::Point;
 use crate::output::chart::escape;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -19,15 +19,19 @@ pub(super) enum Shape {
     Triangle = 5,
     /// A polygon.
     Polygon = 7,
+    /// A tetrahedron.
+    Tetrahedron = 10,
     /// A triangle with the middles of its edges behind its corners.
     QuadraticTriangle = 22,
+    /// A tetrahedron with the middles of its edges behind its corners: 01, 12, 20, 03, 13, 23.
+    QuadraticTetrahedron = 24,
 }
 
 /// Points, and cells that share them.
-#[derive(Debug, Default)]
-pub(super) struct Grid {
-    points: Vec<Point2>,
-    found: HashMap<[i64; 2], u32>,
+#[derive(Debug)]
+pub(super) struct Grid<const D: usize> {
+    points: Vec<Point<D>>,
+    found: HashMap<[i64; D], u32>,
     /// Points are one where they round to the same multiples of this.
     step: f64,
     cells: Vec<(Shape, Vec<u32>)>,
@@ -71,19 +75,30 @@ impl Array {
     }
 }
 
-impl Grid {
+impl<const D: usize> Default for Grid<D> {
+    fn default() -> Self {
+        Self { points: Vec::new(), found: HashMap::new(), step: 0.0, cells: Vec::new() }
+    }
+}
+
+impl<const D: usize> Grid<D> {
     /// No cells of a body of this size.
     pub(super) fn new(size: f64) -> Self {
         Self { step: SAME_POINT * size, ..Self::default() }
     }
 
+    /// Cells with the numbers of their points.
+    pub(super) fn of(points: Vec<Point<D>>, cells: Vec<(Shape, Vec<u32>)>) -> Self {
+        Self { points, cells, ..Self::default() }
+    }
+
     /// Points in the order of the file.
-    pub(super) fn points(&self) -> &[Point2] {
+    pub(super) fn points(&self) -> &[Point<D>] {
         &self.points
     }
 
     /// Adds a cell; points that other cells have too are shared with them.
-    pub(super) fn push(&mut self, shape: Shape, corners: &[Point2]) {
+    pub(super) fn push(&mut self, shape: Shape, corners: &[Point<D>]) {
         let mut points: Vec<u32> = corners.iter().map(|corner| self.point(*corner)).collect();
         // Corners that are nearly one are the same point of their neighbours, too.
         points.dedup();
@@ -94,14 +109,14 @@ impl Grid {
     }
 
     /// Adds a cell with points of its own.
-    pub(super) fn push_alone(&mut self, shape: Shape, corners: &[Point2]) {
+    pub(super) fn push_alone(&mut self, shape: Shape, corners: &[Point<D>]) {
         let first = self.points.len() as u32;
         self.points.extend_from_slice(corners);
         self.cells.push((shape, (first..self.points.len() as u32).collect()));
     }
 
-    fn point(&mut self, x: Point2) -> u32 {
-        let key = [x.x, x.y].map(|v| (v / self.step).round() as i64);
+    fn point(&mut self, x: Point<D>) -> u32 {
+        let key = std::array::from_fn(|k| (x[k] / self.step).round() as i64);
         let next = self.points.len() as u32;
         let place = *self.found.entry(key).or_insert(next);
         if place == next {
@@ -112,7 +127,7 @@ impl Grid {
 
     /// The file. The first array of the points is their displacement.
     pub(super) fn file(&self, of_points: &[Array], of_cells: &[Array]) -> String {
-        let flat = |p: &Point2| [p.x, p.y, 0.0];
+        let flat = |p: &Point<D>| std::array::from_fn::<f64, 3, _>(|k| p.get(k).copied().unwrap_or(0.0));
         let points = Array::new("Points".to_owned(), 3, self.points.iter().flat_map(flat).collect());
         let (mut connectivity, mut offsets, mut shapes, mut end) = (String::new(), String::new(), String::new(), 0);
         for (shape, points) in &self.cells {

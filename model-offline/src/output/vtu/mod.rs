@@ -4,14 +4,17 @@
 mod grid;
 mod parts;
 mod script;
+mod space;
 
 pub use parts::parts;
 pub use script::{Shown, script};
+pub use space::vtu_in_space;
 
 use self::grid::{Array, Grid, Shape};
 use crate::discretization::Integration;
 use crate::geometry::Point2;
 use crate::material::{Law, Matrix, determinant, green_lagrange};
+use crate::mechanics::Tissue;
 use crate::model::TissueModel;
 use crate::output::state::{cauchy_stress, cell_gradients, has_stress, in_space, von_mises};
 
@@ -38,7 +41,7 @@ pub fn vtu(model: &TissueModel, coefficients: &[f64]) -> String {
     grid.file(&[displacement], &of_cells(model, &cell_gradients(model, coefficients)))
 }
 
-fn push(grid: &mut Grid, integration: Integration, corners: &[Point2]) {
+fn push(grid: &mut Grid<2>, integration: Integration, corners: &[Point2]) {
     match (integration, corners) {
         (Integration::FemT3, [_, _, _]) => grid.push(Shape::Triangle, corners),
         (Integration::FemT6, &[a, b, c]) => {
@@ -53,24 +56,30 @@ fn of_cells(model: &TissueModel, gradients: &[Matrix<2>]) -> Vec<Array> {
     let scene = model.scene();
     let inclusion_at = |x: &Point2| scene.inclusions.iter().position(|inclusion| inclusion.outline.contains(*x));
     let regions = model.cells().iter().map(|cell| inclusion_at(&cell.centroid()).map_or(0.0, |i| (i + 1) as f64));
-    let laws = model.tissue().laws();
+    let gradients: Vec<Matrix<3>> = gradients.iter().map(in_space).collect();
+    known(model.tissue(), regions.collect(), &gradients, has_stress(model), &scene.stress_unit)
+}
+
+/// What displacement gradients tell of cells of these regions.
+fn known(tissue: &Tissue, regions: Vec<f64>, gradients: &[Matrix<3>], has_stress: bool, unit: &str) -> Vec<Array> {
+    let laws = tissue.laws();
     let place_of = |law: &Law| laws.iter().position(|known| std::ptr::eq(known, law)).unwrap_or(0) as f64;
     // The law with most of the stiffness where a cell has several.
-    let stiffest = |cell: usize| model.tissue().parts(cell as u32).max_by(|a, b| a.1.total_cmp(&b.1));
+    let stiffest = |cell: usize| tissue.parts(cell as u32).max_by(|a, b| a.1.total_cmp(&b.1));
     let materials = (0..gradients.len()).map(|cell| stiffest(cell).map_or(0.0, |(law, _)| place_of(law)));
-    let strains: Vec<Matrix<3>> = gradients.iter().map(|h| green_lagrange(&in_space(h))).collect();
-    let det_f = gradients.iter().map(|h| determinant(&(Matrix::<2>::identity() + h)));
+    let strains: Vec<Matrix<3>> = gradients.iter().map(green_lagrange).collect();
+    let det_f = gradients.iter().map(|h| determinant(&(Matrix::<3>::identity() + h)));
     let mut arrays = vec![
-        Array::counts("region", regions.collect()),
+        Array::counts("region", regions),
         Array::counts("material", materials.collect()),
         Array::new("green_lagrange_strain".to_owned(), 9, rows(&strains)),
         Array::new("principal_strain".to_owned(), 3, strains.iter().flat_map(principal).collect()),
         Array::new("det_f".to_owned(), 1, det_f.collect()),
     ];
-    if has_stress(model) {
-        let stress = |(cell, h)| cauchy_stress(model, cell, h);
+    if has_stress {
+        let stress = |(cell, h)| cauchy_stress(tissue, cell, h);
         let stresses: Vec<Matrix<3>> = gradients.iter().enumerate().map(stress).collect();
-        let named = |name| in_unit(name, &scene.stress_unit);
+        let named = |name| in_unit(name, unit);
         arrays.extend([
             Array::new(named("cauchy_stress"), 9, rows(&stresses)),
             Array::new(named("principal_stress"), 3, stresses.iter().flat_map(principal).collect()),

@@ -46,7 +46,7 @@ pub fn parts(model: &TissueModel, state: State<'_>) -> String {
 struct Parts<'a> {
     model: &'a TissueModel,
     state: State<'a>,
-    grid: Grid,
+    grid: Grid<2>,
     moved: Vec<f64>,
     part: Vec<f64>,
     paddle: Vec<f64>,

@@ -102,6 +102,18 @@ pub fn discretise(scene: &SpaceScene) -> Result<Discretised, ModelError> {
     Ok(Discretised { rest: rest_responses(&model)?, model, estimate: None })
 }
 
+/// The model of a scene at its spacing or level, or at the tolerance that it was refined to.
+///
+/// # Errors
+/// [`ModelError`], as of [`discretise`].
+pub fn model(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
+    match scene.discretization.resolution {
+        Resolution::Spacing(spacing) => SpaceModel::on(scene, &even_mesh(scene, spacing)?),
+        Resolution::Level(level) => SpaceModel::on(scene, &mesh(scene, &MeshSize::level(level))?),
+        Resolution::Tolerance(_) => Ok(discretise(scene)?.model),
+    }
+}
+
 fn at_level(scene: &SpaceScene, level: i32) -> Result<(SpaceModel, Vec<SpaceResponse>), ModelError> {
     let mesh = mesh(scene, &MeshSize::level(level))?;
     let integration = scene.discretization.method.integration;

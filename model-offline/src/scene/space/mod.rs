@@ -3,9 +3,10 @@
 mod bodies;
 pub mod import;
 pub mod schema;
+pub mod starter;
 mod validate;
 
-use super::error::{SceneError, Source};
+use super::error::{NoSuchPaddle, SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::dimension_of;
 use super::{Actuator, BUNDLED, BUNDLED_IN_SPACE, Scene, TissueVariant};
@@ -180,6 +181,14 @@ impl SpaceScene {
     pub fn check_discretization(&self) -> Result<(), LimitError> {
         let extent = self.body.bounds().map_or_else(|| Point::repeat(f64::INFINITY), |(low, high)| high - low);
         limits::check_in_space(&self.discretization, extent)
+    }
+
+    /// Where a paddle stands in the scene's list, by its index.
+    ///
+    /// # Errors
+    /// [`NoSuchPaddle`] names those that there are.
+    pub fn paddle_position(&self, index: u32) -> Result<usize, NoSuchPaddle> {
+        NoSuchPaddle::find(index, self.paddles.iter().map(|paddle| paddle.index))
     }
 
     /// Length of the diagonal of the body's bounding box.

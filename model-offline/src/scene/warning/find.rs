@@ -6,7 +6,7 @@ use crate::geometry::{Point2, distance_to_polyline, distance_to_segment, segment
 use crate::scene::{Resistance, Scene};
 
 /// A needle at less than this angle to the boundary goes along it, degrees.
-const ALONG: f64 = 10.0;
+pub(crate) const ALONG: f64 = 10.0;
 /// A needle at more than this angle to the way to the target goes elsewhere, degrees. Those of `breast` and `tethered` that
 /// pass the target on purpose have 37 and 31, that of a starter scene 46.
 const ELSEWHERE: f64 = 60.0;
@@ -40,6 +40,21 @@ impl Scene {
     /// The same in words, with the scene's unit and what to do.
     pub fn told_warnings(&self) -> Vec<String> {
         self.warnings().iter().map(|warning| warning.told(&self.length_unit)).collect()
+    }
+}
+
+/// What is unusual about the way of a needle of some depth to a target that its line misses, being nearest at another depth,
+/// in a body of this size.
+pub(crate) fn towards_target(depth: f64, nearest_at: f64, miss: f64, size: f64) -> Option<SceneWarning> {
+    let degrees = miss.atan2(nearest_at).to_degrees();
+    if degrees > ELSEWHERE {
+        Some(SceneWarning::NeedleMissesTarget { miss, degrees })
+    } else if depth >= NEAR * nearest_at && miss > BESIDE * depth {
+        Some(SceneWarning::NeedlePassesBeside { miss, depth, nearest_at })
+    } else if depth > nearest_at + SAME * size {
+        Some(SceneWarning::DeeperThanTarget { depth, nearest_at })
+    } else {
+        None
     }
 }
 
@@ -117,18 +132,8 @@ impl Rules<'_> {
     }
 
     fn towards_target(&self) -> Option<SceneWarning> {
-        let depth = self.scene.needle.depth;
         let (nearest_at, miss) = self.scene.target_from_needle();
-        let degrees = miss.atan2(nearest_at).to_degrees();
-        if degrees > ELSEWHERE {
-            Some(SceneWarning::NeedleMissesTarget { miss, degrees })
-        } else if depth >= NEAR * nearest_at && miss > BESIDE * depth {
-            Some(SceneWarning::NeedlePassesBeside { miss, depth, nearest_at })
-        } else if depth > nearest_at + SAME * self.size {
-            Some(SceneWarning::DeeperThanTarget { depth, nearest_at })
-        } else {
-            None
-        }
+        towards_target(self.scene.needle.depth, nearest_at, miss, self.size)
     }
 
     /// Where the needle's way ends.

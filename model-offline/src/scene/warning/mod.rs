@@ -2,6 +2,8 @@
 
 mod find;
 
+pub(crate) use find::{ALONG, towards_target};
+
 use crate::number::{self, in_unit, short};
 use std::fmt;
 

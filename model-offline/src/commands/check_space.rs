@@ -1,0 +1,188 @@
+//! `model-offline check` of a scene in space: its numbers and its mesh, without solving.
+
+use super::check::warned;
+use super::error::CliError;
+use super::json::write_json;
+use model_offline::discretization::Resolution;
+use model_offline::material::{Law, Material};
+use model_offline::model::space::meshing::{MeshSize, even_mesh, mesh};
+use model_offline::model::space::survey::{PatchSurvey, Survey};
+use model_offline::number::{area, coordinate, in_unit, short};
+use model_offline::scene::space::SpaceScene;
+use serde_json::json;
+use std::fmt::Write as _;
+use std::path::Path;
+
+/// Elements with smaller angles than this make the answers worse, degrees.
+const FLAT: f64 = 3.0;
+
+pub(super) fn run(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
+    check(scene, file).map_err(|error| error.reported_of(file, &scene.name, scene.tissue()))
+}
+
+fn check(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
+    let at_level = |level: i32| Survey::of(scene, &mesh(scene, &MeshSize::level(level))?);
+    let survey = match scene.discretization.resolution {
+        Resolution::Spacing(spacing) => Survey::of(scene, &even_mesh(scene, spacing)?)?,
+        Resolution::Level(level) => at_level(level)?,
+        // Where refinement begins: at the coarsest mesh that sees every patch.
+        Resolution::Tolerance(_) => at_level(0).or_else(|_| at_level(1))?,
+    };
+    let warnings = warnings(scene, &survey);
+    let mut document = json!(survey);
+    document["scene"] = json!(scene.name);
+    document["dimension"] = json!(3);
+    document["tissue"] = json!(scene.tissue());
+    document["units"] = json!({ "length": scene.length_unit, "stress": scene.stress_unit });
+    document["integration"] = json!(scene.discretization.method.integration);
+    document["notes"] = json!(scene.notes);
+    document["warnings"] = json!(warnings);
+    write_json(file, &document)?;
+    print!("{}", text(&Told { scene, survey: &survey }, &warnings));
+    Ok(())
+}
+
+/// What is seldom meant, in words.
+fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
+    let told = Told { scene, survey };
+    let mut all: Vec<String> = survey.warnings.iter().map(|warning| warning.told(&scene.length_unit)).collect();
+    let overlap = |[a, b]: &[u32; 2]| {
+        format!(
+            "paddles {a} and {b} overlap, and cannot be attached together; move one, or leave the pair out in [pairs]"
+        )
+    };
+    all.extend(survey.overlapping.iter().map(overlap));
+    let flat = survey.mesh.worst.first().filter(|worst| worst.dihedral < FLAT);
+    all.extend(flat.map(|worst| {
+        let (angle, at) = (worst.dihedral, told.point(worst.at));
+        format!(
+            "an element at {at} is nearly flat: {angle:.1}°; look for rims, edges or surfaces that nearly meet there"
+        )
+    }));
+    all
+}
+
+fn text(told: &Told<'_>, warnings: &[String]) -> String {
+    let Told { scene, survey } = told;
+    let mut out = format!("{} · {} tissue · a valid scene\n\n", scene.name, scene.tissue());
+    let mut row = |name: &str, what: String| {
+        let _ = writeln!(out, "{name:<13}{what}");
+    };
+    row("body", told.body());
+    let modulus = <Law as Material<3>>::rest_shear_modulus(&scene.material);
+    row("material", format!("shear modulus {} at rest", in_unit(modulus, &scene.stress_unit)));
+    let share = 100.0 * survey.immobile.area / survey.surface;
+    row("immobile", format!("{}, {share:.0} % of the surface", told.patch(&survey.immobile)));
+    row("needle", told.needle());
+    row("target", told.target());
+    for inclusion in &survey.inclusions {
+        let (times, volume) = (short(inclusion.stiffness), told.volume(inclusion.volume));
+        let what = format!("stiffness times {times}; volume {volume}, {} elements", inclusion.elements);
+        row(&format!("inclusion {}", inclusion.number), what);
+    }
+    for paddle in &survey.paddles {
+        let what = format!("{}, around {}", told.patch(&paddle.patch), told.point(paddle.patch.middle));
+        row(&format!("paddle {}", paddle.index), what);
+    }
+    row("mesh", told.mesh());
+    let worst = survey.mesh.worst.iter().map(|worst| format!("{:.1}° at {}", worst.dihedral, told.point(worst.at)));
+    row("worst", worst.collect::<Vec<_>>().join(", "));
+    row("method", told.method());
+    out.push('\n');
+    scene.notes.iter().for_each(|note| {
+        let _ = writeln!(out, "note: {note}");
+    });
+    out.push_str(&warned(warnings));
+    if warnings.is_empty() {
+        out.push_str("no warnings\n");
+    }
+    out
+}
+
+/// The survey in words.
+struct Told<'a> {
+    scene: &'a SpaceScene,
+    survey: &'a Survey,
+}
+
+impl Told<'_> {
+    fn long(&self, length: f64) -> String {
+        in_unit(length, &self.scene.length_unit)
+    }
+
+    fn volume(&self, volume: f64) -> String {
+        match self.scene.length_unit.as_str() {
+            "1" | "" => short(volume),
+            unit => format!("{} {unit}³", short(volume)),
+        }
+    }
+
+    fn point(&self, p: [f64; 3]) -> String {
+        let size = self.scene.size();
+        let [x, y, z] = p.map(|v| coordinate(v, size));
+        format!("({x}, {y}, {z})")
+    }
+
+    fn patch(&self, patch: &PatchSurvey) -> String {
+        format!("area {} in {} triangles", area(patch.area, &self.scene.length_unit), patch.triangles)
+    }
+
+    fn body(&self) -> String {
+        let Survey { low, high, volume, surface, .. } = self.survey;
+        let [x, y, z] = [0, 1, 2].map(|k| high[k] - low[k]);
+        format!(
+            "{} by {} by {}, from {}; volume {}, surface {}",
+            short(x),
+            short(y),
+            self.long(z),
+            self.point(*low),
+            self.volume(*volume),
+            area(*surface, &self.scene.length_unit)
+        )
+    }
+
+    fn needle(&self) -> String {
+        let needle = &self.survey.needle;
+        let [x, y, z] = needle.axis.map(|v| format!("{v:.4}"));
+        format!(
+            "enters at {} in direction ({x}, {y}, {z}); depth {}; contact {}",
+            self.point(needle.contact.middle),
+            self.long(needle.depth),
+            self.patch(&needle.contact)
+        )
+    }
+
+    fn target(&self) -> String {
+        let target = &self.survey.target;
+        format!(
+            "{}: {} along the needle's line, {} off it; {} from the surface",
+            self.point(target.position),
+            self.long(target.along_needle),
+            self.long(target.off_needle),
+            self.long(target.from_boundary)
+        )
+    }
+
+    fn mesh(&self) -> String {
+        let mesh = &self.survey.mesh;
+        format!(
+            "{} corners, {} tetrahedra; dihedral angles {:.1}° to {:.1}°; volumes {} to {}",
+            mesh.nodes,
+            mesh.tetrahedra,
+            mesh.dihedral[0],
+            mesh.dihedral[1],
+            short(mesh.volume[0]),
+            self.volume(mesh.volume[1])
+        )
+    }
+
+    fn method(&self) -> String {
+        let integration = self.scene.discretization.method.integration;
+        match self.scene.discretization.resolution {
+            Resolution::Tolerance(tolerance) => {
+                format!("{integration}; refined from here to {} %", short(100.0 * tolerance))
+            }
+            _ => integration.to_string(),
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! `model-offline solve` of a scene in space: one equilibrium, with as many paddles as are named.
+
+use super::error::CliError;
+use super::json::write_json;
+use super::solve::SolveArgs;
+use model_offline::model::ModelError;
+use model_offline::model::space::{SpaceBody, SpaceModel};
+use model_offline::number::in_unit;
+use model_offline::output;
+use model_offline::output::vtu;
+use model_offline::placement::space::workflow;
+use model_offline::scene::space::SpaceScene;
+use model_offline::solver::equilibrium::NewtonSettings;
+use nalgebra::{Matrix3xX, Vector3};
+use serde_json::json;
+
+/// A paddle by its place in the scene's list, and how far it is displaced.
+type Displaced = (usize, Vector3<f64>);
+
+pub(super) fn run(scene: &SpaceScene, args: &SolveArgs) -> Result<(), CliError> {
+    if args.dwell != 0.0 {
+        let help = "leave --dwell out: tissue does not relax in space";
+        return Err(CliError::usage("--dwell is planar", help));
+    }
+    if args.svg.is_some() {
+        return Err(CliError::usage("--svg draws bodies in the plane", "write --vtu, and look at it in ParaView"));
+    }
+    let paddles = displaced(scene, args)?;
+    if !args.run.quiet {
+        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+    }
+    let json = args.json.as_deref();
+    solve(scene, &paddles, args).map_err(|error| error.reported_of(json, &scene.name, scene.tissue()))
+}
+
+/// The paddles that are named, with their displacements.
+fn displaced(scene: &SpaceScene, args: &SolveArgs) -> Result<Vec<Displaced>, CliError> {
+    let numbers = args.paddle_displacement.as_deref().unwrap_or_default();
+    if !numbers.is_empty() && numbers.len() != 3 * args.paddle.len() || !numbers.iter().all(|v| v.is_finite()) {
+        return Err(CliError::usage(
+            "--paddle-displacement takes three finite numbers in space, once for every --paddle",
+            "e.g. --paddle 1 --paddle-displacement 0.01,0,-0.002 --paddle 4 --paddle-displacement 0,0,0",
+        ));
+    }
+    let mut found: Vec<Displaced> = Vec::new();
+    for (i, index) in args.paddle.iter().enumerate() {
+        let place = scene.paddle_position(*index).map_err(ModelError::from)?;
+        if found.iter().any(|(other, _)| *other == place) {
+            let help = "name every paddle once";
+            return Err(CliError::usage(format!("--paddle {index} is given twice"), help));
+        }
+        found.push((place, numbers.get(3 * i..3 * i + 3).map_or_else(Vector3::zeros, Vector3::from_column_slice)));
+    }
+    Ok(found)
+}
+
+fn solve(scene: &SpaceScene, paddles: &[Displaced], args: &SolveArgs) -> Result<(), CliError> {
+    let model = workflow::model(scene)?;
+    let attached: Vec<usize> = paddles.iter().map(|(place, _)| *place).collect();
+    let mut body = model.body(&attached, NewtonSettings::default()).map_err(ModelError::from)?;
+    // In pieces of the scene's increment: the path matters near the limits of stability.
+    let increments = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
+    for increment in 1..=increments {
+        let part = f64::from(increment) / f64::from(increments);
+        let at: Vec<Vector3<f64>> = paddles.iter().map(|(_, displacement)| displacement * part).collect();
+        if let Err(failure) = body.drive(args.depth * part, &at) {
+            return Err(CliError::Solve { failure, depth: body.depth() });
+        }
+    }
+    write(&model, &mut body, paddles, args)?;
+    if !args.run.quiet {
+        print!("{}", text(&model, &body, paddles, args));
+    }
+    Ok(())
+}
+
+fn text(model: &SpaceModel, body: &SpaceBody<'_>, paddles: &[Displaced], args: &SolveArgs) -> String {
+    let scene = model.scene();
+    let (target, axis) = (body.target_displacement(), scene.needle.axis);
+    let at = |(place, u): &Displaced| format!("paddle {} at ({}, {}, {})", scene.paddles[*place].index, u.x, u.y, u.z);
+    let paddles = match paddles {
+        [] => "no paddle".to_owned(),
+        paddles => paddles.iter().map(at).collect::<Vec<_>>().join(", "),
+    };
+    let axial = target.dot(&axis);
+    format!(
+        "{} · {} tissue · {paddles} · depth {} · {} nodes\n\
+         target displacement ({:.8}, {:.8}, {:.8}), orthogonal {:.8}, axial {axial:.8}\nbase force {}\n",
+        scene.name,
+        scene.tissue(),
+        in_unit(args.depth, &scene.length_unit),
+        model.nodes(),
+        target.x,
+        target.y,
+        target.z,
+        (target - axis * axial).norm(),
+        body.contact_force(),
+    )
+}
+
+/// Writes the files that are asked for.
+fn write(
+    model: &SpaceModel,
+    body: &mut SpaceBody<'_>,
+    paddles: &[Displaced],
+    args: &SolveArgs,
+) -> Result<(), CliError> {
+    let scene = model.scene();
+    let (target, axis) = (body.target_displacement(), scene.needle.axis);
+    let axial = target.dot(&axis);
+    let failed = |failure, depth| CliError::Solve { failure, depth };
+    let jacobian = match paddles {
+        [] => None,
+        _ => Some(body.actuation_jacobian().map_err(|failure| failed(failure, args.depth))?),
+    };
+    let rows = |m: &Matrix3xX<f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect::<Vec<Vec<f64>>>();
+    let point = |p: &Vector3<f64>| <[f64; 3]>::from(*p);
+    let coefficients = body.equilibrium().coefficients();
+    let moved = model.nodal_displacements(coefficients);
+    let document = json!({
+        "scene": scene.name, "dimension": 3, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
+        "integration": scene.discretization.method.integration,
+        "paddles": paddles.iter().map(|(place, _)| scene.paddles[*place].index).collect::<Vec<_>>(),
+        "depth": args.depth,
+        "paddle_displacements": paddles.iter().map(|(_, u)| point(u)).collect::<Vec<_>>(),
+        "target_displacement": point(&target), "orthogonal": (target - axis * axial).norm(), "axial": axial,
+        "jacobian": jacobian.as_ref().map(rows),
+        "base_force": body.contact_force(),
+        "strain_energy": body.equilibrium().energy(),
+        "newton_iterations": body.equilibrium().effort().iterations,
+        "node_positions": model.spatial().positions().iter().map(point).collect::<Vec<_>>(),
+        "node_displacements": moved.iter().map(point).collect::<Vec<_>>(),
+        "units": [&scene.length_unit, &scene.stress_unit],
+        "failure": null,
+    });
+    write_json(args.json.as_deref(), &document)?;
+    if let Some(file) = &args.vtu {
+        output::write_whole(file, vtu::vtu_in_space(model, coefficients).as_bytes())?;
+    }
+    Ok(())
+}

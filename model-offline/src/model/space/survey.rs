@@ -1,0 +1,230 @@
+//! What can be known of a scene in space without solving: its numbers, its mesh, and what of it is seldom meant.
+
+use super::patches::Surface;
+use super::{loose_part, overlapping, patches_of};
+use crate::discretization::TetMesh;
+use crate::discretization::meshing::mesh::Element;
+use crate::geometry::{Implicit, Point};
+use crate::model::error::ModelError;
+use crate::scene::SceneWarning;
+use crate::scene::space::SpaceScene;
+use crate::scene::warning::{self, ALONG};
+use serde::Serialize;
+
+/// So many of the worst elements are named.
+const NAMED: usize = 5;
+/// The needle's way is followed in so many steps over the size of the body.
+const STEPS: i32 = 1000;
+
+/// The numbers of a scene in space and of a mesh of it; lengths in the scene's unit.
+#[derive(Debug, Clone, Serialize)]
+pub struct Survey {
+    /// Lowest corner of the body's bounding box.
+    pub low: [f64; 3],
+    /// Highest corner.
+    pub high: [f64; 3],
+    /// Volume of the mesh.
+    pub volume: f64,
+    /// Area of its surface.
+    pub surface: f64,
+    /// What cannot move.
+    pub immobile: PatchSurvey,
+    /// The needle.
+    pub needle: NeedleSurvey,
+    /// The target.
+    pub target: TargetSurvey,
+    /// Regions of another stiffness or material, in the order of the file.
+    pub inclusions: Vec<InclusionSurvey>,
+    /// Paddle positions, in the order of the file.
+    pub paddles: Vec<PaddleSurvey>,
+    /// The mesh.
+    pub mesh: MeshSurvey,
+    /// Pairs of paddles that overlap, by index.
+    pub overlapping: Vec<[u32; 2]>,
+    /// What is seldom meant.
+    #[serde(skip)]
+    pub warnings: Vec<SceneWarning>,
+}
+
+/// A patch of the surface.
+#[derive(Debug, Clone, Serialize)]
+pub struct PatchSurvey {
+    /// Its area.
+    pub area: f64,
+    /// Its middle.
+    pub middle: [f64; 3],
+    /// Triangles of the mesh that it has.
+    pub triangles: usize,
+    /// Mean of its outer normals, no longer than 1.
+    #[serde(skip)]
+    pub normal: [f64; 3],
+}
+
+/// The needle.
+#[derive(Debug, Clone, Serialize)]
+pub struct NeedleSurvey {
+    /// Its contact, in whose middle it enters.
+    pub contact: PatchSurvey,
+    /// Unit direction of insertion.
+    pub axis: [f64; 3],
+    /// How far it goes.
+    pub depth: f64,
+}
+
+/// The target.
+#[derive(Debug, Clone, Serialize)]
+pub struct TargetSurvey {
+    /// Where it is.
+    pub position: [f64; 3],
+    /// Its distance from the entry along the needle's line.
+    pub along_needle: f64,
+    /// Its distance from the needle's line.
+    pub off_needle: f64,
+    /// Its distance from the surface, about.
+    pub from_boundary: f64,
+}
+
+/// An inclusion.
+#[derive(Debug, Clone, Serialize)]
+pub struct InclusionSurvey {
+    /// From 1, in the order of the file.
+    pub number: usize,
+    /// Factor on the energy.
+    pub stiffness: f64,
+    /// Its volume in the body, without what later inclusions take.
+    pub volume: f64,
+    /// Elements that it has.
+    pub elements: usize,
+}
+
+/// A paddle position.
+#[derive(Debug, Clone, Serialize)]
+pub struct PaddleSurvey {
+    /// Its index.
+    pub index: u32,
+    /// Where it is attached.
+    pub patch: PatchSurvey,
+}
+
+/// A mesh.
+#[derive(Debug, Clone, Serialize)]
+pub struct MeshSurvey {
+    /// Corners of tetrahedra.
+    pub nodes: usize,
+    /// Tetrahedra.
+    pub tetrahedra: usize,
+    /// Smallest and largest dihedral angle, degrees.
+    pub dihedral: [f64; 2],
+    /// Smallest and largest volume of a tetrahedron.
+    pub volume: [f64; 2],
+    /// The tetrahedra with the smallest angles, the worst first.
+    pub worst: Vec<Element>,
+}
+
+impl Survey {
+    /// Of a scene on one of its meshes.
+    ///
+    /// # Errors
+    /// [`ModelError`] for patches without surface, and parts that nothing holds.
+    pub fn of(scene: &SpaceScene, mesh: &TetMesh) -> Result<Self, ModelError> {
+        let surface = Surface::new(mesh, scene.size());
+        let patches = patches_of(scene, &surface)?;
+        loose_part(mesh, &patches)?;
+        let measured: Vec<PatchSurvey> = patches.iter().map(|patch| PatchSurvey::of(mesh, patch)).collect();
+        let volumes = mesh.volumes();
+        let inclusions = scene.inclusions.iter().enumerate().map(|(i, inclusion)| {
+            let own = || mesh.part.iter().zip(&volumes).filter(move |(part, _)| **part as usize == i + 1);
+            let volume = own().map(|(_, volume)| volume).sum();
+            InclusionSurvey { number: i + 1, stiffness: inclusion.stiffness, volume, elements: own().count() }
+        });
+        let (low, high) = scene.body.bounds().unwrap_or_default();
+        let needle =
+            NeedleSurvey { contact: measured[1].clone(), axis: scene.needle.axis.into(), depth: scene.needle.depth };
+        let paddles = scene.paddles.iter().zip(&measured[2..]);
+        let overlapping = overlapping(scene, &patches);
+        let mut survey = Self {
+            low: low.into(),
+            high: high.into(),
+            volume: volumes.iter().sum(),
+            surface: PatchSurvey::of(mesh, surface.triangles()).area,
+            immobile: measured[0].clone(),
+            target: TargetSurvey::of(scene, &Point::from(needle.contact.middle)),
+            needle,
+            inclusions: inclusions.collect(),
+            paddles: paddles.map(|(p, patch)| PaddleSurvey { index: p.index, patch: patch.clone() }).collect(),
+            mesh: MeshSurvey::of(mesh, &volumes),
+            overlapping: overlapping.iter().map(|pair| pair.map(|p| scene.paddles[p].index)).collect(),
+            warnings: Vec::new(),
+        };
+        survey.warnings = survey.seldom_meant(scene);
+        Ok(survey)
+    }
+
+    fn seldom_meant(&self, scene: &SpaceScene) -> Vec<SceneWarning> {
+        let Self { needle, target, .. } = self;
+        let (axis, size) = (scene.needle.axis, scene.size());
+        let inwards = -axis.dot(&Point::from(needle.contact.normal).try_normalize(0.0).unwrap_or_default());
+        let degrees = inwards.clamp(-1.0, 1.0).acos().to_degrees();
+        let to_surface = (90.0 - degrees).abs();
+        let mut found = Vec::new();
+        if to_surface < ALONG {
+            found.push(SceneWarning::NeedleAlongSurface { degrees: to_surface });
+        } else if degrees > 90.0 {
+            found.push(SceneWarning::NeedlePointsOut { degrees });
+        } else {
+            found.extend(warning::towards_target(needle.depth, target.along_needle, target.off_needle, size));
+            let at = comes_out(scene.body.as_ref(), Point::from(needle.contact.middle), axis, size);
+            let leaves = at.filter(|at| needle.depth > *at);
+            found.extend(leaves.map(|at| SceneWarning::NeedleLeavesBody { depth: needle.depth, at }));
+        }
+        found
+    }
+}
+
+/// Depth at which a line that goes into a body comes out of it again, to a thousandth of its size.
+fn comes_out(body: &dyn Implicit, entry: Point<3>, axis: Point<3>, size: f64) -> Option<f64> {
+    let depth = |step: i32| size * f64::from(step) / f64::from(STEPS);
+    let is_in = |step: &i32| body.level(&(entry + axis * depth(*step))) < 0.0;
+    let first = (0..=STEPS).find(is_in)?;
+    (first..=STEPS).find(|step| !is_in(step)).map(depth)
+}
+
+impl PatchSurvey {
+    fn of(mesh: &TetMesh, triangles: &[[u32; 3]]) -> Self {
+        let (mut area, mut middle, mut normal) = (0.0, Point::<3>::zeros(), Point::<3>::zeros());
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|node| mesh.nodes[node as usize]);
+            let across = (b - a).cross(&(c - a)) * 0.5;
+            area += across.norm();
+            middle += (a + b + c) * (across.norm() / 3.0);
+            normal += across;
+        }
+        Self { area, middle: (middle / area).into(), triangles: triangles.len(), normal: (normal / area).into() }
+    }
+}
+
+impl TargetSurvey {
+    fn of(scene: &SpaceScene, entry: &Point<3>) -> Self {
+        let way = scene.target - entry;
+        let along = way.dot(&scene.needle.axis);
+        Self {
+            position: scene.target.into(),
+            along_needle: along,
+            off_needle: (way - scene.needle.axis * along).norm(),
+            from_boundary: -scene.body.level(&scene.target),
+        }
+    }
+}
+
+impl MeshSurvey {
+    fn of(mesh: &TetMesh, volumes: &[f64]) -> Self {
+        let quality = mesh.quality();
+        Self {
+            nodes: mesh.nodes.len(),
+            tetrahedra: mesh.tetrahedra.len(),
+            dihedral: [quality.min_dihedral, quality.max_dihedral],
+            volume: [quality.min_volume, volumes.iter().copied().fold(0.0, f64::max)],
+            worst: mesh.worst(NAMED),
+        }
+    }
+}
