@@ -8,6 +8,7 @@ pub mod describe;
 pub mod error;
 pub mod faults;
 pub mod in_process;
+pub mod in_space;
 pub mod insertion;
 pub mod loop_stability;
 pub mod paper_table;

@@ -10,6 +10,14 @@ use crate::world::needle::RecordedNeedleError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum UsageError {
+    /// What no simulation of a body in space has yet.
+    #[error(
+        "{option} is for scenes in the plane: a body in space is simulated in lockstep, in one process, by its table of states"
+    )]
+    NotInSpace {
+        /// The option.
+        option: String,
+    },
     /// The report's directory would lie in one that is not there.
     #[error("--out {}: the directory {} does not exist; make it, or name another", directory.display(), parent.display())]
     NoParent {

@@ -10,6 +10,7 @@ mod rearm;
 mod replay;
 mod report;
 mod run;
+mod run_space;
 mod schema;
 mod stability;
 mod tables;

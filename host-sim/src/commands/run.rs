@@ -129,6 +129,9 @@ impl RunArgs {
 pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     signals::install();
     super::sweep();
+    if let Some(scene) = args.world.scene_in_space()? {
+        return super::run_space::run(args, &scene);
+    }
     let scene = args.world.scene()?;
     let simulation = args.world.simulation(&scene)?;
     check_directory(&args.out)?;

@@ -6,12 +6,13 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::usage::UsageError;
 use host_sim::world::error::OptionRange;
-use host_sim::world::loop_settings::LoopArgs;
+use host_sim::world::loop_settings::{LoopArgs, LoopSettings};
 use host_sim::world::needle::NeedleTrajectory;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::tissue::WantedPlant;
 use model_offline::output::csv;
-use model_offline::scene::{Effect, Scene};
+use model_offline::scene::space::{AnyScene, SpaceScene};
+use model_offline::scene::{Effect, Motion, Scene, Sensor, SensorPreset};
 
 /// How long a silent peer is waited for.
 pub(super) const PATIENCE: OptionRange = OptionRange::new("--patience", 1e-3, 86_400.0, " s");
@@ -84,9 +85,9 @@ pub(crate) struct WorldArgs {
 }
 
 /// Seconds of an insertion at the speed of the scene's needle.
-fn own_insertion_time(scene: &Scene) -> f64 {
+fn own_insertion_time(depth: f64, speed: f64) -> f64 {
     const USUAL_S: f64 = 5.0;
-    let own_s = scene.needle.depth / scene.needle.speed;
+    let own_s = depth / speed;
     // The speed of a scene that names none is the depth in five seconds, but for rounding.
     if (own_s - USUAL_S).abs() < 1e-9 { USUAL_S } else { own_s }
 }
@@ -105,7 +106,7 @@ impl WorldArgs {
             INSERTION_TIME.check(insertion_s)?;
             scene.set_speed(scene.needle.depth / insertion_s);
         } else if self.needle_motion.is_some() {
-            let needle = self.needle(&scene)?;
+            let needle = self.needle(scene.needle.depth, scene.needle.speed)?;
             scene.set_speed(needle.depth() / needle.insertion_s());
         }
         Ok(scene)
@@ -115,13 +116,12 @@ impl WorldArgs {
     ///
     /// # Errors
     /// [`SimError::Usage`] names the option.
-    fn needle(&self, scene: &Scene) -> Result<NeedleTrajectory, SimError> {
-        let depth = scene.needle.depth;
+    fn needle(&self, depth: f64, speed: f64) -> Result<NeedleTrajectory, SimError> {
         DWELL.check(self.dwell)?;
         let inserted = match &self.needle_motion {
             Some(path) => recorded_needle(path, depth)?,
             None => {
-                let insertion_s = self.insertion_time.unwrap_or_else(|| own_insertion_time(scene));
+                let insertion_s = self.insertion_time.unwrap_or_else(|| own_insertion_time(depth, speed));
                 INSERTION_TIME.check(insertion_s)?;
                 WAIT.check(self.wait)?;
                 STEPS.check(f64::from(self.steps))?;
@@ -140,10 +140,53 @@ impl WorldArgs {
     pub(crate) fn simulation(&self, scene: &Scene) -> Result<Simulation, SimError> {
         let sensor = self.loop_args.sensor(&scene.sensor, scene.needle.depth, &scene.length_unit)?;
         let loop_settings = self.loop_args.settings(&sensor, &scene.motion)?;
+        let simulation = Simulation::new(scene).with_needle(self.needle(scene.needle.depth, scene.needle.speed)?);
+        self.over(simulation, sensor, loop_settings)
+    }
+
+    /// The scene, where it is one in space.
+    ///
+    /// # Errors
+    /// [`SimError::Scene`], [`SimError::Usage`] for what no world in space has.
+    pub(crate) fn scene_in_space(&self) -> Result<Option<SpaceScene>, SimError> {
+        let Some(path) = self.scene.as_deref() else { return Ok(None) };
+        let AnyScene::Space(mut scene) = AnyScene::read(path)? else { return Ok(None) };
+        for (given, option) in [(!self.world.is_empty(), "--world"), (self.plant.is_some(), "--plant")] {
+            if given {
+                return Err(UsageError::NotInSpace { option: option.to_owned() }.into());
+            }
+        }
+        if let Some(insertion_s) = self.insertion_time {
+            INSERTION_TIME.check(insertion_s)?;
+            scene.needle.speed = scene.needle.depth / insertion_s;
+        }
+        Ok(Some(*scene))
+    }
+
+    /// As [`simulation`](Self::simulation), in space.
+    ///
+    /// # Errors
+    /// [`SimError::Usage`] names the option.
+    pub(crate) fn simulation_in_space(&self, scene: &SpaceScene) -> Result<Simulation, SimError> {
+        let (depth, unit) = (scene.needle.depth, &scene.length_unit);
+        // A preset of the unit is always known.
+        let own = SensorPreset::of_unit(unit).sensor(depth, unit)?;
+        let sensor = self.loop_args.sensor(&own, depth, unit)?;
+        let loop_settings = self.loop_args.settings(&sensor, &Motion::default())?;
+        let needle = self.needle(depth, scene.needle.speed)?;
+        let simulation = Simulation::in_space(scene, sensor).with_needle(needle);
+        self.over(simulation, sensor, loop_settings)
+    }
+
+    fn over(
+        &self,
+        mut simulation: Simulation,
+        sensor: Sensor,
+        loop_settings: LoopSettings,
+    ) -> Result<Simulation, SimError> {
         PADDLE_LAG.check(self.paddle_lag)?;
         PADDLE_DELAY.check(f64::from(self.paddle_delay))?;
         PADDLE_GAIN.check(self.paddle_gain)?;
-        let mut simulation = Simulation::new(scene).with_needle(self.needle(scene)?);
         simulation.duration_s = self.duration.unwrap_or(simulation.duration_s);
         DURATION.check(simulation.duration_s)?;
         let (duration_s, wait_s) = (simulation.duration_s, simulation.needle.wait_s());

@@ -4,12 +4,16 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::{Attachments, pictures, render, render_with};
 use crate::bench::error::SimError;
+use crate::bench::in_space::SpaceRun;
 use crate::bench::result::{FORMAT, RunResult};
 use crate::bench::usage::UsageError;
 use crate::record::error::FileError;
 use crate::record::files::{Artifact, read_bytes, write_bytes};
+use crate::report::page::space;
 
 /// The result in a report's directory; also the mark by which a former run is known.
 const RESULT_FILE: &str = "result.json";
@@ -45,20 +49,35 @@ pub fn check_directory(directory: &Path) -> Result<(), SimError> {
 ///
 /// # Errors
 /// [`SimError::File`]; what was there before is untouched then.
-pub fn write_run(directory: &Path, result: &RunResult, artifacts: Vec<Artifact>) -> Result<(), SimError> {
+pub fn write_run(directory: &Path, result: &RunResult, mut artifacts: Vec<Artifact>) -> Result<(), SimError> {
+    artifacts.push(Artifact { name: REPORT_FILE.to_owned(), bytes: render(result).into_bytes() });
+    // Node positions by the thousand: in one line it is half the size.
+    artifacts.push(encoded(directory, result)?);
+    write_directory(directory, &artifacts)
+}
+
+/// The same of a run in space.
+///
+/// # Errors
+/// As [`write_run`].
+pub fn write_space_run(directory: &Path, result: &SpaceRun) -> Result<(), SimError> {
+    let page = Artifact { name: REPORT_FILE.to_owned(), bytes: space::render(result).into_bytes() };
+    write_directory(directory, &[page, encoded(directory, result)?])
+}
+
+fn encoded(directory: &Path, result: &impl Serialize) -> Result<Artifact, SimError> {
+    let bytes = serde_json::to_vec(result).map_err(std::io::Error::from).map_err(FileError::write(directory))?;
+    Ok(Artifact { name: RESULT_FILE.to_owned(), bytes })
+}
+
+/// Writes a directory that appears whole; a former one is replaced.
+fn write_directory(directory: &Path, artifacts: &[Artifact]) -> Result<(), SimError> {
     let parent = parent(directory);
     let temporary =
         tempfile::Builder::new().prefix(".stillpoint-").tempdir_in(parent).map_err(FileError::write(parent))?;
     let new = temporary.path().join("new");
     std::fs::create_dir(&new).map_err(FileError::write(&new))?;
-    let page = Artifact { name: REPORT_FILE.to_owned(), bytes: render(result).into_bytes() };
-    let encoded = serde_json::to_vec(result);
-    // Node positions by the thousand: in one line it is half the size.
-    let summary = Artifact {
-        name: RESULT_FILE.to_owned(),
-        bytes: encoded.map_err(std::io::Error::from).map_err(FileError::write(directory))?,
-    };
-    for artifact in artifacts.iter().chain([&page, &summary]) {
+    for artifact in artifacts {
         let path = new.join(&artifact.name);
         write_synced(&path, &artifact.bytes).map_err(FileError::write(directory))?;
     }

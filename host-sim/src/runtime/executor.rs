@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use clap::ValueEnum;
-use firmware::contract::{MAX_TABLE_BYTES, PaddleCommand, Table, TableError, decode, encode};
+use firmware::contract::{Header, MAX_TABLE_BYTES, PaddleCommand, SpatialTable, Table, TableError, decode, encode};
 use firmware::inputs::Ledger;
 use firmware::scalar::{Scalar, ScalarKind};
 use firmware::serial::Request;
@@ -64,14 +64,14 @@ pub trait StepExecutor {
     fn ledger(&mut self) -> Result<Ledger, RuntimeError>;
 }
 
-/// The controller in this process.
+/// The controller in this process, in D dimensions with N directions orthogonal to the needle and P paddles.
 #[derive(Debug)]
-struct OnThisMachine<'t, T: Scalar> {
-    controller: Controller<'t, T>,
-    state: State<T>,
+struct OnThisMachine<'t, T: Scalar, const D: usize, const N: usize, const P: usize> {
+    controller: Controller<'t, T, D, N, P>,
+    state: State<T, D, N, P>,
 }
 
-impl<T: Scalar> StepExecutor for OnThisMachine<'_, T> {
+impl<T: Scalar, const D: usize, const N: usize, const P: usize> StepExecutor for OnThisMachine<'_, T, D, N, P> {
     fn step(&mut self, inputs: &Inputs) -> Result<PaddleCommand, RuntimeError> {
         Ok(self.controller.step(&mut self.state, inputs))
     }
@@ -109,13 +109,35 @@ impl StepExecutor for OnBoard {
     }
 }
 
-/// A table in whichever scalar its file holds: the controller computes in that one.
+/// A table of whichever shape and scalar its file holds: the controller computes in that one.
 #[derive(Clone, Debug)]
 pub enum AnyTable {
-    /// Single precision.
+    /// In the plane, single precision.
     F32(Box<Table<f32, 2>>),
-    /// Double precision.
+    /// In the plane, double precision.
     F64(Box<Table<f64, 2>>),
+    /// One paddle in space, single precision.
+    OneF32(Box<SpatialTable<f32, 1>>),
+    /// One paddle in space, double precision.
+    OneF64(Box<SpatialTable<f64, 1>>),
+    /// Two paddles in space, single precision.
+    TwoF32(Box<SpatialTable<f32, 2>>),
+    /// Two paddles in space, double precision.
+    TwoF64(Box<SpatialTable<f64, 2>>),
+}
+
+/// The same with every shape and scalar of a table.
+macro_rules! with_table {
+    ($any:expr, $table:ident => $what:expr) => {
+        match $any {
+            AnyTable::F32($table) => $what,
+            AnyTable::F64($table) => $what,
+            AnyTable::OneF32($table) => $what,
+            AnyTable::OneF64($table) => $what,
+            AnyTable::TwoF32($table) => $what,
+            AnyTable::TwoF64($table) => $what,
+        }
+    };
 }
 
 impl AnyTable {
@@ -124,35 +146,36 @@ impl AnyTable {
     /// # Errors
     /// As [`decode`].
     pub fn decode(bytes: &[u8]) -> Result<Self, TableError> {
-        Ok(match scalar_of(bytes) {
-            Some(ScalarKind::F32) => Self::F32(Box::new(decode(bytes)?)),
-            _ => Self::F64(Box::new(decode(bytes)?)),
+        // What has no header that can be read is refused as a table in the plane.
+        let shape = Header::read(bytes).map_or((2, 2), |header| (header.dimension, header.paddle_dof));
+        Ok(match (shape, scalar_of(bytes)) {
+            ((3, 3), Some(ScalarKind::F32)) => Self::OneF32(Box::new(decode(bytes)?)),
+            ((3, 3), _) => Self::OneF64(Box::new(decode(bytes)?)),
+            ((3, _), Some(ScalarKind::F32)) => Self::TwoF32(Box::new(decode(bytes)?)),
+            ((3, _), _) => Self::TwoF64(Box::new(decode(bytes)?)),
+            (_, Some(ScalarKind::F32)) => Self::F32(Box::new(decode(bytes)?)),
+            (_, _) => Self::F64(Box::new(decode(bytes)?)),
         })
     }
 
     /// Deepest needle position that it covers, length.
     pub fn depth_end(&self) -> f64 {
-        match self {
-            Self::F32(table) => table.validity.depth_end.to_f64(),
-            Self::F64(table) => table.validity.depth_end,
-        }
+        with_table!(self, table => table.validity.depth_end.to_f64())
     }
 
     /// SHA-256 of the scene that it was computed from.
     pub fn scene_hash(&self) -> [u8; 32] {
-        match self {
-            Self::F32(table) => table.scene_hash,
-            Self::F64(table) => table.scene_hash,
-        }
+        with_table!(self, table => table.scene_hash)
     }
 
     /// Labels of its units of length and stress.
     pub fn units(&self) -> [String; 2] {
-        let units = match self {
-            Self::F32(table) => &table.units,
-            Self::F64(table) => &table.units,
-        };
-        [units.length.as_str().to_owned(), units.stress.as_str().to_owned()]
+        with_table!(self, table => [table.units.length.as_str().to_owned(), table.units.stress.as_str().to_owned()])
+    }
+
+    /// Indices of its paddles.
+    pub fn paddles(&self) -> Vec<u32> {
+        with_table!(self, table => table.paddles.iter().map(|paddle| paddle.index).collect())
     }
 
     /// The controller in this process.
@@ -160,17 +183,15 @@ impl AnyTable {
     /// # Errors
     /// [`RuntimeError::Settings`].
     pub fn on_this_machine(&self, settings: &Settings) -> Result<Box<dyn StepExecutor + '_>, RuntimeError> {
-        fn executor<'t, T: Scalar>(
-            table: &'t Table<T, 2>,
-            settings: &Settings,
-        ) -> Result<Box<dyn StepExecutor + 't>, RuntimeError> {
-            Ok(Box::new(OnThisMachine { controller: Controller::new(table, settings)?, state: State::new() }))
-        }
-        match self {
-            Self::F32(table) => executor(table, settings),
-            Self::F64(table) => executor(table, settings),
-        }
+        with_table!(self, table => executor(table, settings))
     }
+}
+
+fn executor<'t, T: Scalar, const D: usize, const N: usize, const P: usize>(
+    table: &'t Table<T, D, N, P>,
+    settings: &Settings,
+) -> Result<Box<dyn StepExecutor + 't>, RuntimeError> {
+    Ok(Box::new(OnThisMachine { controller: Controller::new(table, settings)?, state: State::new() }))
 }
 
 /// The controller on a Cortex-M7 in QEMU, with this encoded table.

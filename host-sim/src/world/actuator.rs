@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::Vector2;
+use nalgebra::SVector;
 
 /// How the paddle's actuator follows commands. The default is a servo that is there within one tick, at its rate limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,23 +17,23 @@ pub struct ActuatorModel {
     pub gain: f64,
 }
 
-/// The paddle and the actuator that moves it.
+/// A paddle in D dimensions and the actuator that moves it.
 #[derive(Clone, Debug)]
-pub struct PaddleActuator {
+pub struct PaddleActuator<const D: usize = 2> {
     model: ActuatorModel,
-    waiting: VecDeque<Vector2<f64>>,
-    goal: Vector2<f64>,
-    position: Vector2<f64>,
+    waiting: VecDeque<SVector<f64, D>>,
+    goal: SVector<f64, D>,
+    position: SVector<f64, D>,
 }
 
-impl PaddleActuator {
+impl<const D: usize> PaddleActuator<D> {
     /// A paddle at rest where it touches the undeformed tissue.
     pub fn new(model: ActuatorModel) -> Self {
-        Self { model, waiting: VecDeque::new(), goal: Vector2::zeros(), position: Vector2::zeros() }
+        Self { model, waiting: VecDeque::new(), goal: SVector::zeros(), position: SVector::zeros() }
     }
 
     /// A paddle at rest in this place (displacement, length).
-    pub fn at(model: ActuatorModel, position: Vector2<f64>) -> Self {
+    pub fn at(model: ActuatorModel, position: SVector<f64, D>) -> Self {
         Self { goal: position, position, ..Self::new(model) }
     }
 
@@ -43,12 +43,12 @@ impl PaddleActuator {
     }
 
     /// Displacement now, length.
-    pub fn position(&self) -> Vector2<f64> {
+    pub fn position(&self) -> SVector<f64, D> {
         self.position
     }
 
     /// `elapsed_s` pass with this command, or without one (the last goal stays).
-    pub fn advance(&mut self, command: Option<Vector2<f64>>, elapsed_s: f64) {
+    pub fn advance(&mut self, command: Option<SVector<f64, D>>, elapsed_s: f64) {
         self.waiting.push_back(command.unwrap_or(*self.waiting.back().unwrap_or(&self.goal)));
         while self.waiting.len() > self.model.delay_ticks as usize {
             let Some(goal) = self.waiting.pop_front() else {
@@ -68,6 +68,7 @@ impl PaddleActuator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector2;
 
     const SERVO: ActuatorModel = ActuatorModel { max_rate: 0.1, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
 

@@ -3,6 +3,7 @@
 use model_offline::model::ModelError;
 use model_offline::needle::NeedleError;
 use model_offline::number::length;
+use model_offline::reduction::TabulationError;
 use model_offline::reduction::train::TrainingError;
 use model_offline::solver::equilibrium::Failure;
 
@@ -61,6 +62,10 @@ pub enum WorldError {
     #[error("no reduced model of the tissue: {0}")]
     #[diagnostic(help("use --plant full, or --plant auto to have the full model where no reduced one can be made"))]
     Training(TrainingError),
+    /// The body in space cannot be tabulated.
+    #[error("no table of the tissue along the insertion: {0}")]
+    #[diagnostic(help("insert less deep ([needle] depth), or give the law a barrier"))]
+    Tabulation(TabulationError),
     /// The condensed model that was asked for cannot be made.
     #[error("no reduced model of the tissue: {0}")]
     #[diagnostic(help("use --plant full, or --plant auto to have the full model where no reduced one can be made"))]

@@ -13,6 +13,7 @@ pub mod needle;
 pub mod retrace;
 pub mod sensors;
 pub mod simulation;
+pub mod space;
 pub mod tissue;
 pub mod truth;
 

@@ -5,10 +5,10 @@
 
 use std::collections::VecDeque;
 
-use firmware::contract::frames::{TARGET_VISIBLE, from_plane};
+use firmware::contract::frames::{MAX_DIMENSION, TARGET_VISIBLE, from_plane};
 use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
 use model_offline::scene::{Outages, Sensor};
-use nalgebra::Vector2;
+use nalgebra::{SVector, Vector2};
 use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_pcg::Pcg64;
 
@@ -18,9 +18,9 @@ use super::needle::NeedleMotion;
 const TARGET_STREAM: u128 = 1;
 const OUTAGE_STREAM: u128 = 2;
 
-/// The target's camera: samples at its own rate, which arrive late.
+/// The target's camera, in D dimensions: samples at its own rate, which arrive late.
 #[derive(Clone, Debug)]
-pub struct TargetSensor {
+pub struct TargetSensor<const D: usize = 2> {
     period_ns: u64,
     latency_ns: u64,
     /// Standard deviation per component, length.
@@ -28,7 +28,7 @@ pub struct TargetSensor {
     /// Step of what is reported, length; 0: none.
     quantisation: f64,
     /// Added to every measurement, length.
-    bias: Vector2<f64>,
+    bias: SVector<f64, D>,
     outages: Option<OutageSchedule>,
     random: Pcg64,
     sequence: u32,
@@ -36,7 +36,7 @@ pub struct TargetSensor {
     on_their_way: VecDeque<TargetSample>,
 }
 
-impl TargetSensor {
+impl<const D: usize> TargetSensor<D> {
     /// A sensor with this period and latency, ns, and noise (standard deviation per component, length).
     pub fn new(period_ns: u64, latency_ns: u64, noise: f64, seed: u64) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl TargetSensor {
             latency_ns,
             noise,
             quantisation: 0.0,
-            bias: Vector2::zeros(),
+            bias: SVector::zeros(),
             outages: None,
             random: Pcg64::new(u128::from(seed), TARGET_STREAM),
             sequence: 0,
@@ -53,15 +53,14 @@ impl TargetSensor {
         }
     }
 
-    /// The same with the bias, the steps and the outages of this one.
+    /// The same with results in steps of this length; 0: none.
     #[must_use]
-    pub fn with_defects_of(self, sensor: &Sensor, seed: u64) -> Self {
-        let outages = sensor.outages.map(|outages| OutageSchedule::new(outages, seed));
-        Self { quantisation: sensor.quantisation, bias: sensor.bias, outages, ..self }
+    pub fn quantised(self, step: f64) -> Self {
+        Self { quantisation: step, ..self }
     }
 
     /// Measures if a measurement is due at `time_ns`.
-    pub fn measure(&mut self, time_ns: u64, displacement: &Vector2<f64>) {
+    pub fn measure(&mut self, time_ns: u64, displacement: &SVector<f64, D>) {
         let due_ns = *self.next_ns.get_or_insert(time_ns);
         if time_ns < due_ns {
             return;
@@ -78,7 +77,7 @@ impl TargetSensor {
             sequence: self.sequence,
             flags: if sees { TARGET_VISIBLE } else { 0 },
             time_ns,
-            displacement: from_plane(measured.into()),
+            displacement: to_frame(&measured),
         });
         self.sequence = self.sequence.wrapping_add(1);
     }
@@ -92,6 +91,20 @@ impl TargetSensor {
     fn normal(&mut self) -> f64 {
         StandardNormal.sample(&mut self.random)
     }
+}
+
+impl TargetSensor {
+    /// The same with the bias, the steps and the outages of this one.
+    #[must_use]
+    pub fn with_defects_of(self, sensor: &Sensor, seed: u64) -> Self {
+        let outages = sensor.outages.map(|outages| OutageSchedule::new(outages, seed));
+        Self { quantisation: sensor.quantisation, bias: sensor.bias, outages, ..self }
+    }
+}
+
+/// A displacement as frames have it: what is missing of three components is 0.
+pub fn to_frame<const D: usize>(displacement: &SVector<f64, D>) -> [f64; MAX_DIMENSION] {
+    std::array::from_fn(|k| displacement.as_slice().get(k).copied().unwrap_or(0.0))
 }
 
 /// When nothing is seen: gaps of exponential length between outages.
@@ -172,7 +185,7 @@ mod tests {
     const MS: u64 = 1_000_000;
 
     fn samples(seed: u64, noise: f64) -> Vec<(u64, TargetSample)> {
-        let mut sensor = TargetSensor::new(20 * MS, 25 * MS, noise, seed);
+        let mut sensor: TargetSensor = TargetSensor::new(20 * MS, 25 * MS, noise, seed);
         let mut arrived = Vec::new();
         for tick in 0..200 {
             let time_ns = 7 + tick * MS;
@@ -232,7 +245,7 @@ mod tests {
 
     #[test]
     fn noise_has_the_stated_deviation() {
-        let mut sensor = TargetSensor::new(1, 0, 0.5, 11);
+        let mut sensor: TargetSensor = TargetSensor::new(1, 0, 0.5, 11);
         let count = 20_000;
         let mut squares = 0.0;
         for time_ns in 0..count {

@@ -1,5 +1,6 @@
 //! The numbers of a simulation.
 
+use model_offline::scene::space::SpaceScene;
 use model_offline::scene::{Scene, Sensor};
 
 use super::actuator::ActuatorModel;
@@ -55,6 +56,24 @@ impl Simulation {
         let needle = NeedleTrajectory::new(depth, 5.0);
         let duration_s = needle.end_s() + SETTLE_S;
         Self { loop_settings, sensor, needle, duration_s, depth, actuator, seed: 1, plant: None }
+    }
+
+    /// The same on a body in space, seen by this sensor.
+    pub fn in_space(scene: &SpaceScene, sensor: Sensor) -> Self {
+        let actuator = ActuatorModel { max_rate: scene.actuator.max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
+        let depth = scene.needle.depth;
+        let needle = NeedleTrajectory::new(depth, 5.0);
+        let duration_s = needle.end_s() + SETTLE_S;
+        Self {
+            loop_settings: LoopSettings::of(&sensor),
+            sensor,
+            needle,
+            duration_s,
+            depth,
+            actuator,
+            seed: 1,
+            plant: None,
+        }
     }
 
     /// The same in so many seconds, with half a second for what is left then.

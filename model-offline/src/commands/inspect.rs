@@ -2,8 +2,10 @@
 
 use super::error::CliError;
 use super::json::write_json;
+use firmware::contract::{Header, TableError};
 use model_offline::output::check_outputs;
-use model_offline::output::table_text;
+use model_offline::output::{space_table_text, table_text};
+use model_offline::table::space::SpaceTable;
 use std::path::PathBuf;
 
 /// Options of `inspect`.
@@ -20,10 +22,19 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), CliError> {
     check_outputs(&[&args.table], &[("--json", args.json.as_deref())])?;
     let bytes = std::fs::read(&args.table)
         .map_err(|error| CliError::BadTable { path: args.table.clone(), reason: error.into() })?;
-    let contents = table_text::read(&bytes)
-        .map_err(|error| CliError::BadTable { path: args.table.clone(), reason: error.to_string().into() })?;
-    write_json(args.json.as_deref(), &table_text::json(&contents))?;
+    let refused = |error: TableError| CliError::BadTable { path: args.table.clone(), reason: error.to_string().into() };
+    let (json, summary) = match Header::read(&bytes).map_err(refused)?.dimension {
+        3 => {
+            let contents = SpaceTable::read(&bytes).map_err(refused)?;
+            (space_table_text::json(&contents), space_table_text::summary(&contents))
+        }
+        _ => {
+            let contents = table_text::read(&bytes).map_err(refused)?;
+            (table_text::json(&contents), table_text::summary(&contents))
+        }
+    };
+    write_json(args.json.as_deref(), &json)?;
     println!("{}: {} bytes, checked", args.table.display(), bytes.len());
-    println!("{}", table_text::summary(&contents));
+    println!("{summary}");
     Ok(())
 }

@@ -3,9 +3,13 @@
 use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use model_offline::output::check_outputs;
-use model_offline::output::{self, table_text};
+use model_offline::output::{self, space_table_text, table_text};
 use model_offline::placement::model_with_paddle;
-use model_offline::table::{self, TableOptions};
+use model_offline::placement::space::study::best_to_control;
+use model_offline::placement::space::workflow::insertion_model;
+use model_offline::scene::space::SpaceScene;
+use model_offline::table::space::SpaceTable;
+use model_offline::table::{self, TableBuildError, TableOptions};
 use std::path::PathBuf;
 
 /// Options of `table`.
@@ -13,9 +17,9 @@ use std::path::PathBuf;
 pub(super) struct TableArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Paddle index (default: the best dynamic paddle).
-    #[arg(long)]
-    paddle: Option<u32>,
+    /// Paddle index; of a scene in space one or two, as in `3,8` (default: the best to control with, in space the best pair).
+    #[arg(long, value_delimiter = ',', num_args = 1)]
+    paddle: Vec<u32>,
     /// Where to write the table.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
@@ -29,15 +33,41 @@ pub(super) struct TableArgs {
 }
 
 pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
+    if let Some(scene) = args.scene.read_in_space()? {
+        return in_space(args, args.discretization.over_space(scene)?);
+    }
+    let paddle = match args.paddle[..] {
+        [] => None,
+        [index] => Some(index),
+        _ => return Err(TableBuildError::Paddles(args.paddle.len()).into()),
+    };
     let scene = args.discretization.over(args.scene.read_still()?)?;
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
-    let (model, paddle) = model_with_paddle(&scene, args.paddle)?;
+    let (model, paddle) = model_with_paddle(&scene, paddle)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
     let table = table::build(&model, paddle, &options)?;
     let bytes = table::to_bytes(&table)?;
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
         println!("{}: {} bytes\n{}", args.output.display(), bytes.len(), table_text::summary(&table));
+    }
+    Ok(())
+}
+
+/// A table in space, of the model that insertions are followed on.
+fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
+    check_outputs(&args.scene.files(&scene), &[("--output", Some(&args.output))])?;
+    let model = insertion_model(&scene)?;
+    let paddles = match args.paddle.is_empty() {
+        true => best_to_control(&model)?,
+        false => args.paddle.clone(),
+    };
+    let options = TableOptions { knots: args.knots, ..TableOptions::default() };
+    let table = SpaceTable::build(&model, &paddles, &options)?;
+    let bytes = table.to_bytes()?;
+    output::write_whole(&args.output, &bytes)?;
+    if !args.run.quiet {
+        println!("{}: {} bytes\n{}", args.output.display(), bytes.len(), space_table_text::summary(&table));
     }
     Ok(())
 }

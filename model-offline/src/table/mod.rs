@@ -2,6 +2,7 @@
 
 mod along_insertion;
 mod amplification;
+pub mod space;
 
 use self::amplification::largest_amplification;
 use crate::model::{Body, ModelError, TissueModel};
@@ -56,6 +57,9 @@ pub enum TableBuildError {
     /// The number of knots is out of range.
     #[error("a table has 2 to {MAX_KNOTS} knots, not {0}")]
     Knots(usize),
+    /// A table is of one paddle or two, and in the plane of one.
+    #[error("{0} paddles asked for: a table has one or, in space, two")]
+    Paddles(usize),
     /// The scene has no such paddle, or the model failed before the second knot.
     #[error(transparent)]
     Model(#[from] ModelError),

@@ -12,6 +12,7 @@ mod placement;
 mod scene;
 mod settings;
 mod slider;
+pub(super) mod space;
 mod style;
 mod timing;
 mod view;

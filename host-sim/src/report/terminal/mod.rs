@@ -1,4 +1,5 @@
 //! What commands say on one screen.
 
+pub mod space_summary;
 pub mod summary;
 pub mod timing_summary;

@@ -130,6 +130,22 @@ pub fn rest_responses(model: &SpaceModel) -> Result<Vec<SpaceResponse>, ModelErr
     all_sets(model).iter().map(|attached| rest.response(attached)).collect()
 }
 
+/// The pair that controls the target best at rest, or the paddle where there are no pairs, by index.
+///
+/// # Errors
+/// [`ModelError`], among them [`ModelError::NoPaddleControls`].
+pub fn best_to_control(model: &SpaceModel) -> Result<Vec<u32>, ModelError> {
+    let (scene, sets) = (model.scene(), all_sets(model));
+    let wanted = if scene.pairs.is_empty() { 1 } else { 2 };
+    let responses = rest_responses(model)?;
+    let measures = sets.iter().zip(&responses).filter(|(set, _)| set.len() == wanted).filter_map(|(set, response)| {
+        let measure = response.controllability?.measure;
+        measure.is_finite().then_some((set, measure))
+    });
+    let best = measures.min_by(|a, b| a.1.total_cmp(&b.1)).ok_or(ModelError::NoPaddleControls)?;
+    Ok(best.0.iter().map(|&p| scene.paddles[p].index).collect())
+}
+
 /// Studies every paddle and pair of the model's scene: at rest on the model itself (`rest`, from [`rest_responses`]), along
 /// the insertion with what the law's nonlinearity adds on `profile`.
 ///

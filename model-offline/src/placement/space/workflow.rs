@@ -79,7 +79,7 @@ impl SpaceStudy {
         let start = Instant::now();
         let Discretised { model, rest, estimate: error_estimate } = discretise(scene)?;
         begin(steps(&model));
-        let profile = profile_model(model.scene())?;
+        let profile = insertion_model(model.scene())?;
         let placement = place_in_space(&model, &rest, &profile, threads, progress)?;
         Ok(Self { model, placement, error_estimate, wall_s: start.elapsed().as_secs_f64() })
     }
@@ -230,9 +230,13 @@ fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError>
     Err(ModelError::ToleranceNotReached { tolerance, reached })
 }
 
-/// The model that says what the law's nonlinearity adds along insertions: linear tetrahedra on the coarsest mesh that sees
-/// every patch. They cost a tenth of any other method, and go as deep as it.
-fn profile_model(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
+/// The model of insertions: it says what the law's nonlinearity adds to the response at rest, and is what tables and simulations in
+/// space are made of. Linear tetrahedra on the coarsest mesh that sees every patch: they cost a tenth of any other method, and go as
+/// deep as it; elements that know of the singular strain at rims are squeezed to nothing there long before.
+///
+/// # Errors
+/// [`ModelError`] when no mesh sees every patch.
+pub fn insertion_model(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
     let scene = scene.with_method(Method::new(Integration::FemT4));
     let mut outcome = Err(ModelError::NoPaddleControls);
     for level in LEVELS {

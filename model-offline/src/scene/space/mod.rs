@@ -14,6 +14,7 @@ use crate::discretization::{Discretization, Method};
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::Law;
 use nalgebra::Matrix3x2;
+use sha2::{Digest as _, Sha256};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -96,6 +97,8 @@ pub struct SpaceScene {
     pub actuator: Actuator,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Discretization,
+    /// SHA-256 over what the scene's text says and its files hold.
+    pub(super) content: [u8; 32],
     /// What was changed or assumed in files that the scene names, a sentence each.
     pub notes: Vec<String>,
     /// Files that the scene names.
@@ -189,6 +192,14 @@ impl SpaceScene {
     /// [`NoSuchPaddle`] names those that there are.
     pub fn paddle_position(&self, index: u32) -> Result<usize, NoSuchPaddle> {
         NoSuchPaddle::find(index, self.paddles.iter().map(|paddle| paddle.index))
+    }
+
+    /// SHA-256 over everything that the model's numbers depend on: what the scene says and its files hold, whether its inclusions are
+    /// there, and how it is discretised.
+    pub fn hash(&self) -> [u8; 32] {
+        let Discretization { resolution, method, .. } = self.discretization;
+        let content = serde_json::json!([self.content, self.tissue(), resolution, method.integration, method.support]);
+        Sha256::digest(content.to_string()).into()
     }
 
     /// Length of the diagonal of the body's bounding box.

@@ -11,8 +11,9 @@ use crate::scene::Actuator;
 use crate::scene::error::{SceneError, Source};
 use crate::scene::limits::{self, LimitError};
 use crate::scene::schema::Located;
+use sha2::{Digest, Sha256};
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 type Checked<T> = Result<T, SceneError>;
@@ -32,6 +33,17 @@ pub(super) fn parse(source: Source<'_>, folder: &Path) -> Checked<SpaceScene> {
     })?;
     let bodies = Bodies::new(source, folder, &file.scene.units.length);
     Validator { source, file: &file }.scene(bodies)
+}
+
+/// SHA-256 over what a scene says and what its files hold, whatever its layout and its comments.
+fn content(text: &str, files: &[PathBuf]) -> [u8; 32] {
+    let canonical = toml::from_str::<toml::Table>(text).map_or_else(|_| text.to_owned(), |table| table.to_string());
+    let mut hash = Sha256::new().chain_update(canonical);
+    for file in files {
+        // A file that has just been read: should it be gone, the scene's text still tells it apart.
+        hash.update(std::fs::read(file).unwrap_or_default());
+    }
+    hash.finalize().into()
 }
 
 struct Validator<'a> {
@@ -67,6 +79,7 @@ impl Validator<'_> {
             material: self.material(&file.material)?,
             inclusions,
             notes: bodies.notes,
+            content: content(self.source.text, &bodies.files),
             files: bodies.files,
             immobile: self.immobile()?,
             pairs: self.pairs(&paddles)?,

@@ -1,0 +1,125 @@
+//! The page of a run in space.
+
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use model_offline::number::length;
+use model_offline::output::chart::number::number;
+use model_offline::output::chart::{Axis, Colour, Dash, Panel, Place, ReferenceLine, Series};
+
+use super::embed::panels;
+use super::style;
+use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
+
+/// The whole page; it needs nothing else.
+pub(in crate::report) fn render(run: &SpaceRun) -> String {
+    let unit = &run.units[0];
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "Stillpoint: " (run.scene) }
+                style { (PreEscaped(style::page())) }
+            }
+            body {
+                main {
+                    h1 { "Stillpoint: " (run.scene) ", in space" }
+                    p {
+                        "Insertion to " (length(run.depth)) " " (unit) " in " (run.insertion_s) " s. Loop " (run.rate_hz)
+                        " Hz; target seen at " (run.target_rate_hz) " Hz, " (run.target_latency_ms) " ms late, noise "
+                        (length(run.noise)) " " (unit) " per component; seed " (run.seed) ". Tissue: linear tetrahedra, "
+                        (run.nodes) " nodes, tabulated along each insertion. One process, simulated time."
+                    }
+                    @for case in &run.cases { (of_case(run, case)) }
+                }
+            }
+        }
+    }
+    .into_string()
+}
+
+fn of_case(run: &SpaceRun, case: &SpaceCase) -> Markup {
+    let unit = &run.units[0];
+    let rows = [("no paddle", &case.none), ("best fixture", &case.fixture), ("controlled", &case.dynamic)];
+    html! {
+        section {
+            h2 { "Tissue " (case.tissue.name()) ", table of tissue " (case.table_tissue.name()) }
+            p {
+                "Controlled paddles leave " (number(case.improvement, 2)) " times less than the best fixture, and "
+                (number(case.improvement_over_none, 2)) " times less than no paddle."
+            }
+            table {
+                thead {
+                    tr { th { "" } th { "paddles" } th { "largest error, " (unit) } th { "RMS, " (unit) } th { "travel, " (unit) } th { "state" } }
+                }
+                tbody {
+                    @for (name, result) in rows {
+                        tr {
+                            td { (name) }
+                            td { (paddles(result)) }
+                            td { (length(result.max_orthogonal_error)) }
+                            td { (length(result.rms_orthogonal_error)) }
+                            td { (length(result.paddle_travel)) }
+                            td { (result.final_state.map_or_else(String::new, |mode| mode.to_string())) }
+                        }
+                    }
+                }
+            }
+            (panels(&[error_panel(run, case), enlarged_panel(run, case), paddle_panel(run, case)]))
+        }
+    }
+}
+
+fn paddles(result: &SpaceStrategyResult) -> String {
+    let names: Vec<String> = result.paddles.iter().map(u32::to_string).collect();
+    if names.is_empty() { "–".to_owned() } else { names.join(" + ") }
+}
+
+fn errors(result: &SpaceStrategyResult) -> Vec<(f64, f64)> {
+    result.series.iter().map(|point| (point.depth, point.orthogonal_error)).collect()
+}
+
+fn depth_axis(run: &SpaceRun) -> Axis {
+    Axis::linear("needle depth", &run.units[0]).range(0.0, run.depth)
+}
+
+/// Error of all strategies: the length of the target's way off the needle's line.
+fn error_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
+    let mut panel =
+        Panel::new("Off the needle's line", depth_axis(run), Axis::linear("orthogonal error", &run.units[0]));
+    panel.description = format!("Orthogonal error along the insertion, tissue {}", case.tissue.name());
+    for (name, colour, dash, result) in [
+        ("no paddle", Colour::Quiet, Dash::Dotted, &case.none),
+        ("fixture", Colour::Vermillion, Dash::Dashed, &case.fixture),
+        ("controlled", Colour::Blue, Dash::Solid, &case.dynamic),
+    ] {
+        panel.series.push(Series::curve(name, colour, dash, errors(result)));
+    }
+    panel
+}
+
+/// The controlled error alone, beside the sensor's noise.
+fn enlarged_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
+    let title = format!("Controlled alone: at most {}", number(case.dynamic.max_orthogonal_error, 2));
+    let mut panel = Panel::new(&title, depth_axis(run), Axis::linear("orthogonal error", &run.units[0]));
+    panel.description = format!("Orthogonal error of the controlled paddles, tissue {}", case.tissue.name());
+    if run.noise > 0.0 {
+        panel.lines.push(ReferenceLine::new("1 σ of the sensor's noise", Place::Y(run.noise), Dash::DashDot));
+    }
+    panel.series.push(Series::curve("controlled", Colour::Blue, Dash::Solid, errors(&case.dynamic)));
+    panel
+}
+
+/// How far the controlled paddles are displaced.
+fn paddle_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
+    let mut panel = Panel::new("Paddles", depth_axis(run), Axis::linear("displacement", &run.units[0]));
+    panel.description = "Length of the controlled paddles' displacements along the insertion".to_owned();
+    let looks = [(Colour::Blue, Dash::Solid), (Colour::Green, Dash::DashDot)];
+    for ((place, index), (colour, dash)) in case.dynamic.paddles.iter().enumerate().zip(looks) {
+        let norm = |p: &[f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let points =
+            case.dynamic.series.iter().filter_map(|point| Some((point.depth, norm(point.paddles.get(place)?))));
+        panel.series.push(Series::curve(&format!("paddle {index}"), colour, dash, points.collect()));
+    }
+    panel
+}

@@ -1,0 +1,209 @@
+//! Tables in space: one paddle or two that hold the target together.
+
+use super::{SPEED_MARGIN, TableBuildError, TableOptions, label};
+use crate::geometry::Implicit as _;
+use crate::model::space::{SpaceBody, SpaceModel};
+use crate::model::{ModelError, control_derivatives};
+use crate::placement::space::holding::{Hold, hold};
+use crate::solver::equilibrium::NewtonSettings;
+use firmware::contract::{
+    Gains, Header, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, SpatialTable, TableError, Units, Validity, decode, encode,
+};
+use firmware::loop_stability::default_gain;
+use firmware::scalar::ScalarKind;
+use nalgebra::{DMatrix, Matrix2xX, SMatrix, Vector3};
+
+/// A table of one paddle or of two.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SpaceTable {
+    /// One paddle.
+    One(Box<SpatialTable<f64, 1>>),
+    /// Two paddles.
+    Two(Box<SpatialTable<f64, 2>>),
+}
+
+impl SpaceTable {
+    /// Builds the table of the paddles of these indices, one or two. When the tissue loses stability on the way, the table ends at
+    /// the last knot reached.
+    ///
+    /// # Errors
+    /// [`TableBuildError`].
+    pub fn build(model: &SpaceModel, paddles: &[u32], options: &TableOptions) -> Result<Self, TableBuildError> {
+        match *paddles {
+            [one] => Ok(Self::One(Box::new(build(model, [one], options)?))),
+            [one, other] => Ok(Self::Two(Box::new(build(model, [one, other], options)?))),
+            _ => Err(TableBuildError::Paddles(paddles.len())),
+        }
+    }
+
+    /// Reads and checks a table file of either scalar type.
+    ///
+    /// # Errors
+    /// [`TableError`] says which check refused it.
+    pub fn read(bytes: &[u8]) -> Result<Self, TableError> {
+        let header = Header::read(bytes)?;
+        match (header.paddle_dof, header.scalar) {
+            (3, ScalarKind::F64) => Ok(Self::One(Box::new(decode::<f64, 3, 2, 1>(bytes)?))),
+            (3, ScalarKind::F32) => Ok(Self::One(Box::new(decode::<f32, 3, 2, 1>(bytes)?.cast()))),
+            (_, ScalarKind::F64) => Ok(Self::Two(Box::new(decode::<f64, 3, 2, 2>(bytes)?))),
+            (_, ScalarKind::F32) => Ok(Self::Two(Box::new(decode::<f32, 3, 2, 2>(bytes)?.cast()))),
+        }
+    }
+
+    /// Indices of its paddles.
+    pub fn paddles(&self) -> Vec<u32> {
+        match self {
+            Self::One(table) => table.paddles.iter().map(|p| p.index).collect(),
+            Self::Two(table) => table.paddles.iter().map(|p| p.index).collect(),
+        }
+    }
+
+    /// Where it holds.
+    pub fn validity(&self) -> &Validity<f64> {
+        match self {
+            Self::One(table) => &table.validity,
+            Self::Two(table) => &table.validity,
+        }
+    }
+
+    /// The bytes of a table file.
+    ///
+    /// # Errors
+    /// [`TableBuildError::Invalid`] when the table breaks one of its own rules.
+    pub fn to_bytes(&self) -> Result<Vec<u8>, TableBuildError> {
+        match self {
+            Self::One(table) => bytes_of(|buffer| encode(table, buffer)),
+            Self::Two(table) => bytes_of(|buffer| encode(table, buffer)),
+        }
+    }
+}
+
+fn bytes_of(encode: impl FnOnce(&mut [u8]) -> Result<usize, TableError>) -> Result<Vec<u8>, TableBuildError> {
+    let mut bytes = vec![0; MAX_TABLE_BYTES];
+    let length = encode(&mut bytes).map_err(TableBuildError::Invalid)?;
+    bytes.truncate(length);
+    Ok(bytes)
+}
+
+fn build<const P: usize>(
+    model: &SpaceModel,
+    indices: [u32; P],
+    options: &TableOptions,
+) -> Result<SpatialTable<f64, P>, TableBuildError> {
+    if !(2..=MAX_KNOTS).contains(&options.knots) {
+        return Err(TableBuildError::Knots(options.knots));
+    }
+    let scene = model.scene();
+    let mut attached = [0; P];
+    for (place, index) in attached.iter_mut().zip(indices) {
+        *place = scene.paddle_position(index).map_err(ModelError::from)?;
+    }
+    let knots = knots(model, attached, options.knots)?;
+    let lambda_max = options.lambda_max.max(mistaken(model, &attached, &knots[0])?);
+    let (first, last) = (&knots[0], &knots[knots.len() - 1]);
+    let table = SpatialTable {
+        scene_hash: scene.hash(),
+        units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
+        tissue: label(scene.tissue().name())?,
+        paddles: std::array::from_fn(|p| {
+            let (low, high) = scene.paddles[attached[p]].region.bounds().unwrap_or_default();
+            Paddle {
+                index: indices[p],
+                extent: [low, high],
+                max_displacement: scene.actuator.max_displacement,
+                max_rate: scene.actuator.max_rate,
+            }
+        }),
+        needle_axis: scene.needle.axis,
+        orthogonal: scene.needle.orthogonal(),
+        target_position: scene.target,
+        validity: Validity {
+            depth_start: first.depth,
+            depth_end: last.depth,
+            paddle_displacement: scene.actuator.max_displacement,
+            needle_speed: scene.actuator.max_needle_speed.max(SPEED_MARGIN * options.needle_speed),
+        },
+        gains: Gains {
+            loop_gain: default_gain(options.delay_samples, lambda_max),
+            delay_samples: options.delay_samples,
+            lambda_max,
+        },
+        knots,
+    };
+    table.validate().map_err(TableBuildError::Invalid)?;
+    Ok(table)
+}
+
+fn knots<const P: usize>(
+    model: &SpaceModel,
+    attached: [usize; P],
+    count: usize,
+) -> Result<heapless::Vec<Knot<f64, 3, P>, MAX_KNOTS>, TableBuildError> {
+    let scene = model.scene();
+    let settings = NewtonSettings::default();
+    let mut still = model.body(&attached, settings).map_err(ModelError::from)?;
+    let mut steered = still.clone();
+    let mut knots = heapless::Vec::new();
+    for k in 0..count {
+        let depth = scene.needle.depth * k as f64 / (count - 1) as f64;
+        match knot::<P>(&mut still, &mut steered, depth) {
+            Ok(knot) => {
+                let needed = knot.paddle_path.column_iter().map(|p| p.norm()).fold(0.0, f64::max);
+                let available = scene.actuator.max_displacement;
+                if needed > available {
+                    return Err(TableBuildError::OutOfReach { depth, needed, available });
+                }
+                // Capacity was checked before.
+                let _ = knots.push(knot);
+            }
+            Err(error) if knots.len() < 2 => return Err(error.into()),
+            Err(_) => break,
+        }
+    }
+    Ok(knots)
+}
+
+/// One knot: takes both bodies to the depth, the one with its paddles where they hold the target.
+fn knot<const P: usize>(
+    still: &mut SpaceBody<'_>,
+    steered: &mut SpaceBody<'_>,
+    depth: f64,
+) -> Result<Knot<f64, 3, P>, ModelError> {
+    still.drive(depth, &[Vector3::zeros(); P])?;
+    hold(steered, depth)?;
+    let held = Hold::of(steered)?;
+    let slope = held.way(steered);
+    Ok(Knot {
+        depth,
+        jacobian: std::array::from_fn(|p| held.jacobian.fixed_view::<3, 3>(0, 3 * p).into_owned()),
+        paddle_path: SMatrix::from_columns(&std::array::from_fn::<_, P, _>(|p| steered.paddles()[p])),
+        paddle_path_slope: SMatrix::from_column_slice(slope.as_slice()),
+        target_displacement: steered.target_displacement(),
+        target_displacement_slope: held.per_depth + &held.jacobian * &slope,
+        static_target_displacement: still.target_displacement(),
+    })
+}
+
+/// Largest |λ| of (NᵀJ)(NᵀĴ)⁺ where the scene's tissues, with its inclusions and without, are mistaken for each other, at rest.
+fn mistaken<const P: usize>(
+    model: &SpaceModel,
+    attached: &[usize; P],
+    own: &Knot<f64, 3, P>,
+) -> Result<f64, ModelError> {
+    if model.scene().inclusions.is_empty() {
+        return Ok(1.0);
+    }
+    let n = model.scene().needle.orthogonal();
+    let across = |jacobian: &DMatrix<f64>| n.transpose() * jacobian;
+    let own = across(&DMatrix::from_fn(3, 3 * P, |r, c| own.jacobian[c / 3][(r, c % 3)]));
+    let other = model.without_inclusions();
+    let mut body = other.body(attached, NewtonSettings::default())?;
+    let other = across(&control_derivatives::<3, _>(&mut body)?.slope.columns(1, 3 * P).into_owned());
+    let largest = |of: &Matrix2xX<f64>, taken_for: &Matrix2xX<f64>| {
+        let inverse = taken_for.clone().pseudo_inverse(f64::EPSILON).ok()?;
+        let eigenvalues = (of * inverse).complex_eigenvalues();
+        eigenvalues.iter().map(|l| l.norm()).reduce(f64::max)
+    };
+    let both = [largest(&own, &other), largest(&other, &own)];
+    Ok(both.into_iter().flatten().fold(1.0, f64::max))
+}
