@@ -1,7 +1,7 @@
 //! `model-offline check`: a scene's numbers, and what of it is seldom meant, without solving.
 
 use super::check_space;
-use super::common::{DiscretizationArgs, SceneArgs};
+use super::common::{DiscretizationArgs, SceneArgs, warned};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::number::{area, coordinate, in_unit, short};
@@ -68,14 +68,6 @@ fn text(scene: &Scene, facts: &SceneFacts, warnings: &[String]) -> String {
         out.push_str("no warnings\n");
     }
     out
-}
-
-/// Warnings, a line each.
-pub(super) fn warned(warnings: &[String]) -> String {
-    warnings.iter().fold(String::new(), |mut out, warning| {
-        let _ = writeln!(out, "warning: {warning}");
-        out
-    })
 }
 
 /// The facts in words.

@@ -1,6 +1,6 @@
 //! `model-offline check` of a scene in space: its numbers and its mesh, without solving.
 
-use super::check::warned;
+use super::common::warned;
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::discretization::Resolution;

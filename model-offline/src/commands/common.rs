@@ -9,6 +9,7 @@ use model_offline::output::terminal;
 use model_offline::parallel;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::scene::{Scene, limits};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// A scene file, with or without its inclusions.
@@ -174,4 +175,12 @@ impl RunArgs {
     pub(super) fn progress(&self, steps: u64) -> ProgressBar {
         if self.quiet { ProgressBar::hidden() } else { terminal::progress(steps) }
     }
+}
+
+/// Warnings, a line each.
+pub(super) fn warned(warnings: &[String]) -> String {
+    warnings.iter().fold(String::new(), |mut out, warning| {
+        let _ = writeln!(out, "warning: {warning}");
+        out
+    })
 }

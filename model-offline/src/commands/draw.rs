@@ -1,7 +1,7 @@
 //! `model-offline draw`: a scene, or a result, as a picture.
 
-use super::check::warned;
 use super::common::SceneArgs;
+use super::common::warned;
 use super::error::CliError;
 use model_offline::output::field_picture::{self, Field};
 use model_offline::output::result_file::{Which, read_body};

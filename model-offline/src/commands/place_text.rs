@@ -1,6 +1,6 @@
 //! A placement study as text: a row per paddle and one without, with the error of every number beside it.
 
-use super::check::warned;
+use super::common::warned;
 use model_offline::model::ModelError;
 use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};

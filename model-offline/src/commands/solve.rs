@@ -3,7 +3,7 @@
 use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
-use super::solve_space;
+use super::solve_space::{self, SpaceArgs};
 use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
@@ -12,6 +12,7 @@ use model_offline::output::vtu::{self, Shown};
 use model_offline::output::{Geometry, NodalFields, State, body, check_outputs, has_stress};
 use model_offline::placement::{controllability, discretise};
 use model_offline::scene::Scene;
+use model_offline::scene::space::SpaceScene;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 use std::path::{Path, PathBuf};
@@ -26,10 +27,10 @@ pub(super) struct SolveArgs {
     scene: SceneArgs,
     /// Index of the paddle that is attached [default: none]; in space once more for a second one
     #[arg(long)]
-    pub(super) paddle: Vec<u32>,
+    paddle: Vec<u32>,
     /// Needle depth, length units.
     #[arg(long)]
-    pub(super) depth: f64,
+    depth: f64,
     /// Paddle displacement, length units; in space three numbers, and once for every paddle, in their order.
     #[arg(
         long,
@@ -39,24 +40,24 @@ pub(super) struct SolveArgs {
         num_args = 1,
         allow_hyphen_values = true
     )]
-    pub(super) paddle_displacement: Option<Vec<f64>>,
+    paddle_displacement: Option<Vec<f64>>,
     /// Hold needle and paddle there for so many seconds: tissue that relaxes goes on.
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS")]
-    pub(super) dwell: f64,
+    dwell: f64,
     /// Write the result as JSON.
     #[arg(long, value_name = "FILE")]
-    pub(super) json: Option<PathBuf>,
+    json: Option<PathBuf>,
     /// Write displacement, strain and stress for ParaView; beside it needle, target and paddles (-parts.vtu) and a script that
     /// shows all of it (.py).
     #[arg(long, value_name = "FILE")]
-    pub(super) vtu: Option<PathBuf>,
+    vtu: Option<PathBuf>,
     /// Draw the deformed body.
     #[arg(long, value_name = "FILE")]
-    pub(super) svg: Option<PathBuf>,
+    svg: Option<PathBuf>,
     #[command(flatten)]
     discretization: DiscretizationArgs,
     #[command(flatten)]
-    pub(super) run: RunArgs,
+    run: RunArgs,
 }
 
 pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
@@ -67,7 +68,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
         let scene = args.discretization.over_space(scene)?;
         let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref())];
         check_outputs(&args.scene.files(&scene), &outputs)?;
-        return solve_space::run(&scene, args);
+        return in_space(&scene, args);
     }
     let scene = args.discretization.over(args.scene.read_still()?)?;
     let paddle = match args.paddle[..] {
@@ -109,6 +110,25 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg), parts, script];
     check_outputs(&[&args.scene.scene], &outputs)?;
     solve(&scene, Held { paddle, displacement }, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
+}
+
+/// The same of a scene in space, without the options of the plane.
+fn in_space(scene: &SpaceScene, args: &SolveArgs) -> Result<(), CliError> {
+    if args.dwell != 0.0 {
+        return Err(CliError::usage("--dwell is planar", "leave --dwell out: tissue does not relax in space"));
+    }
+    if args.svg.is_some() {
+        return Err(CliError::usage("--svg draws bodies in the plane", "write --vtu, and look at it in ParaView"));
+    }
+    let asked = SpaceArgs {
+        paddles: &args.paddle,
+        displacements: args.paddle_displacement.as_deref().unwrap_or_default(),
+        depth: args.depth,
+        json: args.json.as_deref(),
+        vtu: args.vtu.as_deref(),
+        quiet: args.run.quiet,
+    };
+    solve_space::run(scene, asked)
 }
 
 /// The paddle, and where it is.

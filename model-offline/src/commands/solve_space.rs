@@ -2,10 +2,9 @@
 
 use super::error::CliError;
 use super::json::write_json;
-use super::solve::SolveArgs;
 use model_offline::model::ModelError;
 use model_offline::model::space::{SpaceBody, SpaceModel};
-use model_offline::number::in_unit;
+use model_offline::number::{in_unit, short};
 use model_offline::output;
 use model_offline::output::vtu;
 use model_offline::placement::space::workflow;
@@ -13,37 +12,47 @@ use model_offline::scene::space::SpaceScene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::{Matrix3xX, Vector3};
 use serde_json::json;
+use std::path::Path;
+
+/// What is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SpaceArgs<'a> {
+    /// Indices of the paddles that are attached.
+    pub(super) paddles: &'a [u32],
+    /// Their displacements, three numbers each; none: where they are.
+    pub(super) displacements: &'a [f64],
+    /// Needle depth.
+    pub(super) depth: f64,
+    /// Where the result goes.
+    pub(super) json: Option<&'a Path>,
+    /// Where the body goes for ParaView.
+    pub(super) vtu: Option<&'a Path>,
+    /// No summary.
+    pub(super) quiet: bool,
+}
 
 /// A paddle by its place in the scene's list, and how far it is displaced.
 type Displaced = (usize, Vector3<f64>);
 
-pub(super) fn run(scene: &SpaceScene, args: &SolveArgs) -> Result<(), CliError> {
-    if args.dwell != 0.0 {
-        let help = "leave --dwell out: tissue does not relax in space";
-        return Err(CliError::usage("--dwell is planar", help));
-    }
-    if args.svg.is_some() {
-        return Err(CliError::usage("--svg draws bodies in the plane", "write --vtu, and look at it in ParaView"));
-    }
+pub(super) fn run(scene: &SpaceScene, args: SpaceArgs<'_>) -> Result<(), CliError> {
     let paddles = displaced(scene, args)?;
-    if !args.run.quiet {
+    if !args.quiet {
         scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
-    let json = args.json.as_deref();
-    solve(scene, &paddles, args).map_err(|error| error.reported_of(json, &scene.name, scene.tissue()))
+    solve(scene, &paddles, args).map_err(|error| error.reported_of(args.json, &scene.name, scene.tissue()))
 }
 
 /// The paddles that are named, with their displacements.
-fn displaced(scene: &SpaceScene, args: &SolveArgs) -> Result<Vec<Displaced>, CliError> {
-    let numbers = args.paddle_displacement.as_deref().unwrap_or_default();
-    if !numbers.is_empty() && numbers.len() != 3 * args.paddle.len() || !numbers.iter().all(|v| v.is_finite()) {
+fn displaced(scene: &SpaceScene, args: SpaceArgs<'_>) -> Result<Vec<Displaced>, CliError> {
+    let numbers = args.displacements;
+    if !numbers.is_empty() && numbers.len() != 3 * args.paddles.len() || !numbers.iter().all(|v| v.is_finite()) {
         return Err(CliError::usage(
             "--paddle-displacement takes three finite numbers in space, once for every --paddle",
             "e.g. --paddle 1 --paddle-displacement 0.01,0,-0.002 --paddle 4 --paddle-displacement 0,0,0",
         ));
     }
     let mut found: Vec<Displaced> = Vec::new();
-    for (i, index) in args.paddle.iter().enumerate() {
+    for (i, index) in args.paddles.iter().enumerate() {
         let place = scene.paddle_position(*index).map_err(ModelError::from)?;
         if found.iter().any(|(other, _)| *other == place) {
             let help = "name every paddle once";
@@ -54,7 +63,7 @@ fn displaced(scene: &SpaceScene, args: &SolveArgs) -> Result<Vec<Displaced>, Cli
     Ok(found)
 }
 
-fn solve(scene: &SpaceScene, paddles: &[Displaced], args: &SolveArgs) -> Result<(), CliError> {
+fn solve(scene: &SpaceScene, paddles: &[Displaced], args: SpaceArgs<'_>) -> Result<(), CliError> {
     let model = workflow::model(scene)?;
     let attached: Vec<usize> = paddles.iter().map(|(place, _)| *place).collect();
     let mut body = model.body(&attached, NewtonSettings::default()).map_err(ModelError::from)?;
@@ -68,13 +77,13 @@ fn solve(scene: &SpaceScene, paddles: &[Displaced], args: &SolveArgs) -> Result<
         }
     }
     write(&model, &mut body, paddles, args)?;
-    if !args.run.quiet {
+    if !args.quiet {
         print!("{}", text(&model, &body, paddles, args));
     }
     Ok(())
 }
 
-fn text(model: &SpaceModel, body: &SpaceBody<'_>, paddles: &[Displaced], args: &SolveArgs) -> String {
+fn text(model: &SpaceModel, body: &SpaceBody<'_>, paddles: &[Displaced], args: SpaceArgs<'_>) -> String {
     let scene = model.scene();
     let (target, axis) = (body.target_displacement(), scene.needle.axis);
     let at = |(place, u): &Displaced| format!("paddle {} at ({}, {}, {})", scene.paddles[*place].index, u.x, u.y, u.z);
@@ -94,7 +103,7 @@ fn text(model: &SpaceModel, body: &SpaceBody<'_>, paddles: &[Displaced], args: &
         target.y,
         target.z,
         (target - axis * axial).norm(),
-        body.contact_force(),
+        short(body.contact_force()),
     )
 }
 
@@ -103,7 +112,7 @@ fn write(
     model: &SpaceModel,
     body: &mut SpaceBody<'_>,
     paddles: &[Displaced],
-    args: &SolveArgs,
+    args: SpaceArgs<'_>,
 ) -> Result<(), CliError> {
     let scene = model.scene();
     let (target, axis) = (body.target_displacement(), scene.needle.axis);
@@ -133,8 +142,8 @@ fn write(
         "units": [&scene.length_unit, &scene.stress_unit],
         "failure": null,
     });
-    write_json(args.json.as_deref(), &document)?;
-    if let Some(file) = &args.vtu {
+    write_json(args.json, &document)?;
+    if let Some(file) = args.vtu {
         output::write_whole(file, vtu::vtu_in_space(model, coefficients).as_bytes())?;
     }
     Ok(())
