@@ -83,16 +83,22 @@ impl<T: Scalar, const D: usize, const P: usize> TableLocation<'_, T, D, P> {
     ) -> SMatrix<T, D, C> {
         let s = self.fraction;
         let (two, three) = (T::of(2.0), T::of(3.0));
-        // One component at a time: every operation on vectors would be a loop of its own in code compiled for size.
-        SMatrix::from_fn(|i, j| {
-            let at = (i, j);
-            let rise = right[at] - left[at];
-            let start = left_slope[at] * self.interval;
-            let end = right_slope[at] * self.interval;
+        // One component at a time: every operation on vectors would be a loop of its own in code compiled for size. No index,
+        // so that none can be out of bounds however the loops are compiled.
+        let mut path = *left;
+        let right = right.as_slice().iter().zip(right_slope.as_slice());
+        for ((path, left_slope), (right, right_slope)) in
+            path.as_mut_slice().iter_mut().zip(left_slope.as_slice()).zip(right)
+        {
+            let left = *path;
+            let rise = *right - left;
+            let start = *left_slope * self.interval;
+            let end = *right_slope * self.interval;
             let quadratic = rise * three - start * two - end;
             let cubic = start + end - rise * two;
-            left[at] + (start + (quadratic + cubic * s) * s) * s
-        })
+            *path = left + (start + (quadratic + cubic * s) * s) * s;
+        }
+        path
     }
 }
 

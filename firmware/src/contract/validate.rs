@@ -83,12 +83,13 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Table<T, D, N, P
             finite(Field::PaddleExtent, end.as_slice())?;
         }
         unit(Field::NeedleAxis, &self.needle_axis)?;
-        let mut others = self.orthogonal.column_iter();
+        // As arrays: copies of column views have a check of their own that no compiler proves.
+        let mut others = self.orthogonal.data.0.iter();
         while let Some(direction) = others.next() {
-            let direction = direction.into_owned();
+            let direction = SVector::from(*direction);
             unit(Field::OrthogonalDirection, &direction)?;
             let is_orthogonal = |other: &SVector<T, D>| other.dot(&direction).to_f64().abs() <= T::UNIT_TOLERANCE;
-            let among_each_other = others.clone().all(|other| is_orthogonal(&other.into_owned()));
+            let among_each_other = others.clone().all(|other| is_orthogonal(&SVector::from(*other)));
             ensure(is_orthogonal(&self.needle_axis) && among_each_other, TableError::NotOrthogonal)?;
         }
         Ok(())

@@ -17,6 +17,8 @@ mod reading;
 mod state;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+pub(crate) use tests::space::{insertion as space_insertion, table as space_table};
 
 use motion::Tick;
 pub use state::State;

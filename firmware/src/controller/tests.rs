@@ -16,7 +16,7 @@ mod attacks;
 mod bits;
 mod control;
 mod faults;
-mod space;
+pub(super) mod space;
 
 fn settings() -> Settings {
     Settings::new(MS, 20 * MS, 20 * MS)

@@ -31,10 +31,10 @@ impl<const D: usize, const N: usize, const P: usize> Tissue<D, N, P> {
         let across = self.orthogonal.transpose() * self.drag;
         let mut slope = SMatrix::<f64, D, P>::zeros();
         let mut moved = self.drag;
-        for place in 0..P {
-            let column = -(directions[place] * across);
+        for (place, (direction, jacobian)) in directions.iter().zip(&self.jacobians).enumerate() {
+            let column = -(direction * across);
             slope.set_column(place, &column);
-            moved += self.jacobians[place] * column;
+            moved += jacobian * column;
         }
         let knot = |i: u32| {
             let depth = DEPTH * f64::from(i) / 10.0;
@@ -99,6 +99,24 @@ fn pair() -> Tissue<3, 2, 2> {
     let Tissue { axis, orthogonal, jacobians: [first], drag, .. } = single();
     let second = Rotation3::from_axis_angle(&Vector3::y_axis(), 1.2).matrix() * first * 0.8;
     Tissue { axis, orthogonal, jacobians: [first, second], drag, limits: [0.05, 0.05] }
+}
+
+/// A table of two paddles in space, for the tests of other modules.
+pub(crate) fn table() -> SpatialTable<f64, 2> {
+    pair().table(Direction::MinimumNorm)
+}
+
+/// Inputs of a closed loop on it, and the commands that the controller gives by itself.
+pub(crate) fn insertion(ticks: usize) -> std::vec::Vec<(Inputs, PaddleCommand)> {
+    let (tissue, table) = (pair(), table());
+    let mut closed = Space::new(&table, &tissue, &settings());
+    (0..ticks)
+        .map(|_| {
+            let mut given = Inputs::default();
+            let command = closed.tick(|inputs| given = *inputs);
+            (given, command)
+        })
+        .collect()
 }
 
 /// Controller, tissue and paddles, with every command checked against the limits of each paddle.
@@ -508,7 +526,7 @@ fn both_paddles_are_adopted_where_they_are() {
 /// A plane looks at nothing that is out of it, and at no second paddle.
 #[test]
 fn the_plane_ignores_what_is_out_of_it() {
-    let table = table();
+    let table = crate::contract::example::table();
     let (mut plain, mut strange) = (Loop::new(&table, &settings()), Loop::new(&table, &settings()));
     for tick in 0..1500 {
         let one = plain.tick(|_| {});
@@ -556,7 +574,7 @@ fn space_has_its_own_default_direction() {
     let table = tissue.table(Direction::MinimumNorm);
     let controller = Controller::new(&table, &settings()).unwrap();
     assert_eq!(controller.runtime.direction, Direction::MinimumNorm);
-    let planar = super::table();
+    let planar = crate::contract::example::table();
     assert_eq!(Controller::new(&planar, &settings()).unwrap().runtime.direction, Direction::Inverse);
 }
 
@@ -618,6 +636,44 @@ fn spatial_tables_are_checked_paddle_by_paddle_and_direction_by_direction() {
         knot.jacobian[1] = Matrix3::from_diagonal(&Vector3::new(0.3, 0.0, 0.0));
     }
     table.validate().unwrap();
+}
+
+proptest! {
+    /// Whatever arrives: limits of both paddles (checked in every tick), accounts that balance, a mode that follows.
+    #[test]
+    fn any_inputs_keep_the_limits_of_both_paddles(
+        choices in prop::collection::vec((0..12u32, any::<u32>(), -0.1..0.1f64, -0.1..0.1f64), 1..400),
+        offset in prop::array::uniform3(-5e-3..5e-3f64),
+    ) {
+        let (tissue, table) = (pair(), table());
+        let mut closed = Space::new(&table, &tissue, &settings());
+        closed.run(60);
+        closed.offset = Vector3::from(offset);
+        for (choice, bits, a, b) in choices {
+            let command = closed.tick(|inputs| {
+                let place = (bits & 1) as usize;
+                match (choice, &mut inputs.paddles[place]) {
+                    (0, sample) => *sample = None,
+                    (1, Some(sample)) => sample.displacement = [a, b, a],
+                    (2, Some(sample)) => sample.sequence = bits,
+                    (3, Some(sample)) => sample.time_ns = sample.time_ns.wrapping_sub(u64::from(bits)),
+                    (4, _) => inputs.target = None,
+                    (5, _) => inputs.needle = None,
+                    (6, _) => inputs.target.iter_mut().for_each(|sample| sample.displacement = [a, b, a]),
+                    _ => {}
+                }
+            });
+            let faults = Faults::from_bits(command.faults);
+            let has = |codes: Faults| !faults.intersection(codes).is_empty();
+            let expected =
+                if has(Faults::LATCHING) { Mode::Safe } else if has(Faults::HOLDING) { Mode::Hold } else { Mode::Run };
+            prop_assert_eq!(Mode::from_wire(command.state), Some(expected));
+            if closed.state.mode() == Mode::Safe && bits % 16 == 0 {
+                closed.state.rearm();
+                closed.last = None;
+            }
+        }
+    }
 }
 
 fn jacobian_of(entries: [f64; 9]) -> Matrix3<f64> {

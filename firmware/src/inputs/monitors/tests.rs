@@ -371,3 +371,27 @@ fn a_paddle_follows_within_the_error_and_what_is_on_its_way() {
         close(off, 0.001 + 0.1 * (age + 0.002));
     }
 }
+
+/// In space the way of each paddle counts with its own Jacobian: along all three axes, at most 17 % more than its norm.
+#[test]
+fn the_gate_in_space_adds_up_what_both_paddles_do() {
+    let table = crate::controller::space_table();
+    let runtime = Runtime::<f64, 2>::new(&table, &settings()).unwrap();
+    for way in [[0.003, 0.001, 0.002], [0.0, 0.0, 0.004], [0.002, 0.002, 0.002], [0.001, 0.005, 0.0]] {
+        let norm = nalgebra::Vector3::from(way).norm();
+        let widened = |place: usize| {
+            let mut gate = InnovationGate::<3, 2>::default();
+            let width = |gate: &InnovationGate<3, 2>| {
+                threshold(1.0, |jump| gate.check(&runtime, &[0.0, 0.0, 1.0], &[0.0, jump, 1.0]).is_ok())
+            };
+            let still = width(&gate);
+            gate.travel.paddles[place] = way;
+            (width(&gate) - still) / (3.0 * runtime.paddles[place].jacobian_norm)
+        };
+        for place in 0..2 {
+            let farthest = widened(place);
+            assert!(farthest >= norm * (1.0 - 1e-6) && farthest <= 1.18 * norm, "{way:?}: {farthest} {norm}");
+        }
+    }
+    assert!(runtime.paddles[0].jacobian_norm != runtime.paddles[1].jacobian_norm, "nothing told them apart");
+}

@@ -51,7 +51,7 @@ impl Board for Bench {
     }
 }
 
-fn encoded<T: Scalar>(table: &Table<T, 2>) -> Vec<u8> {
+fn encoded<T: Scalar, const D: usize, const N: usize, const P: usize>(table: &Table<T, D, N, P>) -> Vec<u8> {
     let mut bytes = std::vec![0; MAX_TABLE_BYTES];
     let length = encode(table, &mut bytes).unwrap();
     bytes.truncate(length);
@@ -71,6 +71,12 @@ fn loading(table: &[u8], clock: ClockSource) -> Vec<Request<'_>> {
 
 /// What a device answers to these requests.
 fn answers<T: Scalar>(bench: &mut Bench, requests: &[Request<'_>]) -> Vec<Reply> {
+    say(bench, requests);
+    answers_of::<T>(bench)
+}
+
+/// Puts these requests on the line, after a Hello.
+fn say(bench: &mut Bench, requests: &[Request<'_>]) {
     let mut writer = FrameWriter::new();
     let begun = matches!(requests.first(), Some(Request::Hello { .. }));
     for request in [HELLO].iter().take(usize::from(!begun)).chain(requests) {
@@ -79,13 +85,19 @@ fn answers<T: Scalar>(bench: &mut Bench, requests: &[Request<'_>]) -> Vec<Reply>
         }
         bench.to_device.extend(writer.encode(request).unwrap());
     }
-    answers_of::<T>(bench)
 }
 
 /// What a device answers to what is on the line.
 fn answers_of<T: Scalar>(bench: &mut Bench) -> Vec<Reply> {
-    let mut memory = std::boxed::Box::new(Memory::<T>::new());
-    serve(bench, &mut memory, ResetCause::PowerOn);
+    answers_with(bench, &mut std::boxed::Box::new(Memory::<T>::new()))
+}
+
+/// The same of a device with this memory.
+fn answers_with<T: Scalar, const D: usize, const N: usize, const P: usize, const BYTES: usize>(
+    bench: &mut Bench,
+    memory: &mut Memory<T, D, N, P, BYTES>,
+) -> Vec<Reply> {
+    serve(bench, memory, ResetCause::PowerOn);
     let mut reader = FrameReader::new();
     let mut replies = Vec::new();
     for byte in &bench.from_device {
@@ -465,4 +477,40 @@ fn a_message_that_is_late_does_not_set_the_clock_back_and_drift_does() {
     bench.counter = 600_000;
     now.set(&mut bench, told + 600_500_000);
     assert_eq!(now.read(&mut bench), Some(told + 600_500_000));
+}
+
+/// Two paddles in space: every sample goes to its paddle's place, whatever comes first, and one of neither to the first.
+#[test]
+fn a_device_in_space_moves_two_paddles() {
+    let bytes = encoded(&crate::controller::space_table());
+    let expected = crate::controller::space_insertion(300);
+    let mut requests = loading(&bytes, ClockSource::Frames);
+    for (tick, (inputs, _)) in expected.iter().enumerate() {
+        let mut swapped = *inputs;
+        if tick % 2 == 1 {
+            swapped.paddles.reverse();
+        }
+        requests.extend(requests_of(&swapped));
+    }
+    let mut bench = Bench::default();
+    say(&mut bench, &requests);
+    let mut memory = std::boxed::Box::new(Memory::<f64, 3, 2, 2, SPATIAL_TABLE_BYTES>::new());
+    let replies = answers_with(&mut bench, &mut memory);
+    let commands: Vec<_> = replies
+        .iter()
+        .filter_map(|reply| match reply {
+            Reply::Command { command, .. } => Some(*command),
+            _ => None,
+        })
+        .collect();
+    assert!(commands.iter().eq(expected.iter().map(|(_, command)| command)));
+    assert_eq!(commands.last().map(|command| command.state), Some(Mode::Run as u32));
+    let Some(Reply::Hello(identity)) = replies.first() else { panic!("no Hello") };
+    assert_eq!((identity.dimension, identity.paddles), (3, 2));
+    // The table of a plane is refused there.
+    let planar = encoded(&table());
+    let mut bench = Bench::default();
+    say(&mut bench, &loading(&planar, ClockSource::Frames));
+    let refused = Refusal::Table { code: crate::contract::TableError::Dimension { found: 2, expected: 3 }.code() };
+    assert_eq!(answers_with(&mut bench, &mut memory).last(), Some(&Reply::Refused(refused)));
 }
