@@ -85,7 +85,7 @@ impl<'m> SpaceTissue<'m> {
         let failed = |source| WorldError::Tissue { depth, source };
         let mut full = match self.full.take() {
             Some(full) => full,
-            None => Box::new(self.model.body(&self.attached, NewtonSettings::SMALL_STEPS).map_err(failed)?),
+            None => Box::new(self.model.body(&self.attached, NewtonSettings::default()).map_err(failed)?),
         };
         full.drive(depth, paddles).map_err(failed)?;
         let target = full.target_displacement();

@@ -263,8 +263,10 @@ impl Tabulated {
                     break d;
                 }
             };
+            // As often near the way, where insertions are, as far from it.
+            let size = *room * random.unit();
             let mut paddle = at.rows_mut(1 + 3 * p, 3);
-            paddle += direction * *room;
+            paddle += direction * size;
         }
         at
     }

@@ -46,8 +46,11 @@ pub const BUNDLED: [(&str, &str); 7] = [
 ];
 
 /// The bundled scenes in space: name and text.
-pub const BUNDLED_IN_SPACE: [(&str, &str); 2] =
-    [("block", include_str!("../../scenes/block.toml")), ("mound", include_str!("../../scenes/mound.toml"))];
+pub const BUNDLED_IN_SPACE: [(&str, &str); 3] = [
+    ("block", include_str!("../../scenes/block.toml")),
+    ("mound", include_str!("../../scenes/mound.toml")),
+    ("scan", include_str!("../../scenes/scan.toml")),
+];
 
 /// All bundled scenes.
 fn all_bundled() -> impl Iterator<Item = &'static (&'static str, &'static str)> {

@@ -13,7 +13,7 @@ mod transform;
 pub use body::LabelBody;
 pub use error::LabelError;
 #[cfg(test)]
-pub(crate) use synthetic::synthetic_breast;
+pub(crate) use synthetic::{synthetic_breast, synthetic_scan};
 
 use crate::geometry::point::Point;
 use nalgebra::{Matrix3, Matrix4};

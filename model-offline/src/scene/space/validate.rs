@@ -1,6 +1,7 @@
 //! From the file's text to a [`SpaceScene`]: every rule that a scene in space must obey, each with its own message.
 
 use super::bodies::Bodies;
+use super::import;
 use super::schema::{DiscretizationSection, InclusionSection, PairsOf, SolidSection, SpaceSceneFile};
 use super::{SpaceInclusion, SpaceNeedle, SpacePaddle, SpaceScene};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
@@ -41,7 +42,7 @@ fn content(text: &str, files: &[PathBuf]) -> [u8; 32] {
     let mut hash = Sha256::new().chain_update(canonical);
     for file in files {
         // A file that has just been read: should it be gone, the scene's text still tells it apart.
-        hash.update(std::fs::read(file).unwrap_or_default());
+        hash.update(import::bytes(file).unwrap_or_default());
     }
     hash.finalize().into()
 }

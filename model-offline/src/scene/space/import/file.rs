@@ -6,6 +6,21 @@ use crate::geometry::labels::Labels;
 use crate::geometry::surface::TriangleSurface;
 use std::path::Path;
 
+/// Files that bundled scenes name.
+const BUNDLED: [(&str, &[u8]); 1] = [("scan.nii.gz", include_bytes!("../../../../scenes/scan.nii.gz"))];
+
+/// What a file holds: a bundled one where there is none of its name.
+///
+/// # Errors
+/// [`FileError::Io`].
+pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
+    let found = BUNDLED.iter().find(|(name, _)| Path::new(name) == path && !path.exists());
+    found.map_or_else(
+        || std::fs::read(path).map_err(|source| FileError::Io { path: path.into(), source }),
+        |(_, bytes)| Ok(bytes.to_vec()),
+    )
+}
+
 fn read<T>(
     path: &Path,
     wanted: &'static str,
@@ -14,7 +29,7 @@ fn read<T>(
 ) -> Result<T, FileError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
     let reader = reader(&name).ok_or_else(|| FileError::Ending { path: path.into(), wanted, endings })?;
-    let bytes = std::fs::read(path).map_err(|source| FileError::Io { path: path.into(), source })?;
+    let bytes = bytes(path)?;
     reader(&bytes).map_err(|source| FileError::Read { path: path.into(), source })
 }
 

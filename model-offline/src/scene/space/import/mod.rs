@@ -16,7 +16,7 @@ mod voxels;
 mod words;
 
 pub use error::{FileError, Noted, Place, ReadError};
-pub use file::{labels, surface};
+pub use file::{bytes, labels, surface};
 pub use nifti::write_nifti;
 
 #[cfg(test)]

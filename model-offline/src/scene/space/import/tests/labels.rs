@@ -1,6 +1,6 @@
 use super::super::{nifti, nrrd, write_nifti};
 use super::made;
-use crate::geometry::labels::{LabelBody, LabelError, Labels, synthetic_breast};
+use crate::geometry::labels::{LabelBody, LabelError, Labels, synthetic_breast, synthetic_scan};
 use crate::geometry::{Implicit as _, Point};
 use nalgebra::{Matrix3, Matrix4, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
@@ -84,6 +84,17 @@ fn fields_of_a_header_are_heeded() {
     assert!(told("encoding: ascii", "encoding: ascii\ndata file: a.raw").contains("a.raw"));
     assert!(told("left-posterior-superior", "here").contains("line"));
     assert!(told("dimension: 3", "dimension: 4").contains("4 axes"));
+}
+
+/// With `STILLPOINT_WRITE_SCAN` set it is written again.
+#[test]
+fn the_bundled_scan_is_the_made_up_one() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/scan.nii.gz");
+    let made = write_nifti(&synthetic_scan()).unwrap();
+    if std::env::var_os("STILLPOINT_WRITE_SCAN").is_some() {
+        std::fs::write(&path, &made).unwrap();
+    }
+    assert_eq!(std::fs::read(&path).unwrap(), made);
 }
 
 #[test]
