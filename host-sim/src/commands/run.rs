@@ -22,6 +22,7 @@ use model_offline::scene::TableScalar;
 use model_offline::scene::TissueVariant;
 
 use super::outputs::check_json_beside_report;
+use super::run_space::SpaceJob;
 use super::world_args::WorldArgs;
 
 /// Options of `run`.
@@ -105,6 +106,30 @@ impl std::fmt::Display for TableWorld {
 }
 
 impl RunArgs {
+    /// What of it is for a body in space.
+    fn in_space(&self) -> SpaceJob<'_> {
+        let given = [
+            (self.table.is_some(), "--table"),
+            (self.mode == Some(RunMode::FreeRun), "--mode free-run"),
+            (self.hardware != Hardware::Native, "--controller qemu"),
+            (self.scalar != TableScalar::F64, "--scalar f32"),
+            (self.view, "--view"),
+            (self.mcap, "--mcap"),
+            (self.vtu, "--vtu"),
+            (self.causes, "--causes"),
+        ];
+        SpaceJob {
+            world: &self.world,
+            tissue: self.tissue,
+            table_tissue: self.table_tissue,
+            out: &self.out,
+            json: self.json.as_deref(),
+            quiet: self.quiet,
+            threads: self.threads,
+            refused: given.iter().find(|(given, _)| *given).map(|(_, option)| *option),
+        }
+    }
+
     fn options(&self) -> Result<ComparisonOptions, SimError> {
         let mut options = ComparisonOptions::new(std::env::current_exe().map_err(RuntimeError::Spawn)?);
         options.tissue = self.tissue;
@@ -130,7 +155,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     signals::install();
     super::sweep();
     if let Some(scene) = args.world.scene_in_space()? {
-        return super::run_space::run(args, &scene);
+        return super::run_space::run(&args.in_space(), &scene);
     }
     let scene = args.world.scene()?;
     let simulation = args.world.simulation(&scene)?;
