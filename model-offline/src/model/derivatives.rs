@@ -126,7 +126,6 @@ impl Body<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::model::TissueModel;
     use crate::scene::Scene;
     use crate::solver::equilibrium::NewtonSettings;
