@@ -347,7 +347,8 @@ impl Insertion<'_> {
             max_orthogonal_error: worst.map_or(0.0, error),
             max_error_depth: worst.map_or(0.0, |truth| truth.depth),
             rms_orthogonal_error: (squares / truths.len().max(1) as f64).sqrt(),
-            paddle_travel: truths.windows(2).map(way).sum(),
+            // The sum of nothing is −0.
+            paddle_travel: truths.windows(2).map(way).sum::<f64>() + 0.0,
             final_state: None,
             run_share: None,
             faults: Faults::NONE,
