@@ -415,6 +415,37 @@ fn what_a_saturated_paddle_cannot_give_the_other_gives() {
     }
 }
 
+/// What integral feedback asks of a saturated paddle goes to the other in the same sample, so that the loop is as fast as
+/// with both: the second paddle's share is four fifths, and without it the error would stay five times as long.
+#[test]
+fn a_correction_that_one_paddle_cannot_give_goes_to_the_other_at_once() {
+    const J: f64 = 0.2;
+    const L: f64 = 0.05;
+    let Tissue { axis, orthogonal, .. } = single();
+    let jacobians = [Matrix3::identity() * J, Matrix3::identity() * (2.0 * J)];
+    let tissue = Tissue { axis, orthogonal, jacobians, drag: Vector3::new(1e-3, 0.0, 0.0), limits: [L; 2] };
+    for direction in [Direction::MinimumNorm, Direction::Inverse] {
+        let table = tissue.table(direction);
+        let chosen = Settings { feedback: Feedback::Integral, direction: Some(direction), ..settings() };
+        // From 2.5·j·L on, the second paddle is at its limit. A small step then, which no rate limit sees.
+        let left = [2.0, 2.7].map(|asked| {
+            let mut closed = Space::new(&table, &tissue, &chosen);
+            closed.speed = 0.0;
+            for tick in 0..8000 {
+                closed.offset.z = -asked * J * L * (f64::from(tick) / 5000.0).min(1.0);
+                closed.tick(|_| {});
+            }
+            let saturated = closed.paddles[1].norm() > L * (1.0 - 1e-9);
+            assert_eq!(saturated, asked > 2.5, "{direction:?} {asked}");
+            let step = 1e-3 * J * L;
+            closed.offset.z -= step;
+            closed.run(200).error() / step
+        });
+        let [free, saturated] = left;
+        assert!(free < 0.2 && (saturated - free).abs() < 0.05, "{direction:?}: {free} {saturated}");
+    }
+}
+
 /// Where both are at their limits, nobody is asked any more: no commands beyond, and no verdict on the sign of the plant.
 #[test]
 fn when_both_saturate_what_is_left_is_left() {
