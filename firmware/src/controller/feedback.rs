@@ -153,10 +153,13 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'_, T
     /// What displacements of the paddles, a column each, do to the target orthogonally to the needle: Nᵀ·Σ Jₚ·uₚ.
     #[inline(always)]
     fn effect(&self, jacobians: &[SMatrix<T, D, D>; P], displacements: &SMatrix<T, D, P>) -> [T; N] {
-        let mut terms =
-            jacobians.iter().zip(columns(displacements)).map(|(jacobian, column)| jacobian * SVector::from(*column));
-        let first = terms.next().unwrap_or_else(SVector::zeros);
-        self.across(&terms.fold(first, |sum, term| sum + term))
+        // A loop, not a fold: compiled for size, that is a call even for a single paddle.
+        let mut moved = None;
+        for (jacobian, column) in jacobians.iter().zip(columns(displacements)) {
+            let term = jacobian * SVector::from(*column);
+            moved = Some(moved.map_or(term, |sum: SVector<T, D>| sum + term));
+        }
+        self.across(&moved.unwrap_or_else(SVector::zeros))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The control law, one tick at a time.
 
-use crate::contract::frames::{COMMAND_VALID, MAX_PADDLES};
+use crate::contract::frames::{COMMAND_VALID, MAX_DIMENSION, MAX_PADDLES};
 use crate::contract::{Faults, Mode, PaddleCommand, Table};
 use crate::inputs::Inputs;
 use crate::scalar::Scalar;
@@ -132,7 +132,7 @@ impl<'t, T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'
             tick: inputs.tick,
             time_ns: inputs.time_ns,
             faults: state.faults.bits(),
-            displacement: displacement.as_ref().map(to_frame).unwrap_or_default(),
+            displacement: displacement.as_ref().map_or([[0.0; MAX_DIMENSION]; MAX_PADDLES], to_frame),
             needle_sequence: state.needle.accepted.map(|sample| sample.sequence).unwrap_or_default(),
             target_sequence: state.target.accepted.map(|sample| sample.sequence).unwrap_or_default(),
             paddle_index,

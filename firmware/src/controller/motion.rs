@@ -4,7 +4,7 @@ use nalgebra::{SMatrix, SVector};
 
 use super::feedback::Setting;
 use super::history::{INTERVALS, Moment};
-use super::state::{Underway, columns, to_frame};
+use super::state::{Underway, columns};
 use super::{Controller, State};
 use crate::contract::Faults;
 use crate::inputs::sample::Measurement;
@@ -67,7 +67,7 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Controller<'_, T
             let diverges = state.divergence.update(runtime, correction.error, correction.size, needle.values[1]);
             faults.set_if(Faults::DIVERGENCE, diverges);
         }
-        if !to_frame(&next).as_flattened().iter().all(|component| component.is_finite()) {
+        if !next.as_slice().iter().all(|component| component.to_f64().is_finite()) {
             *faults |= Faults::INTERNAL;
             return;
         }

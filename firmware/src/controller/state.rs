@@ -65,6 +65,7 @@ impl<T: Scalar, const D: usize> PaddleState<T, D> {
 }
 
 impl<T: Scalar, const D: usize, const N: usize, const P: usize> Default for State<T, D, N, P> {
+    #[inline(never)] // Written where it is to be, not put together on the way.
     fn default() -> Self {
         Self {
             supervisor: Supervisor::default(),
@@ -141,12 +142,45 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> State<T, D, N, P
         if self.mode != Mode::Safe {
             return;
         }
-        *self = Self {
-            ledger: self.ledger,
-            clock: self.clock.rearmed(),
-            command_sequence: self.command_sequence,
-            ..Self::default()
-        };
+        let Self {
+            supervisor,
+            mode,
+            faults,
+            ledger: _,
+            clock,
+            command_sequence: _,
+            armed,
+            added,
+            estimate,
+            history,
+            underway,
+            needle,
+            target,
+            target_lost,
+            needle_monitor,
+            target_frozen,
+            target_resolution,
+            gate,
+            divergence,
+            paddles,
+        } = self;
+        *clock = clock.rearmed();
+        // Piece by piece: a whole new state would be on the stack until it is moved here.
+        *supervisor = Supervisor::default();
+        (*mode, *faults, *armed) = (Mode::default(), Faults::NONE, false);
+        (*added, *estimate, *underway) = (None, None, None);
+        *history = History::default();
+        *needle = StreamGate::default();
+        *target = StreamGate::default();
+        *target_lost = false;
+        *needle_monitor = NeedleMonitor::default();
+        *target_frozen = FrozenMonitor::default();
+        *target_resolution = SensorStep::default();
+        *gate = InnovationGate::default();
+        *divergence = DivergenceMonitor::default();
+        for paddle in paddles {
+            *paddle = PaddleState::default();
+        }
     }
 }
 
@@ -192,13 +226,12 @@ impl<T: Scalar, const D: usize, const P: usize> Underway<T, D, P> {
 pub(super) fn to_frame<T: Scalar, const D: usize, const P: usize>(
     displacements: &SMatrix<T, D, P>,
 ) -> [[f64; MAX_DIMENSION]; MAX_PADDLES] {
-    let mut frame = [[0.0; MAX_DIMENSION]; MAX_PADDLES];
-    for (components, column) in frame.iter_mut().zip(columns(displacements)) {
-        for (component, value) in components.iter_mut().zip(column) {
-            *component = value.to_f64();
-        }
-    }
-    frame
+    let component = |paddle: usize, axis: usize| {
+        columns(displacements).get(paddle).and_then(|column| column.get(axis)).map_or(0.0, |value| value.to_f64())
+    };
+    // Written out, so that every place is known when this is compiled: clearing all of them before filling some takes longer.
+    let paddle = |paddle: usize| [component(paddle, 0), component(paddle, 1), component(paddle, 2)];
+    [paddle(0), paddle(1)]
 }
 
 /// A vector as measurements have it.

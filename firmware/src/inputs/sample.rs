@@ -51,7 +51,9 @@ pub(crate) fn are_within<const V: usize>(a: &[f64; V], b: &[f64; V], distance: f
 /// Square of the distance of two points.
 #[inline(always)]
 pub(crate) fn squared_distance<const V: usize>(a: &[f64; V], b: &[f64; V]) -> f64 {
-    let mut squares = a.iter().zip(b).map(|(a, b)| (a - b) * (a - b));
-    let first = squares.next().unwrap_or_default();
-    squares.fold(first, |sum, square| sum + square)
+    let mut sum = 0.0;
+    for (a, b) in a.iter().zip(b) {
+        sum += (a - b) * (a - b);
+    }
+    sum
 }

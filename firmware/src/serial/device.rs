@@ -4,6 +4,8 @@
 //! served once per pass, so that a step that never returns is noticed, and a silent host is not: silence is the
 //! controller's own business (ages of samples, HOLD, SAFE).
 
+use heapless::Vec;
+
 use super::frame::{Frame, FrameReader, FrameWriter};
 use super::message::{Account, ClockSource, Identity, PROTOCOL_VERSION, Refusal, Reply, Request, ResetCause};
 use crate::contract::codec::FORMAT_VERSION;
@@ -66,6 +68,9 @@ pub struct Memory<
     encoded: [u8; BYTES],
     filled: usize,
     line: Line,
+    /// Of the last run. Here and not on the stack, which it would nearly double. A list, empty before the first run: that is
+    /// all zeros, so that a `static` takes no flash; an `Option` is not.
+    state: Vec<State<T, D, N, P>, 1>,
 }
 
 #[derive(Debug)]
@@ -78,7 +83,7 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize, const BYTES: usi
     /// Memory of a device that starts.
     pub const fn new() -> Self {
         let line = Line { reader: FrameReader::new(), writer: FrameWriter::new() };
-        Self { table: Table::empty(), encoded: [0; BYTES], filled: 0, line }
+        Self { table: Table::empty(), encoded: [0; BYTES], filled: 0, line, state: Vec::new() }
     }
 
     /// The frame of a SAFE command that moves nothing, for an exception to send before it resets the device: it has
@@ -105,7 +110,7 @@ pub fn serve<T: Scalar, const D: usize, const N: usize, const P: usize, const BY
     memory: &mut Memory<T, D, N, P, BYTES>,
     reset: ResetCause,
 ) {
-    let Memory { table, encoded, filled, line } = memory;
+    let Memory { table, encoded, filled, line, state } = memory;
     line.writer.restart();
     let identity = Identity {
         protocol: PROTOCOL_VERSION,
@@ -134,7 +139,7 @@ pub fn serve<T: Scalar, const D: usize, const N: usize, const P: usize, const BY
             },
             Some(Request::Begin { settings, clock }) => {
                 let begun = check_table(encoded.get(..*filled).unwrap_or_default(), table)
-                    .and_then(|()| run(board, line, table, &Start { settings, clock, session }));
+                    .and_then(|()| run(board, line, table, afresh(state)?, &Start { settings, clock, session }));
                 session = session.checked_add(1).unwrap_or(1);
                 match begun {
                     Ok(()) if board.is_closed() => {}
@@ -188,21 +193,32 @@ fn build<'t, T: Scalar, const D: usize, const N: usize, const P: usize>(
     Controller::new(table, settings).map_err(|_| Refusal::Settings)
 }
 
+/// The state before the first tick, in its place.
+#[inline(never)]
+fn afresh<T: Scalar, const D: usize, const N: usize, const P: usize>(
+    state: &mut Vec<State<T, D, N, P>, 1>,
+) -> Result<&mut State<T, D, N, P>, Refusal> {
+    state.clear();
+    // Neither can fail: the list is empty before, and is not afterwards.
+    state.push(State::new()).map_err(|_| Refusal::Order)?;
+    state.last_mut().ok_or(Refusal::Order)
+}
+
 /// Builds the controller and runs it until the host says Hello.
 #[inline(never)]
 fn run<T: Scalar, const D: usize, const N: usize, const P: usize, B: Board>(
     board: &mut B,
     line: &mut Line,
     table: &Table<T, D, N, P>,
+    state: &mut State<T, D, N, P>,
     start: &Start,
 ) -> Result<(), Refusal> {
     let controller = build(table, &start.settings)?;
     let period_ns = start.settings.loop_period_ns;
-    let mut state = State::new();
     line.send_ready(board);
     Run {
         controller: &controller,
-        state: &mut state,
+        state,
         inbox: Inputs::default(),
         paddles: table.paddles.each_ref().map(|paddle| paddle.index),
         clock: start.clock,
@@ -289,9 +305,9 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Run<'_, T, D, N,
         }
     }
 
-    /// A sample goes to the place of its paddle. One of another paddle goes to the first: the controller refuses it there.
+    /// A sample goes to the place of its paddle. One of another paddle goes to the last: the controller refuses it there.
     fn keep_paddle(&mut self, sample: PaddleSample) {
-        let place = self.paddles.iter().position(|index| *index == sample.paddle_index).unwrap_or_default();
+        let place = self.paddles.iter().position(|index| *index == sample.paddle_index).unwrap_or(P.saturating_sub(1));
         if let Some(kept) = self.inbox.paddles.get_mut(place) {
             keep_newest(kept, sample, |s| s.sequence);
         }
@@ -300,9 +316,11 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Run<'_, T, D, N,
     /// One tick.
     #[inline(never)]
     fn step<B: Board>(&mut self, board: &mut B, line: &mut Line, tick: u64, time_ns: u64) {
-        let inputs = Inputs { tick, time_ns, ..core::mem::take(&mut self.inbox) };
-        let (command, counts) = timed_step(board, self.controller, self.state, &inputs);
-        line.send(board, &BorrowedReply::Command { command, counts });
+        // Read where they are: a copy would be on the stack below the deepest step.
+        (self.inbox.tick, self.inbox.time_ns) = (tick, time_ns);
+        let reply = timed_step(board, self.controller, self.state, &self.inbox);
+        self.inbox = Inputs::default();
+        line.send(board, &reply);
     }
 
     /// The host's clock shows `time_ns` now. The first time, the next release is one period ahead.
@@ -326,7 +344,7 @@ impl<T: Scalar, const D: usize, const N: usize, const P: usize> Run<'_, T, D, N,
     }
 }
 
-/// `Controller::step` and the counts that it took. Not inlined, and with its arguments and result opaque, so that
+/// `Controller::step` and the counts that it took, as the reply to send. Not inlined, and with its arguments and result opaque, so that
 /// nothing of the step is moved out of the count and nothing else into it.
 #[inline(never)]
 fn timed_step<T: Scalar, const D: usize, const N: usize, const P: usize, B: Board>(
@@ -334,13 +352,13 @@ fn timed_step<T: Scalar, const D: usize, const N: usize, const P: usize, B: Boar
     controller: &Controller<'_, T, D, N, P>,
     state: &mut State<T, D, N, P>,
     inputs: &Inputs,
-) -> (PaddleCommand, u32) {
+) -> BorrowedReply<'static> {
     use core::hint::black_box;
     let before = board.counter();
     let command = black_box(controller).step(black_box(&mut *state), black_box(inputs));
     black_box((&command, state));
     let counts = board.counter().wrapping_sub(before) & COUNTER_MASK;
-    (command, counts)
+    BorrowedReply::Command { command, counts }
 }
 
 /// Keeps the newer of two samples; sequence numbers wrap.
