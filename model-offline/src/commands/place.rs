@@ -39,8 +39,8 @@ pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
         check_outputs(&args.scene.files(&scene), &outputs)?;
         if args.table.is_some() {
             return Err(CliError::usage(
-                "--table: tables of paddles in space are not written yet",
-                "leave --table out: the study has the Jacobians (--json)",
+                "--table: in space a table is made of another model than the study, by a command of its own",
+                "leave --table out, and use `model-offline table SCENE -o FILE`",
             ));
         }
         return place_space::run(&scene, args.json.as_deref(), &args.run);
