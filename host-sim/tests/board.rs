@@ -321,7 +321,7 @@ fn two_paddles_in_space_stay_within_their_budget() {
     let figures = measure::measure(&image, &space::scenarios()).unwrap();
     let run = figures.instructions[&measure::Branch::Run];
     assert!(run.median <= 6000 && run.max <= 12_000, "{run:?}");
-    assert!(figures.flash <= 40 * 1024 && figures.stack <= 6 * 1024, "{figures:?}");
+    assert!(figures.flash <= 47 * 1024 && figures.stack <= 6 * 1024, "{figures:?}");
     for branch in ["hold", "run", "safe", "saturated", "table-edge"] {
         assert!(figures.instructions.keys().any(|found| found.to_string() == branch), "no step took {branch}");
     }
