@@ -72,6 +72,9 @@ fn the_same_seed_gives_the_same_bytes_and_replays() {
     assert_eq!(replayed.status.code(), Some(2), "cut off");
 }
 
+/// A record of a recording and its hash, as the format has them.
+const RECORD_BYTES: usize = 384 + 32;
+
 /// A recording that is damaged is refused, and says how its first part can be had; that part replays and is exported.
 #[test]
 fn a_damaged_recording_is_salvaged_up_to_the_damage() {
@@ -84,13 +87,13 @@ fn a_damaged_recording_is_salvaged_up_to_the_damage() {
     let ledger = read_run(&out).unwrap().cases[0].strategies.dynamic.as_ref().unwrap().ledger.clone().unwrap();
     let ticks = usize::try_from(ledger.ticks.due).unwrap();
     let mut altered = whole.clone();
-    let place = altered.len() - 101 * 288 + 40;
+    let place = altered.len() - 101 * RECORD_BYTES + 40;
     altered[place] ^= 1;
     let salvaged = |arguments: &[&str]| host_sim().args(arguments).arg(&recording).output().unwrap();
     let csv_of = csv.to_str().unwrap();
     for (bytes, kept, damage) in [
         (&whole[..whole.len() - 1], ticks, "without an end mark"),
-        (&whole[..whole.len() - 50 * 288 - 7], ticks - 50, "without an end mark"),
+        (&whole[..whole.len() - 50 * RECORD_BYTES - 7], ticks - 50, "without an end mark"),
         (&altered[..], ticks - 100, "the chain breaks at record"),
     ] {
         std::fs::write(&recording, bytes).unwrap();
@@ -109,7 +112,7 @@ fn a_damaged_recording_is_salvaged_up_to_the_damage() {
         std::fs::remove_file(&csv).unwrap();
     }
     // Without a single whole record there is nothing to salvage.
-    std::fs::write(&recording, &whole[..whole.len() - (ticks + 1) * 288]).unwrap();
+    std::fs::write(&recording, &whole[..whole.len() - (ticks + 1) * RECORD_BYTES]).unwrap();
     assert_eq!(salvaged(&["replay", "--salvage"]).status.code(), Some(2));
     // Salvage of a whole one is a replay like any other.
     std::fs::write(&recording, &whole).unwrap();

@@ -26,7 +26,7 @@ const PADDLE_LAG: OptionRange = OptionRange::new("--paddle-lag", 0.0, 6e4, " ms"
 const PADDLE_DELAY: OptionRange = OptionRange::new("--paddle-delay", 0.0, 1e5, " ticks");
 const PADDLE_GAIN: OptionRange = OptionRange::new("--paddle-gain", 0.0, 100.0, "");
 
-/// Ticks of one insertion at most: every one is recorded and kept until the report is written, 300 bytes each.
+/// Ticks of one insertion at most: every one is recorded and kept until the report is written, about 400 bytes each.
 const MOST_TICKS: f64 = 1e7;
 
 /// Options of the simulated world.
