@@ -40,7 +40,7 @@
 //! assert_eq!((optimum.static_paddle, optimum.dynamic_paddle), (4, Some(3))); // the paper's optima
 //!
 //! let table = table::build(&study.model, 3, &Default::default())?;
-//! assert_eq!(table.paddle.index, 3);
+//! assert_eq!(table.paddles[0].index, 3);
 //! # Ok::<(), table::TableBuildError>(())
 //! ```
 

@@ -275,6 +275,11 @@
 #define STILLPOINT_FAULT_TICKS_SKIPPED 34359738368
 
 /**
+ * What another code of this step says of a paddle, it says of the second one, at least. Never set in the plane.
+ */
+#define STILLPOINT_FAULT_SECOND_PADDLE 68719476736
+
+/**
  * What became of a call. 0 is success; `stillpoint_status_text` says what to do about the others. Numbers are never
  * reused.
  */

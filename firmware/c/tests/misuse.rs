@@ -148,7 +148,7 @@ fn damaged_tables_are_refused_by_what_is_wrong_with_them() {
     };
     for (bytes, status, says) in [
         (changed(0, b'X'), Status::NotATable, "not a controller table"),
-        (changed(8, 2), Status::TableVersion, "version 2"),
+        (changed(8, 1), Status::TableVersion, "version 1"),
         (table()[..table().len() - 1].to_vec(), Status::TableDamaged, "missing"),
         ([table(), b"x"].concat(), Status::TableDamaged, "follow the table"),
         (changed(200, 0xff), Status::TableDamaged, "checksum"),
