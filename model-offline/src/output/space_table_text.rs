@@ -1,6 +1,6 @@
 //! A table in space as text and JSON, for people and scripts.
 
-use super::table_text::hex;
+use super::table_text::{head, hex};
 use crate::table::space::SpaceTable;
 use firmware::contract::SpatialTable;
 use nalgebra::{DMatrix, Vector3};
@@ -30,24 +30,8 @@ fn measure<const P: usize>(table: &SpatialTable<f64, P>, knot: usize) -> f64 {
 }
 
 fn summary_of<const P: usize>(table: &SpatialTable<f64, P>) -> String {
-    let names: Vec<String> = table.paddles.iter().map(|p| p.index.to_string()).collect();
-    let mut out = format!(
-        "paddle {} · {} tissue · in space · {} knots, depth {:.4} to {:.4}\nscene {}\n\
-         limits: displacement {:.4}, rate {:.4} per s, needle speed {:.4} per s; loop gain {:.4} (delay {} samples, model error {:.2})\n\n\
-            depth   paddle path                          1/σ_min(NᵀJ)  axial target  static orthogonal\n",
-        names.join(" and "),
-        table.tissue,
-        table.knots.len(),
-        table.validity.depth_start,
-        table.validity.depth_end,
-        hex(&table.scene_hash),
-        table.paddles[0].max_displacement,
-        table.paddles[0].max_rate,
-        table.validity.needle_speed,
-        table.gains.loop_gain,
-        table.gains.delay_samples,
-        table.gains.lambda_max,
-    );
+    let mut out = head(table);
+    out.push_str("\n   depth   paddle path                          1/σ_min(NᵀJ)  axial target  static orthogonal\n");
     for (k, knot) in table.knots.iter().enumerate() {
         for (p, path) in knot.paddle_path.column_iter().enumerate() {
             let lead = if p == 0 { format!("{:8.4}", knot.depth) } else { " ".repeat(8) };

@@ -25,23 +25,8 @@ pub fn hex(bytes: &[u8]) -> String {
 
 /// A screen's worth about a table.
 pub fn summary(table: &Table<f64, 2>) -> String {
-    let mut out = format!(
-        "paddle {} · {} tissue · {} knots, depth {:.4} to {:.4}\nscene {}\n\
-         limits: displacement {:.4}, rate {:.4} per s, needle speed {:.4} per s; loop gain {:.4} (delay {} samples, model error {:.2})\n\n\
-            depth   paddle path            J⁻¹n norm   axial target  static orthogonal\n",
-        table.paddles[0].index,
-        table.tissue,
-        table.knots.len(),
-        table.validity.depth_start,
-        table.validity.depth_end,
-        hex(&table.scene_hash),
-        table.paddles[0].max_displacement,
-        table.paddles[0].max_rate,
-        table.validity.needle_speed,
-        table.gains.loop_gain,
-        table.gains.delay_samples,
-        table.gains.lambda_max,
-    );
+    let mut out = head(table);
+    out.push_str("\n   depth   paddle path            J⁻¹n norm   axial target  static orthogonal\n");
     for knot in &table.knots {
         let measure = knot.jacobian[0].try_inverse().map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
         let _ = writeln!(
@@ -56,6 +41,28 @@ pub fn summary(table: &Table<f64, 2>) -> String {
         );
     }
     out
+}
+
+/// What a table is of, and its limits: three lines.
+pub(super) fn head<const D: usize, const N: usize, const P: usize>(table: &Table<f64, D, N, P>) -> String {
+    let names: Vec<String> = table.paddles.iter().map(|paddle| paddle.index.to_string()).collect();
+    let (max_displacement, max_rate) =
+        table.paddles.first().map_or((0.0, 0.0), |paddle| (paddle.max_displacement, paddle.max_rate));
+    format!(
+        "paddle {} · {} tissue · {} knots, depth {:.4} to {:.4}\nscene {}\n\
+         limits: displacement {max_displacement:.4}, rate {max_rate:.4} per s, needle speed {:.4} per s; loop gain {:.4} \
+         (delay {} samples, model error {:.2})\n",
+        names.join(" and "),
+        table.tissue,
+        table.knots.len(),
+        table.validity.depth_start,
+        table.validity.depth_end,
+        hex(&table.scene_hash),
+        table.validity.needle_speed,
+        table.gains.loop_gain,
+        table.gains.delay_samples,
+        table.gains.lambda_max,
+    )
 }
 
 /// The whole table as JSON.

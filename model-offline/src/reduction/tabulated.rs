@@ -98,7 +98,7 @@ pub enum TabulationError {
     },
     /// No number of depths is enough.
     #[error(
-        "the best table is wrong by {worst_error:.2e} of the target's largest orthogonal displacement and bounds its error by {worst_estimate:.2e}, {tolerance:.2e} was asked for; ask for that bound, or insert less deep"
+        "the best table is wrong by {worst_error:.2e} of the target's largest orthogonal displacement and bounds its error by {worst_estimate:.2e}, {tolerance:.2e} was asked for; insert less deep"
     )]
     TooInaccurate {
         /// Worst error of the best try.
@@ -311,7 +311,7 @@ impl Tabulated {
 
     fn target(&self, at: &DVector<f64>) -> Vector3<f64> {
         let (knot, share) = self.interval(at[0]);
-        let blend = share * share * (3.0 - 2.0 * share);
+        let blend = blended(share);
         let [before, after] = [0, 1].map(|k| self.knots[knot + k].expanded(at));
         before * (1.0 - blend) + after * blend
     }
@@ -336,6 +336,11 @@ impl Tabulated {
     pub fn deepest(&self) -> f64 {
         self.knots[self.knots.len() - 1].at[0]
     }
+}
+
+/// The cubic from 0 to 1 that leaves no kink at either end.
+fn blended(share: f64) -> f64 {
+    share * share * (3.0 - 2.0 * share)
 }
 
 /// What an error grows with.
@@ -444,7 +449,7 @@ impl TabulatedBody {
     /// Nodal coefficients of the full model, to first order.
     pub fn coefficients(&self) -> Vec<f64> {
         let (knot, share) = self.table.interval(self.at[0]);
-        let blend = share * share * (3.0 - 2.0 * share);
+        let blend = blended(share);
         let mut sum = vec![0.0; self.table.knots[0].coefficients.len()];
         for (knot, weight) in [(knot, 1.0 - blend), (knot + 1, blend)] {
             let Knot { at, coefficients, derivatives, .. } = &self.table.knots[knot];

@@ -8,13 +8,14 @@ use self::amplification::largest_amplification;
 use crate::model::{Body, ModelError, TissueModel};
 use crate::needle::NeedleError;
 use crate::placement::controllability::best_direction;
+use crate::scene::Actuator;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use firmware::contract::{
     CONDITION_LIMIT, Gains, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, Table, TableError, Units, Validity,
     condition_number,
 };
 use firmware::loop_stability::default_gain;
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// How a table is made.
 ///
@@ -119,35 +120,66 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
         false => largest_amplification(model, position, &knots).map_err(ModelError::from)?,
     };
     let lambda_max = options.lambda_max.max(amplification);
-    let (first, last) = (&knots[0], &knots[knots.len() - 1]);
-    let table = Table {
+    let paddle = (paddle_index, scene.paddles[position].segment);
+    let of = Described {
         scene_hash: scene.hash(),
-        units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
-        tissue: label(scene.tissue().name())?,
-        paddles: [Paddle {
-            index: paddle_index,
-            extent: scene.paddles[position].segment,
-            max_displacement: scene.actuator.max_displacement,
-            max_rate: scene.actuator.max_rate,
-        }],
-        needle_axis: scene.needle.axis,
+        units: [&scene.length_unit, &scene.stress_unit],
+        tissue: scene.tissue().name(),
+        actuator: &scene.actuator,
+        axis: scene.needle.axis,
         orthogonal: scene.needle.orthogonal(),
-        target_position: scene.target,
-        validity: Validity {
-            depth_start: first.depth,
-            depth_end: last.depth,
-            paddle_displacement: scene.actuator.max_displacement,
-            needle_speed: scene.actuator.max_needle_speed.max(SPEED_MARGIN * options.needle_speed),
-        },
-        gains: Gains {
-            loop_gain: default_gain(options.delay_samples, lambda_max),
-            delay_samples: options.delay_samples,
-            lambda_max,
-        },
-        knots,
+        target: scene.target,
     };
-    table.validate().map_err(TableBuildError::Invalid)?;
-    Ok(table)
+    of.table([paddle], knots, lambda_max, options)
+}
+
+/// What a table says of its scene.
+struct Described<'a, const D: usize, const N: usize> {
+    scene_hash: [u8; 32],
+    /// Of length and stress.
+    units: [&'a str; 2],
+    tissue: &'a str,
+    actuator: &'a Actuator,
+    axis: SVector<f64, D>,
+    orthogonal: SMatrix<f64, D, N>,
+    target: SVector<f64, D>,
+}
+
+impl<const D: usize, const N: usize> Described<'_, D, N> {
+    /// The table of paddles, by index and extent, with these knots and a gain for this |λ|.
+    fn table<const P: usize>(
+        self,
+        paddles: [(u32, [SVector<f64, D>; 2]); P],
+        knots: heapless::Vec<Knot<f64, D, P>, MAX_KNOTS>,
+        lambda_max: f64,
+        options: &TableOptions,
+    ) -> Result<Table<f64, D, N, P>, TableBuildError> {
+        let Actuator { max_displacement, max_rate, max_needle_speed } = *self.actuator;
+        let depths = [knots.first(), knots.last()].map(|knot| knot.map_or(0.0, |knot| knot.depth));
+        let table = Table {
+            scene_hash: self.scene_hash,
+            units: Units { length: label(self.units[0])?, stress: label(self.units[1])? },
+            tissue: label(self.tissue)?,
+            paddles: paddles.map(|(index, extent)| Paddle { index, extent, max_displacement, max_rate }),
+            needle_axis: self.axis,
+            orthogonal: self.orthogonal,
+            target_position: self.target,
+            validity: Validity {
+                depth_start: depths[0],
+                depth_end: depths[1],
+                paddle_displacement: max_displacement,
+                needle_speed: max_needle_speed.max(SPEED_MARGIN * options.needle_speed),
+            },
+            gains: Gains {
+                loop_gain: default_gain(options.delay_samples, lambda_max),
+                delay_samples: options.delay_samples,
+                lambda_max,
+            },
+            knots,
+        };
+        table.validate().map_err(TableBuildError::Invalid)?;
+        Ok(table)
+    }
 }
 
 /// Refuses a knot that no controller can work with.
@@ -196,7 +228,9 @@ fn knots_of_states(
 ///
 /// # Errors
 /// [`TableBuildError::Invalid`] when the table breaks one of its own rules.
-pub fn to_bytes(table: &Table<f64, 2>) -> Result<Vec<u8>, TableBuildError> {
+pub fn to_bytes<const D: usize, const N: usize, const P: usize>(
+    table: &Table<f64, D, N, P>,
+) -> Result<Vec<u8>, TableBuildError> {
     let mut bytes = vec![0; MAX_TABLE_BYTES];
     let length = firmware::contract::encode(table, &mut bytes).map_err(TableBuildError::Invalid)?;
     bytes.truncate(length);

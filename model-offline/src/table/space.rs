@@ -1,15 +1,12 @@
 //! Tables in space: one paddle or two that hold the target together.
 
-use super::{SPEED_MARGIN, TableBuildError, TableOptions, label};
+use super::{Described, TableBuildError, TableOptions, to_bytes};
 use crate::geometry::Implicit as _;
 use crate::model::space::{SpaceBody, SpaceModel};
 use crate::model::{ModelError, control_derivatives};
 use crate::placement::space::holding::{Hold, hold};
 use crate::solver::equilibrium::NewtonSettings;
-use firmware::contract::{
-    Gains, Header, Knot, MAX_KNOTS, MAX_TABLE_BYTES, Paddle, SpatialTable, TableError, Units, Validity, decode, encode,
-};
-use firmware::loop_stability::default_gain;
+use firmware::contract::{Header, Knot, MAX_KNOTS, SpatialTable, TableError, Validity, decode};
 use firmware::scalar::ScalarKind;
 use nalgebra::{DMatrix, Matrix2xX, SMatrix, Vector3};
 
@@ -72,17 +69,10 @@ impl SpaceTable {
     /// [`TableBuildError::Invalid`] when the table breaks one of its own rules.
     pub fn to_bytes(&self) -> Result<Vec<u8>, TableBuildError> {
         match self {
-            Self::One(table) => bytes_of(|buffer| encode(table, buffer)),
-            Self::Two(table) => bytes_of(|buffer| encode(table, buffer)),
+            Self::One(table) => to_bytes(table),
+            Self::Two(table) => to_bytes(table),
         }
     }
-}
-
-fn bytes_of(encode: impl FnOnce(&mut [u8]) -> Result<usize, TableError>) -> Result<Vec<u8>, TableBuildError> {
-    let mut bytes = vec![0; MAX_TABLE_BYTES];
-    let length = encode(&mut bytes).map_err(TableBuildError::Invalid)?;
-    bytes.truncate(length);
-    Ok(bytes)
 }
 
 fn build<const P: usize>(
@@ -100,38 +90,21 @@ fn build<const P: usize>(
     }
     let knots = knots(model, attached, options.knots)?;
     let lambda_max = options.lambda_max.max(mistaken(model, &attached, &knots[0])?);
-    let (first, last) = (&knots[0], &knots[knots.len() - 1]);
-    let table = SpatialTable {
+    let extents = indices.map(|index| {
+        let region = scene.paddles.iter().find(|paddle| paddle.index == index).map(|paddle| &paddle.region);
+        let (low, high) = region.and_then(|region| region.bounds()).unwrap_or_default();
+        (index, [low, high])
+    });
+    let of = Described {
         scene_hash: scene.hash(),
-        units: Units { length: label(&scene.length_unit)?, stress: label(&scene.stress_unit)? },
-        tissue: label(scene.tissue().name())?,
-        paddles: std::array::from_fn(|p| {
-            let (low, high) = scene.paddles[attached[p]].region.bounds().unwrap_or_default();
-            Paddle {
-                index: indices[p],
-                extent: [low, high],
-                max_displacement: scene.actuator.max_displacement,
-                max_rate: scene.actuator.max_rate,
-            }
-        }),
-        needle_axis: scene.needle.axis,
+        units: [&scene.length_unit, &scene.stress_unit],
+        tissue: scene.tissue().name(),
+        actuator: &scene.actuator,
+        axis: scene.needle.axis,
         orthogonal: scene.needle.orthogonal(),
-        target_position: scene.target,
-        validity: Validity {
-            depth_start: first.depth,
-            depth_end: last.depth,
-            paddle_displacement: scene.actuator.max_displacement,
-            needle_speed: scene.actuator.max_needle_speed.max(SPEED_MARGIN * options.needle_speed),
-        },
-        gains: Gains {
-            loop_gain: default_gain(options.delay_samples, lambda_max),
-            delay_samples: options.delay_samples,
-            lambda_max,
-        },
-        knots,
+        target: scene.target,
     };
-    table.validate().map_err(TableBuildError::Invalid)?;
-    Ok(table)
+    of.table(extents, knots, lambda_max, options)
 }
 
 fn knots<const P: usize>(
