@@ -2,6 +2,7 @@
 //!
 //! One process and simulated time: the firmware's own controller on the body's [table of states](model_offline::reduction::tabulated).
 
+use std::hint::black_box;
 use std::time::Instant;
 
 use firmware::inputs::Ledger;
@@ -10,7 +11,7 @@ use model_offline::model::space::SpaceModel;
 use model_offline::output::table_text::hex;
 use model_offline::placement::space::study::{SpaceOptimum, place_in_space, rest_responses};
 use model_offline::placement::space::workflow::insertion_model;
-use model_offline::reduction::{Tabulated, TabulationOptions, TabulationReport};
+use model_offline::reduction::{Tabulated, TabulatedBody, TabulationOptions, TabulationReport};
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::TableOptions;
@@ -144,6 +145,8 @@ pub struct SpaceStrategyResult {
 pub struct SpacePlantAccount {
     /// How it was tabulated.
     pub tabulation: TabulationReport,
+    /// Mean time of a step of the table, µs, on the way of this run once more.
+    pub step_us: f64,
     /// Steps that the full model answered.
     pub fallbacks: u64,
     /// Why, the first time.
@@ -294,13 +297,13 @@ impl Insertion<'_> {
         let decoded = decoded.map_err(model_offline::table::TableBuildError::Invalid)?;
         let mut controller = decoded.as_ref().map(|table| table.on_this_machine(&settings)).transpose()?;
         if controller.is_none() {
-            world.start_needle(0);
+            world.started.at(0);
         }
         let (mut truths, mut faults) = (Vec::new(), Faults::NONE);
         let (mut in_run, mut command) = (0_u64, None);
         for tick in 0..simulation.ticks() {
             let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns)?;
-            let since_start_s = world.since_start_s(truth.time_ns);
+            let since_start_s = world.started.since_s(truth.time_ns);
             if since_start_s >= simulation.duration_s {
                 break;
             }
@@ -315,6 +318,7 @@ impl Insertion<'_> {
         let largest_error = held_against_full(&mut world.tissue, &truths);
         let plant = SpacePlantAccount {
             tabulation,
+            step_us: step_us(states.body(), &truths),
             fallbacks: world.tissue.fallbacks,
             first_fallback: world.tissue.first_fallback.clone(),
             largest_estimate: world.tissue.largest_estimate,
@@ -367,6 +371,16 @@ impl Insertion<'_> {
                 .collect(),
         }
     }
+}
+
+/// Mean time of a step, µs, on the way of a run.
+fn step_us(mut body: TabulatedBody, truths: &[(f64, SpaceTruth)]) -> f64 {
+    let start = Instant::now();
+    for (_, truth) in truths {
+        // Where the table does not reach, finding that out is what a step takes.
+        let _ = black_box(body.drive(truth.depth, &truth.paddles));
+    }
+    start.elapsed().as_secs_f64() * 1e6 / truths.len().max(1) as f64
 }
 
 /// The largest distance of the tissue from its full model at some states of a run, in their order.

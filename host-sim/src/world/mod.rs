@@ -25,7 +25,7 @@ use nalgebra::Vector2;
 
 use self::actuator::PaddleActuator;
 use self::error::WorldError;
-use self::needle::{NeedleDrive, NeedleMotion, NeedleTrajectory};
+use self::needle::{NeedleDrive, NeedleMotion, NeedleStart, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
 use self::tissue::{AttachedPaddle, Insertion, PlantAccount, Reductions, TissuePlant, TissueResponse};
@@ -44,7 +44,7 @@ pub struct World<T, N = NeedleTrajectory> {
     target_sensor: TargetSensor,
     encoders: Encoders,
     needle: NeedleMotion,
-    needle_started_ns: Option<u64>,
+    started: NeedleStart,
 }
 
 /// What the controller's samples come from.
@@ -126,22 +126,22 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
     pub fn of(tissue: T, drive: N, actuator: PaddleActuator, sensors: Sensors) -> Self {
         let Sensors { target, encoders } = sensors;
         let needle = NeedleMotion::default();
-        Self { tissue, drive, actuator, target_sensor: target, encoders, needle, needle_started_ns: None }
+        Self { tissue, drive, actuator, target_sensor: target, encoders, needle, started: NeedleStart::default() }
     }
 
     /// The needle starts now. It waits for the controller's RUN, or for nobody without a controller.
     pub fn start_needle(&mut self, time_ns: u64) {
-        self.needle_started_ns.get_or_insert(time_ns);
+        self.started.at(time_ns);
     }
 
     /// When the needle started, ns.
     pub fn needle_started_ns(&self) -> Option<u64> {
-        self.needle_started_ns
+        self.started.time_ns()
     }
 
     /// Time since the needle started, s; −1 before.
     pub fn since_start_s(&self, time_ns: u64) -> f64 {
-        self.needle_started_ns.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9)
+        self.started.since_s(time_ns)
     }
 
     /// One tick of a loop without a transport: time goes on by a period under `command`, and every sensor is read at

@@ -14,6 +14,27 @@ pub struct NeedleMotion {
     pub velocity: f64,
 }
 
+/// When the needle started, if it has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NeedleStart(Option<u64>);
+
+impl NeedleStart {
+    /// It starts now, ns, unless it has before.
+    pub fn at(&mut self, time_ns: u64) {
+        self.0.get_or_insert(time_ns);
+    }
+
+    /// When, ns.
+    pub fn time_ns(&self) -> Option<u64> {
+        self.0
+    }
+
+    /// Time since, s; −1 before.
+    pub fn since_s(&self, time_ns: u64) -> f64 {
+        self.0.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9)
+    }
+}
+
 /// What moves the needle.
 pub trait NeedleDrive {
     /// Motion at a time since the start, s (negative: not started). Called once per tick, in order.

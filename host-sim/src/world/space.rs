@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use super::actuator::PaddleActuator;
 use super::error::WorldError;
-use super::needle::NeedleDrive;
+use super::needle::{NeedleDrive, NeedleStart};
 use super::sensors::{TargetSensor, to_frame};
 use super::simulation::Simulation;
 
@@ -112,7 +112,8 @@ pub struct SpaceWorld<'m, N> {
     indices: Vec<u32>,
     target_sensor: TargetSensor<3>,
     sequence: u32,
-    needle_started_ns: Option<u64>,
+    /// When the needle started: for the first RUN, or for nobody where there is no controller.
+    pub started: NeedleStart,
 }
 
 impl<'m, N: NeedleDrive + Clone> SpaceWorld<'m, N> {
@@ -133,18 +134,8 @@ impl<'m, N: NeedleDrive + Clone> SpaceWorld<'m, N> {
             )
             .quantised(simulation.sensor.quantisation),
             sequence: 0,
-            needle_started_ns: None,
+            started: NeedleStart::default(),
         }
-    }
-
-    /// The needle starts now: for nobody, where there is no controller.
-    pub fn start_needle(&mut self, time_ns: u64) {
-        self.needle_started_ns.get_or_insert(time_ns);
-    }
-
-    /// Time since the needle started, s; −1 before.
-    pub fn since_start_s(&self, time_ns: u64) -> f64 {
-        self.needle_started_ns.map_or(-1.0, |started_ns| time_ns.saturating_sub(started_ns) as f64 * 1e-9)
     }
 
     /// One tick: time goes on by a period under `command`, the first RUN starts the needle, and every sensor is read. Returns what is
@@ -161,14 +152,14 @@ impl<'m, N: NeedleDrive + Clone> SpaceWorld<'m, N> {
         let time_ns = tick * period_ns;
         if command.is_some_and(|command| command.state == Mode::Run as u32) {
             // The command is the answer to the tick before.
-            self.start_needle(time_ns.saturating_sub(period_ns));
+            self.started.at(time_ns.saturating_sub(period_ns));
         }
         let command = command.filter(|command| command.is_valid());
         for (place, actuator) in self.actuators.iter_mut().enumerate() {
             let goal = command.map(|command| Vector3::from(command.displacement[place]));
             actuator.advance(goal, period_ns as f64 * 1e-9);
         }
-        let needle = self.drive.motion(self.since_start_s(time_ns));
+        let needle = self.drive.motion(self.started.since_s(time_ns));
         let paddles: Vec<Vector3<f64>> = self.actuators.iter().map(PaddleActuator::position).collect();
         let target = self.tissue.step(needle.depth, &paddles)?;
         self.target_sensor.measure(time_ns, &target);

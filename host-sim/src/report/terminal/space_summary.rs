@@ -43,8 +43,9 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
         let checked = plant.largest_error.map_or_else(|| "not checked".to_owned(), length);
         let _ = writeln!(
             out,
-            "  tissue: {} states, estimated within {}, {checked} found; {} steps by the full model",
+            "  tissue: {} states, {:.1} µs a step, estimated within {}, {checked} found; {} steps by the full model",
             plant.tabulation.knots,
+            plant.step_us,
             length(plant.largest_estimate),
             plant.fallbacks
         );
