@@ -167,6 +167,27 @@ fn a_tabulated_body_follows_the_full_one_and_knows_where_it_does_not() {
     assert!(refused.contains("insert less deep"), "{refused}");
 }
 
+/// At a tabulated depth what is left out is of third order in the distance from the way: half of it leaves an eighth.
+#[test]
+fn a_tabulated_body_is_of_third_order_beside_its_way() {
+    let model = scan();
+    let options = TabulationOptions { tolerance: 0.01, steered: true, threads: 2 };
+    let (table, report) = Tabulated::learn(&model, &[4, 5], &options).unwrap();
+    let depth = table.deepest() * ((table.knots() - 1) / 2) as f64 / (table.knots() - 1) as f64;
+    for (k, direction) in [Vector3::x(), Vector3::y(), Vector3::new(0.6, 0.0, 0.8)].into_iter().enumerate() {
+        let error = |share: f64| {
+            let mut paddles = table.way(depth);
+            paddles[k % 2] += direction * (share * report.room[k % 2]);
+            let (mut body, mut full) = (table.body(), model.body(&[4, 5], NewtonSettings::default()).unwrap());
+            body.drive(depth, &paddles).unwrap();
+            full.drive(depth, &paddles).unwrap();
+            (body.target_displacement() - full.target_displacement()).norm()
+        };
+        let order = (error(0.9) / error(0.45)).log2();
+        assert!((2.6..3.6).contains(&order), "{k}: order {order:.2}");
+    }
+}
+
 /// Held paddles and none: one control, the same answers as the full model, nothing beside rest.
 #[test]
 fn fixtures_are_tabulated_by_depth_alone() {
