@@ -1,11 +1,13 @@
 //! Tables and tabulated bodies in space: held against differences, whole solves, and each other.
 
 use firmware::contract::{Header, TableError};
+use model_offline::discretization::{Integration, Method, Resolution};
 use model_offline::geometry::Point;
-use model_offline::model::space::{SpaceBody, SpaceModel};
+use model_offline::model::space::SpaceBody;
 use model_offline::model::{DrivenBody, control_derivatives};
 use model_offline::placement::space::holding::hold;
-use model_offline::placement::space::study::{best_to_control, rest_responses};
+use model_offline::placement::space::insertion::InsertionModel;
+use model_offline::placement::space::rest::rest_responses;
 use model_offline::placement::space::workflow::insertion_model;
 use model_offline::reduction::tabulated::Untabulated;
 use model_offline::reduction::{Tabulated, TabulationOptions};
@@ -13,13 +15,20 @@ use model_offline::scene::space::SpaceScene;
 use model_offline::solver::equilibrium::NewtonSettings;
 use model_offline::table::TableOptions;
 use model_offline::table::space::SpaceTable;
-use nalgebra::{DMatrix, Vector3};
+use nalgebra::{DMatrix, Matrix3xX, Vector3};
+use std::sync::LazyLock;
 
-fn scan() -> SpaceModel {
-    insertion_model(&SpaceScene::bundled("scan").unwrap()).unwrap()
+/// Followed on linear tetrahedra, at rest quadratic ones: the default of a tolerance, on the coarsest mesh.
+fn scan() -> &'static InsertionModel {
+    static SCAN: LazyLock<InsertionModel> = LazyLock::new(|| {
+        let mut scene = SpaceScene::bundled("scan").unwrap().with_method(Method::new(Integration::FemT10));
+        scene.discretization.resolution = Resolution::Level(0);
+        insertion_model(&scene).unwrap()
+    });
+    &SCAN
 }
 
-fn off_line(body: &SpaceBody<'_>, model: &SpaceModel) -> f64 {
+fn off_line(body: &SpaceBody<'_>, model: &InsertionModel) -> f64 {
     (model.scene().needle.orthogonal().transpose() * body.target_displacement()).norm()
 }
 
@@ -62,17 +71,52 @@ fn paddles_that_hold_leave_nothing_off_the_needles_line() {
             let depth = share * model.scene().needle.depth;
             hold(&mut body, depth).unwrap();
             assert_eq!(body.depth(), depth);
-            assert!(off_line(&body, &model) < 1e-9 * model.scene().size(), "{attached:?} {depth}");
+            assert!(off_line(&body, model) < 1e-9 * model.scene().size(), "{attached:?} {depth}");
         }
     }
+}
+
+/// As deep as the accurate model goes itself before it is squeezed to nothing at rims, it says what the corrected coarse one does, and
+/// not what that says alone.
+#[test]
+fn at_depth_the_accurate_model_says_what_insertions_are_made_of() {
+    let model = scan();
+    let depth = 0.15 * model.scene().needle.depth;
+    let off = |a: &Matrix3xX<f64>, b: &Matrix3xX<f64>| (a - b).norm() / b.norm();
+    for attached in [[4, 5], [0, 1]] {
+        let mut body = model.body(&attached, NewtonSettings::default()).unwrap();
+        hold(&mut body, depth).unwrap();
+        let mut accurate = model.accurate().body(&attached, NewtonSettings::default()).unwrap();
+        let mut coarse = model.coarse().body(&attached, NewtonSettings::default()).unwrap();
+        accurate.drive(depth, body.paddles()).unwrap();
+        coarse.drive(depth, body.paddles()).unwrap();
+        let jacobian = accurate.actuation_jacobian().unwrap();
+        let [corrected, alone] = [&mut body, &mut coarse].map(|body| body.actuation_jacobian().unwrap());
+        let (left, without) = (off(&corrected, &jacobian), off(&alone, &jacobian));
+        assert!(left < 0.03 && without > 0.1, "{attached:?}: {left:.3}, without correction {without:.3}");
+        let moved = accurate.target_displacement();
+        let left = (body.target_displacement() - moved).norm() / moved.norm();
+        assert!(left < 0.04, "{attached:?}: {left:.3}");
+    }
+}
+
+/// Pairs in another order, and such as the scene does not study, answer at rest as the accurate model.
+#[test]
+fn every_order_of_paddles_is_corrected() {
+    let model = scan();
+    let jacobian =
+        |attached: &[usize]| model.body(attached, NewtonSettings::default()).unwrap().actuation_jacobian().unwrap();
+    let (there, back) = (jacobian(&[4, 5]), jacobian(&[5, 4]));
+    assert!((there.columns(0, 3) - back.columns(3, 3)).amax() < 1e-9 * there.amax());
+    assert!((there.columns(3, 3) - back.columns(0, 3)).amax() < 1e-9 * there.amax());
 }
 
 /// The path of a table between its knots, and its Jacobian at rest, against the model that it was made of.
 #[test]
 fn a_table_holds_the_target_between_its_knots() {
     let model = scan();
-    let paddles = best_to_control(&model).unwrap();
-    let table = SpaceTable::build(&model, &paddles, &TableOptions::default()).unwrap();
+    let paddles = model.best_to_control().unwrap();
+    let table = SpaceTable::build(model, &paddles, &TableOptions::default()).unwrap();
     assert_eq!(table.paddles(), paddles);
     let SpaceTable::Two(of_two) = &table else { panic!("the best is a pair") };
     let places: Vec<usize> = paddles.iter().map(|&p| model.scene().paddle_position(p).unwrap()).collect();
@@ -84,12 +128,12 @@ fn a_table_holds_the_target_between_its_knots() {
         let path = location.paddle_path();
         body.drive(depth, &[path.column(0).into_owned(), path.column(1).into_owned()]).unwrap();
         unheld.drive(depth, &[]).unwrap();
-        let (left, without) = (off_line(&body, &model), off_line(&unheld, &model));
+        let (left, without) = (off_line(&body, model), off_line(&unheld, model));
         assert!(left < 1e-4 * without, "{left} of {without} at {depth}");
         assert!((location.target_displacement() - body.target_displacement()).norm() < 1e-3 * without);
     }
     let pair = model.scene().pairs.iter().position(|pair| pair.to_vec() == places).unwrap();
-    let rest = &rest_responses(&model).unwrap()[model.scene().paddles.len() + pair];
+    let rest = &rest_responses(model.accurate()).unwrap()[model.scene().paddles.len() + pair];
     let own = DMatrix::from_fn(3, 6, |r, c| of_two.knots[0].jacobian[c / 3][(r, c % 3)]);
     assert!((own - &rest.jacobian).amax() < 1e-6 * rest.jacobian.amax());
     // Through a file and back.
@@ -104,7 +148,7 @@ fn a_table_holds_the_target_between_its_knots() {
 fn tables_are_of_one_paddle_or_two_that_there_are() {
     let model = scan();
     let refused = |paddles: &[u32]| {
-        SpaceTable::build(&model, paddles, &TableOptions { knots: 3, ..TableOptions::default() })
+        SpaceTable::build(model, paddles, &TableOptions { knots: 3, ..TableOptions::default() })
             .unwrap_err()
             .to_string()
     };
@@ -135,7 +179,7 @@ fn the_hash_is_of_what_the_numbers_depend_on() {
 fn a_tabulated_body_follows_the_full_one_and_knows_where_it_does_not() {
     let model = scan();
     let options = TabulationOptions { tolerance: 0.01, steered: true, threads: 2 };
-    let (table, report) = Tabulated::learn(&model, &[4, 5], &options).unwrap();
+    let (table, report) = Tabulated::learn(model, &[4, 5], &options).unwrap();
     assert!(report.worst_error <= 0.01 * report.scale && report.worst_estimate <= 0.01 * report.scale, "{report:?}");
     assert!(report.trials >= 40 && report.fresh >= 20 && report.least_effectivity > 0.7, "{report:?}");
     let mut body = table.body();
@@ -163,7 +207,7 @@ fn a_tabulated_body_follows_the_full_one_and_knows_where_it_does_not() {
     assert_eq!(body.target_displacement(), before);
     // A table that is asked for more than it can has none.
     let tiny = TabulationOptions { tolerance: 1e-12, ..options };
-    let refused = Tabulated::learn(&model, &[4, 5], &tiny).unwrap_err().to_string();
+    let refused = Tabulated::learn(model, &[4, 5], &tiny).unwrap_err().to_string();
     assert!(refused.contains("insert less deep"), "{refused}");
 }
 
@@ -172,7 +216,7 @@ fn a_tabulated_body_follows_the_full_one_and_knows_where_it_does_not() {
 fn a_tabulated_body_is_of_third_order_beside_its_way() {
     let model = scan();
     let options = TabulationOptions { tolerance: 0.01, steered: true, threads: 2 };
-    let (table, report) = Tabulated::learn(&model, &[4, 5], &options).unwrap();
+    let (table, report) = Tabulated::learn(model, &[4, 5], &options).unwrap();
     let depth = table.deepest() * ((table.knots() - 1) / 2) as f64 / (table.knots() - 1) as f64;
     for (k, direction) in [Vector3::x(), Vector3::y(), Vector3::new(0.6, 0.0, 0.8)].into_iter().enumerate() {
         let error = |share: f64| {
@@ -194,7 +238,7 @@ fn fixtures_are_tabulated_by_depth_alone() {
     let model = scan();
     for attached in [vec![], vec![2, 3]] {
         let options = TabulationOptions { tolerance: 0.01, steered: false, threads: 2 };
-        let (table, report) = Tabulated::learn(&model, &attached, &options).unwrap();
+        let (table, report) = Tabulated::learn(model, &attached, &options).unwrap();
         let still = vec![Point::<3>::zeros(); attached.len()];
         let (mut body, mut full) = (table.body(), model.body(&attached, NewtonSettings::default()).unwrap());
         for share in [0.21, 0.66, 1.0] {

@@ -53,7 +53,7 @@ fn worst_of(responses: &[SpaceResponse], limits: &Value) -> f64 {
 
 fn responses(scene: &SpaceScene, level: i32) -> (usize, Vec<SpaceResponse>) {
     let model = SpaceModel::on(scene, &mesh(scene, &MeshSize::level(level)).unwrap()).unwrap();
-    (model.nodes(), model_offline::placement::space::study::rest_responses(&model).unwrap())
+    (model.nodes(), model_offline::placement::space::rest::rest_responses(&model).unwrap())
 }
 
 #[test]

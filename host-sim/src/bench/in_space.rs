@@ -7,9 +7,9 @@ use std::time::Instant;
 
 use firmware::inputs::Ledger;
 use firmware::{Faults, Mode};
-use model_offline::model::space::SpaceModel;
 use model_offline::output::table_text::hex;
-use model_offline::placement::space::study::{SpaceOptimum, place_in_space, rest_responses};
+use model_offline::placement::space::insertion::InsertionModel;
+use model_offline::placement::space::study::{SpaceOptimum, place_in_space};
 use model_offline::placement::space::workflow::insertion_model;
 use model_offline::reduction::{Tabulated, TabulatedBody, TabulationOptions, TabulationReport};
 use model_offline::scene::TissueVariant;
@@ -174,7 +174,7 @@ pub struct SpaceSeriesPoint {
 
 /// A tissue with what is best on it.
 struct Tissue {
-    model: SpaceModel,
+    model: InsertionModel,
     optimum: SpaceOptimum,
 }
 
@@ -207,12 +207,11 @@ pub fn compare(
     };
     let with = insertion_model(scene)?;
     let nodes = with.nodes();
-    let study = |model: SpaceModel| -> Result<Tissue, SimError> {
-        let rest = rest_responses(&model)?;
-        let placement = place_in_space(&model, &rest, &model, threads, &|| ())?;
+    let study = |model: InsertionModel| -> Result<Tissue, SimError> {
+        let placement = place_in_space(&model, threads, &|| ())?;
         Ok(Tissue { optimum: placement.optimum, model })
     };
-    let homogeneous = study(with.without_inclusions())?;
+    let homogeneous = study(with.without_inclusions()?)?;
     let inclusion = if scene.inclusions.is_empty() { None } else { Some(study(with)?) };
     let of = |variant| match (variant, &inclusion) {
         (TissueVariant::Inclusion, Some(tissue)) => tissue,
@@ -276,7 +275,7 @@ fn case(
 
 /// An insertion that is to be simulated.
 struct Insertion<'a> {
-    model: &'a SpaceModel,
+    model: &'a InsertionModel,
     simulation: &'a Simulation,
     threads: usize,
 }

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use firmware::contract::frames::MAX_PADDLES;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample};
 use firmware::{Inputs, Mode};
-use model_offline::model::space::{SpaceBody, SpaceModel};
+use model_offline::model::space::SpaceBody;
+use model_offline::placement::space::insertion::InsertionModel;
 use model_offline::reduction::{Tabulated, TabulatedBody};
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector3;
@@ -36,7 +37,7 @@ pub struct SpaceTruth {
 /// A solid body with attached paddles.
 #[derive(Debug)]
 pub struct SpaceTissue<'m> {
-    model: &'m SpaceModel,
+    model: &'m InsertionModel,
     attached: Vec<usize>,
     body: TabulatedBody,
     /// Made when it is first needed.
@@ -51,7 +52,7 @@ pub struct SpaceTissue<'m> {
 
 impl<'m> SpaceTissue<'m> {
     /// Tissue at rest, by a table of this model with these paddles attached (places in the scene's list).
-    pub fn new(model: &'m SpaceModel, attached: &[usize], table: &Arc<Tabulated>) -> Self {
+    pub fn new(model: &'m InsertionModel, attached: &[usize], table: &Arc<Tabulated>) -> Self {
         Self {
             model,
             attached: attached.to_vec(),
@@ -85,7 +86,10 @@ impl<'m> SpaceTissue<'m> {
         let failed = |source| WorldError::Tissue { depth, source };
         let mut full = match self.full.take() {
             Some(full) => full,
-            None => Box::new(self.model.body(&self.attached, NewtonSettings::default()).map_err(failed)?),
+            None => {
+                let body = self.model.body(&self.attached, NewtonSettings::default());
+                Box::new(body.map_err(|error| WorldError::Tabulation(error.into()))?)
+            }
         };
         full.drive(depth, paddles).map_err(failed)?;
         let target = full.target_displacement();

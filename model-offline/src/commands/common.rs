@@ -100,6 +100,18 @@ pub(super) struct VariedArgs {
 }
 
 impl VariedArgs {
+    /// Refuses what is varied on planar nodes alone.
+    pub(super) fn none_in_space(&self) -> Result<(), CliError> {
+        let given = [("--spacing", self.spacing.is_some()), ("--essential", self.essential.is_some())];
+        match given.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) => Err(CliError::usage(
+                format!("{option} is for scenes in the plane"),
+                "in space spacings are shares of the body's size, and essential values are always held node by node",
+            )),
+            None => Ok(()),
+        }
+    }
+
     /// The scene with the flags in it, checked.
     pub(super) fn over(&self, mut scene: Scene) -> Result<Scene, CliError> {
         let spec = &mut scene.discretization;

@@ -3,7 +3,10 @@
 use super::common::{RunArgs, SceneArgs, VariedArgs};
 use super::error::CliError;
 use model_offline::output;
-use model_offline::study::{Extent, pareto};
+use model_offline::scene::TissueVariant;
+use model_offline::study::Extent;
+use model_offline::study::pareto::{self, Pareto};
+use model_offline::study::pareto_space::compare_in_space;
 use std::path::PathBuf;
 
 /// Options of `pareto`.
@@ -24,15 +27,30 @@ pub(super) struct ParetoArgs {
 }
 
 pub(super) fn run(args: &ParetoArgs) -> Result<(), CliError> {
+    if let Some(scene) = args.scene.read_in_space()? {
+        args.varied.none_in_space()?;
+        let compared = shown(args, &|progress| Ok(compare_in_space(&scene, Extent::of_flag(args.quick), progress)?));
+        return written(args, &compared?, &scene.name, scene.tissue());
+    }
     let scene = args.varied.over(args.scene.read()?)?;
+    let compared = shown(args, &|progress| Ok(pareto::compare(&scene, Extent::of_flag(args.quick), progress)?));
+    written(args, &compared?, &scene.name, scene.tissue())
+}
+
+/// Compares behind a progress bar.
+fn shown(args: &ParetoArgs, compare: &dyn Fn(&dyn Fn(f64)) -> Result<Pareto, CliError>) -> Result<Pareto, CliError> {
     output::make_folder(&args.out)?;
     let bar = args.run.progress(1000);
-    let comparison =
-        pareto::compare(&scene, Extent::of_flag(args.quick), &|share| bar.set_position((1000.0 * share) as u64))?;
+    let comparison = compare(&|share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
+    Ok(comparison)
+}
+
+/// Writes chart and numbers.
+fn written(args: &ParetoArgs, comparison: &Pareto, scene: &str, tissue: TissueVariant) -> Result<(), CliError> {
     let (csv, svg) = (args.out.join("pareto.csv"), args.out.join("pareto.svg"));
     output::write_whole(&csv, &comparison.csv())?;
-    output::write_whole(&svg, comparison.svg(&scene.name, scene.tissue()).as_bytes())?;
+    output::write_whole(&svg, comparison.svg(scene, tissue).as_bytes())?;
     if !args.run.quiet {
         print!("{}", comparison.table());
         println!("{}\n{}", csv.display(), svg.display());

@@ -5,7 +5,6 @@ use super::error::CliError;
 use model_offline::output::check_outputs;
 use model_offline::output::{self, space_table_text, table_text};
 use model_offline::placement::model_with_paddle;
-use model_offline::placement::space::study::best_to_control;
 use model_offline::placement::space::workflow::insertion_model;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
@@ -59,7 +58,7 @@ fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
     check_outputs(&args.scene.files(&scene), &[("--output", Some(&args.output))])?;
     let model = insertion_model(&scene)?;
     let paddles = match args.paddle.is_empty() {
-        true => best_to_control(&model)?,
+        true => model.best_to_control()?,
         false => args.paddle.clone(),
     };
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };

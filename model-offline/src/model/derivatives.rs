@@ -66,6 +66,9 @@ pub fn control_derivatives<const D: usize, B: DrivenBody<D>>(body: &mut B) -> Re
     for (column, response) in responses.chunks_exact(unknowns).enumerate() {
         slope.set_column(column, &body.target_row().interpolate(response));
     }
+    if let Some(beside) = body.beside_row() {
+        slope += beside;
+    }
     let bend = second_derivatives(body, &responses, &adjoints);
     Ok(ControlDerivatives { slope, bend, responses })
 }

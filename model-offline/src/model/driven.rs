@@ -5,6 +5,10 @@ use super::space::SpaceBody;
 use crate::discretization::Stencil;
 use crate::geometry::Point;
 use crate::solver::equilibrium::{Equilibrium, Failure};
+use nalgebra::{Const, Dyn, OMatrix};
+
+/// D rows, a column per control.
+pub type PerControl<const D: usize> = OMatrix<f64, Const<D>, Dyn>;
 
 /// A body in D dimensions that is moved by its controls: the needle's depth, then D displacements per attached paddle, lengths.
 pub trait DrivenBody<const D: usize>: Clone + Send + Sync {
@@ -38,6 +42,11 @@ pub trait DrivenBody<const D: usize>: Clone + Send + Sync {
     /// Target displacement.
     fn target(&self) -> Point<D> {
         self.target_row().interpolate(self.equilibrium().coefficients())
+    }
+
+    /// What the target is displaced by per control beside what its row says; none for most.
+    fn beside_row(&self) -> Option<&PerControl<D>> {
+        None
     }
 }
 
@@ -116,5 +125,13 @@ impl DrivenBody<3> for SpaceBody<'_> {
 
     fn controls(&self) -> Vec<f64> {
         controls_of(self.depth(), SpaceBody::paddles(self))
+    }
+
+    fn target(&self) -> Point<3> {
+        self.target_displacement()
+    }
+
+    fn beside_row(&self) -> Option<&PerControl<3>> {
+        self.beside()
     }
 }

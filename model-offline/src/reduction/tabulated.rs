@@ -18,10 +18,11 @@
 //! Shafer 2005); others, which had no part in it, judge the bound.
 
 use crate::geometry::Point;
-use crate::model::space::{SpaceBody, SpaceModel};
+use crate::model::space::SpaceBody;
 use crate::model::{ControlDerivatives, DrivenBody, ModelError, control_derivatives};
 use crate::parallel;
 use crate::placement::space::holding::hold;
+use crate::placement::space::insertion::InsertionModel;
 use crate::random::SplitMix64;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::{DVector, Vector3};
@@ -173,7 +174,7 @@ impl Tabulated {
     /// # Errors
     /// [`TabulationError`].
     pub fn learn(
-        model: &SpaceModel,
+        model: &InsertionModel,
         attached: &[usize],
         options: &TabulationOptions,
     ) -> Result<(Arc<Self>, TabulationReport), TabulationError> {
@@ -196,7 +197,7 @@ impl Tabulated {
     }
 
     fn of_size(
-        model: &SpaceModel,
+        model: &InsertionModel,
         attached: &[usize],
         options: &TabulationOptions,
         (intervals, share): (usize, f64),
@@ -357,13 +358,13 @@ struct Trial {
 
 /// The body's states with the paddles on their way, and the bodies there.
 fn walk<'m>(
-    model: &'m SpaceModel,
+    model: &'m InsertionModel,
     attached: &[usize],
     steered: bool,
     intervals: usize,
 ) -> Result<(Vec<Knot>, Vec<SpaceBody<'m>>), TabulationError> {
     let asked = model.scene().needle.depth;
-    let mut body = model.body(attached, NewtonSettings::default()).map_err(ModelError::from)?;
+    let mut body = model.body(attached, NewtonSettings::default())?;
     let (mut knots, mut bodies) = (Vec::new(), Vec::new());
     for k in 0..=intervals {
         let depth = asked * k as f64 / intervals as f64;
@@ -399,9 +400,9 @@ impl Knot {
 }
 
 /// The target's largest orthogonal displacement on the insertion without a paddle, length.
-fn unheld(model: &SpaceModel) -> Result<f64, TabulationError> {
+fn unheld(model: &InsertionModel) -> Result<f64, TabulationError> {
     let needle = &model.scene().needle;
-    let mut body = model.body(&[], NewtonSettings::default()).map_err(ModelError::from)?;
+    let mut body = model.body(&[], NewtonSettings::default())?;
     let mut largest = f64::MIN_POSITIVE;
     for k in 1..=needle.increments {
         if body.drive(needle.depth * f64::from(k) / f64::from(needle.increments), &[]).is_err() {

@@ -36,6 +36,19 @@ pub struct Measurement {
     pub on_front: bool,
 }
 
+/// What somebody else's program took for the Jacobians of all single paddles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peer {
+    /// Unknowns.
+    pub dofs: u32,
+    /// Whether its elements are quadratic.
+    pub quadratic: bool,
+    /// Time on one thread, s.
+    pub wall_s: f64,
+    /// Worst error of the measures, relative.
+    pub error: f64,
+}
+
 /// Why there is no time or no error.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeasurementFailure {

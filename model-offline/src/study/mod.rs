@@ -9,6 +9,7 @@ mod looks;
 pub mod measurement;
 pub mod pareto;
 mod pareto_chart;
+pub mod pareto_space;
 pub mod stability;
 pub mod sweep;
 

@@ -10,7 +10,7 @@
 use super::candidates::{assess, families};
 use super::extent::Extent;
 use super::insertion::{insertion_points, step_points, with_mesh_limit};
-use super::measurement::{Job, Linearity, Measurement};
+use super::measurement::{Job, Linearity, Measurement, Peer};
 use crate::discretization::Discretization;
 use crate::model::ModelError;
 use crate::output::csv::table;
@@ -29,6 +29,8 @@ const LONGEST_QUICK_S: f64 = 0.2;
 /// A whole comparison.
 #[derive(Debug, Clone)]
 pub struct Pareto {
+    /// Dimension of the body.
+    pub dimension: usize,
     /// Everything that was tried.
     pub points: Vec<Measurement>,
     /// How good the references are: worst relative distance of their two finest levels, for `placement` and for the
@@ -38,6 +40,8 @@ pub struct Pareto {
     pub reference_nodes: (usize, usize),
     /// The barrier that was added to give the law a mesh limit at finite depth, stress units.
     pub barrier: Option<f64>,
+    /// What others took for the same scene, where that is known.
+    pub peers: Vec<Peer>,
 }
 
 /// Compares every method on the scene; `progress` is told how much is done, from 0 to 1. Times are those of one thread.
@@ -71,7 +75,14 @@ pub fn compare(scene: &Scene, extent: Extent, progress: &dyn Fn(f64)) -> Result<
         mark_front(&mut points, job);
     }
     progress(1.0);
-    Ok(Pareto { points, open: (reference.open, open), reference_nodes: (reference.nodes, nodes), barrier })
+    Ok(Pareto {
+        dimension: 2,
+        points,
+        open: (reference.open, open),
+        reference_nodes: (reference.nodes, nodes),
+        barrier,
+        peers: Vec::new(),
+    })
 }
 
 fn placement_point(discretization: Discretization, scene: &Scene, reference: &Reference) -> Measurement {
@@ -91,7 +102,7 @@ fn placement_point(discretization: Discretization, scene: &Scene, reference: &Re
 }
 
 /// Marks the points of a job that no other beats in both time and error.
-fn mark_front(points: &mut [Measurement], job: Job) {
+pub(super) fn mark_front(points: &mut [Measurement], job: Job) {
     let usable = |p: &Measurement| p.job == job && p.failure.is_none() && p.wall_s.is_finite() && p.error().is_finite();
     let mut order: Vec<usize> = (0..points.len()).filter(|&i| usable(&points[i])).collect();
     order.sort_by(|&i, &j| points[i].wall_s.total_cmp(&points[j].wall_s));
@@ -146,7 +157,7 @@ impl Pareto {
                 number(p.spacing),
                 if element { String::new() } else { method.support.to_string() },
                 p.nodes.to_string(),
-                (2 * p.nodes).to_string(),
+                (self.dimension * p.nodes).to_string(),
                 p.law.to_string(),
                 number(p.wall_s),
                 number(p.error_cm),

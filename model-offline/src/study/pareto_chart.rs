@@ -1,7 +1,7 @@
 //! The comparison as a figure and as a table for the terminal.
 
 use super::looks::look;
-use super::measurement::{Job, Linearity, Measurement, ModelKind};
+use super::measurement::{Job, Linearity, Measurement, ModelKind, Peer};
 use super::pareto::Pareto;
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Note, Panel, Series};
 use crate::scene::TissueVariant;
@@ -15,7 +15,30 @@ struct View {
     error: fn(&Measurement) -> f64,
     /// What filled and open markers tell apart; nothing where all are alike.
     filled: Option<Filling>,
+    /// Whether what others took is of the same work.
+    told_by_peers: bool,
 }
+
+/// What others took, one series for linear elements and one for quadratic ones.
+fn peers(all: &[Peer]) -> impl Iterator<Item = Series> {
+    [(false, "DOLFINx + MUMPS, linear, singles alone"), (true, "DOLFINx + MUMPS, quadratic, singles alone")]
+        .into_iter()
+        .filter_map(|(quadratic, label)| {
+            let of_kind: Vec<&Peer> = all.iter().filter(|peer| peer.quadratic == quadratic).collect();
+            let points = of_kind.iter().map(|peer| (peer.wall_s, peer.error)).collect();
+            let titles = of_kind
+                .iter()
+                .map(|p| format!("{label}, {} unknowns: {} in {:.3e} s", p.dofs, percent(p.error), p.wall_s));
+            let series = Series {
+                titles: titles.collect(),
+                ..Series::scatter(label, Colour::Purple, PEER[usize::from(quadratic)], points)
+            };
+            (!of_kind.is_empty()).then(|| series.open())
+        })
+}
+
+/// Their markers.
+const PEER: [Marker; 2] = [Marker::TriangleRight, Marker::Pentagon];
 
 /// A second property, told by filled and open markers.
 #[derive(Clone, Copy)]
@@ -37,6 +60,7 @@ const VIEWS: [View; 4] = [
         quantity: "error of the controllability measure, over itself",
         error: |p| p.error_cm,
         filled: Some(GRADED),
+        told_by_peers: true,
     },
     View {
         job: Job::Placement,
@@ -44,6 +68,7 @@ const VIEWS: [View; 4] = [
         quantity: "error of the target displacement, over the largest",
         error: |p| p.error_static,
         filled: Some(GRADED),
+        told_by_peers: false,
     },
     View {
         job: Job::Insertion,
@@ -51,6 +76,7 @@ const VIEWS: [View; 4] = [
         quantity: "error of the target displacement, over the largest",
         error: |p| p.error_static,
         filled: Some(NONLINEAR),
+        told_by_peers: false,
     },
     View {
         job: Job::Step,
@@ -58,6 +84,7 @@ const VIEWS: [View; 4] = [
         quantity: "error of the target displacement, over the largest",
         error: |p| p.error_static,
         filled: None,
+        told_by_peers: false,
     },
 ];
 
@@ -142,6 +169,9 @@ impl View {
             .iter()
             .map(|p| Note { at: (p.wall_s, (self.error)(p)), text: format!("{}, {}", appearance(p).0, p.nodes) })
             .collect();
+        if self.told_by_peers {
+            panel.series.extend(peers(&pareto.peers));
+        }
         panel
     }
 
@@ -189,20 +219,32 @@ impl View {
 }
 
 impl Pareto {
+    /// The views that have points.
+    fn views(&self) -> impl Iterator<Item = &'static View> {
+        VIEWS.iter().filter(|view| self.points.iter().any(|p| p.job == view.job))
+    }
+
     /// The comparison as one SVG.
     pub fn svg(&self, scene: &str, tissue: TissueVariant) -> String {
         let barrier = self.barrier.map_or(String::new(), |b| format!(", barrier {b:.0} added for finite depth"));
+        let references = match self.dimension {
+            2 => format!(
+                "References good to {} (small depth) and {} (finite depth)",
+                percent(self.open.0),
+                percent(self.open.1)
+            ),
+            _ => format!(
+                "All single paddles and pairs, mesh included; the reference, {} nodes, claims {}",
+                self.reference_nodes.0,
+                percent(self.open.0)
+            ),
+        };
         let conclusion = VIEWS[0].conclusion(&VIEWS[0].front(self));
         let title = conclusion.unwrap_or_else(|| "No method has a point on the front".to_owned());
         Figure {
             title: format!("{title}: error against time, scene {scene}, {tissue} tissue"),
-            caption: format!(
-                "References good to {} (small depth) and {} (finite depth){barrier}. Points of the front are named with \
-                 method and number of nodes.",
-                percent(self.open.0),
-                percent(self.open.1)
-            ),
-            panels: VIEWS.iter().map(|view| view.panel(self)).collect(),
+            caption: format!("{references}{barrier}. Points of the front are named with method and number of nodes."),
+            panels: self.views().map(|view| view.panel(self)).collect(),
             columns: 2,
         }
         .svg()
@@ -217,6 +259,9 @@ impl Pareto {
             (Job::Step, "one step of a simulator", "µs", 1e6),
         ] {
             let all = self.points.iter().filter(|p| p.job == job);
+            if all.clone().next().is_none() {
+                continue;
+            }
             let failed = all.clone().filter(|p| p.failure.is_some()).count();
             let _ = writeln!(out, "{what}: {} settings, {failed} failed; the front", all.count());
             let _ = writeln!(out, "  {:>11} {:>9} {:>10}  {:<10} settings", "time", "error cm", "static", "method");

@@ -2,9 +2,10 @@
 
 use super::{Described, TableBuildError, TableOptions, to_bytes};
 use crate::geometry::Implicit as _;
-use crate::model::space::{SpaceBody, SpaceModel};
+use crate::model::space::SpaceBody;
 use crate::model::{ModelError, control_derivatives};
 use crate::placement::space::holding::{Hold, hold};
+use crate::placement::space::insertion::InsertionModel;
 use crate::solver::equilibrium::NewtonSettings;
 use firmware::contract::{Header, Knot, MAX_KNOTS, SpatialTable, TableError, Validity, decode};
 use firmware::scalar::ScalarKind;
@@ -25,7 +26,7 @@ impl SpaceTable {
     ///
     /// # Errors
     /// [`TableBuildError`].
-    pub fn build(model: &SpaceModel, paddles: &[u32], options: &TableOptions) -> Result<Self, TableBuildError> {
+    pub fn build(model: &InsertionModel, paddles: &[u32], options: &TableOptions) -> Result<Self, TableBuildError> {
         match *paddles {
             [one] => Ok(Self::One(Box::new(build(model, [one], options)?))),
             [one, other] => Ok(Self::Two(Box::new(build(model, [one, other], options)?))),
@@ -76,7 +77,7 @@ impl SpaceTable {
 }
 
 fn build<const P: usize>(
-    model: &SpaceModel,
+    model: &InsertionModel,
     indices: [u32; P],
     options: &TableOptions,
 ) -> Result<SpatialTable<f64, P>, TableBuildError> {
@@ -108,13 +109,13 @@ fn build<const P: usize>(
 }
 
 fn knots<const P: usize>(
-    model: &SpaceModel,
+    model: &InsertionModel,
     attached: [usize; P],
     count: usize,
 ) -> Result<heapless::Vec<Knot<f64, 3, P>, MAX_KNOTS>, TableBuildError> {
     let scene = model.scene();
     let settings = NewtonSettings::default();
-    let mut still = model.body(&attached, settings).map_err(ModelError::from)?;
+    let mut still = model.body(&attached, settings)?;
     let mut steered = still.clone();
     let mut knots = heapless::Vec::new();
     for k in 0..count {
@@ -159,7 +160,7 @@ fn knot<const P: usize>(
 
 /// Largest |λ| of (NᵀJ)(NᵀĴ)⁺ where the scene's tissues, with its inclusions and without, are mistaken for each other, at rest.
 fn mistaken<const P: usize>(
-    model: &SpaceModel,
+    model: &InsertionModel,
     attached: &[usize; P],
     own: &Knot<f64, 3, P>,
 ) -> Result<f64, ModelError> {
@@ -169,7 +170,7 @@ fn mistaken<const P: usize>(
     let n = model.scene().needle.orthogonal();
     let across = |jacobian: &DMatrix<f64>| n.transpose() * jacobian;
     let own = across(&DMatrix::from_fn(3, 3 * P, |r, c| own.jacobian[c / 3][(r, c % 3)]));
-    let other = model.without_inclusions();
+    let other = model.without_inclusions()?;
     let mut body = other.body(attached, NewtonSettings::default())?;
     let other = across(&control_derivatives::<3, _>(&mut body)?.slope.columns(1, 3 * P).into_owned());
     let largest = |of: &Matrix2xX<f64>, taken_for: &Matrix2xX<f64>| {

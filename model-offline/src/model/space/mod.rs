@@ -8,6 +8,7 @@ pub mod survey;
 
 use self::middles::Middles;
 use self::patches::{Surface, loose, nodes_of, overlap};
+use super::driven::DrivenBody as _;
 use super::error::{BoundaryPart, ModelError};
 use super::tissue::{Mixing, Phase, mixture};
 use crate::discretization::{Spatial, Stencil, TetMesh};
@@ -17,7 +18,7 @@ use crate::mechanics::{ConstrainedRows, Constraints, Tissue};
 use crate::scene::space::SpaceScene;
 use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
-use nalgebra::{Matrix3xX, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
@@ -224,7 +225,7 @@ impl SpaceModel {
         let constraints = Constraints::from(held.rows.clone());
         let equilibrium = Equilibrium::analysed(self.discrete_body(), self.analysis(), constraints, settings)?;
         let paddles = vec![Vector3::zeros(); attached.len()];
-        Ok(SpaceBody { model: self, equilibrium, held, depth: 0.0, paddles })
+        Ok(SpaceBody { model: self, equilibrium, held, depth: 0.0, paddles, beside: None })
     }
 
     /// Displacement of any point of the body for given coefficients.
@@ -322,9 +323,31 @@ pub struct SpaceBody<'m> {
     held: HeldRows,
     depth: f64,
     paddles: Vec<Vector3<f64>>,
+    /// What the target is displaced by per control beside what the nodes say, where a better model has been heard.
+    beside: Option<Matrix3xX<f64>>,
 }
 
 impl SpaceBody<'_> {
+    /// Corrects the target's displacement by a term linear in the controls, so that at rest it answers as another model of the
+    /// body: `per_control` has 3 rows, a column for the depth and three per paddle.
+    ///
+    /// # Errors
+    /// [`Failure`] when the body, which is to be at rest, is not stable.
+    pub(crate) fn answering_at_rest(mut self, per_control: &DMatrix<f64>) -> Result<Self, Failure> {
+        self.beside = None;
+        let own = self.actuation_jacobian()?.insert_column(0, 0.0);
+        let mut beside = Matrix3xX::from_column_slice(per_control.as_slice()) - own;
+        let per_depth = self.depth_sensitivity()?;
+        beside.column_mut(0).axpy(-1.0, &per_depth, 1.0);
+        self.beside = Some(beside);
+        Ok(self)
+    }
+
+    /// What the target is displaced by per control beside what the nodes say.
+    pub(crate) fn beside(&self) -> Option<&Matrix3xX<f64>> {
+        self.beside.as_ref()
+    }
+
     /// Needle depth.
     pub fn depth(&self) -> f64 {
         self.depth
@@ -379,7 +402,8 @@ impl SpaceBody<'_> {
 
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector3<f64> {
-        self.model.target.interpolate(self.equilibrium.coefficients())
+        let nodal = self.model.target.interpolate(self.equilibrium.coefficients());
+        self.beside.as_ref().map_or(nodal, |beside| nodal + beside * DVector::from_vec(self.controls()))
     }
 
     /// Actuation Jacobian d(target displacement)/d(paddle displacements) with the needle still, by exact linearisation: 3
@@ -389,6 +413,9 @@ impl SpaceBody<'_> {
     /// [`Failure`] when the current state is not stable.
     pub fn actuation_jacobian(&mut self) -> Result<Matrix3xX<f64>, Failure> {
         let count = self.paddles.len();
+        if count == 0 {
+            return Ok(Matrix3xX::zeros(0));
+        }
         let rates: Vec<f64> = (0..3 * count)
             .flat_map(|column| {
                 let mut paddles = vec![Vector3::zeros(); count];
@@ -398,7 +425,8 @@ impl SpaceBody<'_> {
             .collect();
         let responses = self.equilibrium.sensitivities(&rates)?;
         let columns = responses.chunks_exact(self.model.dofs()).map(|r| self.model.target.interpolate(r));
-        Ok(Matrix3xX::from_columns(&columns.collect::<Vec<_>>()))
+        let nodal = Matrix3xX::from_columns(&columns.collect::<Vec<_>>());
+        Ok(self.beside.as_ref().map_or_else(|| nodal.clone(), |beside| &nodal + beside.columns(1, 3 * count)))
     }
 
     /// d(target displacement)/d(depth) with the paddles held, by exact linearisation.
@@ -408,6 +436,7 @@ impl SpaceBody<'_> {
     pub fn depth_sensitivity(&mut self) -> Result<Vector3<f64>, Failure> {
         let still = vec![Vector3::zeros(); self.paddles.len()];
         let response = self.equilibrium.sensitivities(&self.held.values(self.model.scene.needle.axis, &still))?;
-        Ok(self.model.target.interpolate(&response))
+        let nodal = self.model.target.interpolate(&response);
+        Ok(self.beside.as_ref().map_or(nodal, |beside| nodal + beside.column(0)))
     }
 }

@@ -2,10 +2,12 @@
 
 pub mod controllability;
 pub mod holding;
+pub mod insertion;
 pub mod rest;
 pub mod study;
 pub mod workflow;
 
 pub use controllability::Controllability;
+pub use insertion::InsertionModel;
 pub use study::SpacePlacement;
 pub use workflow::{SpaceErrorEstimate, SpaceStudy};

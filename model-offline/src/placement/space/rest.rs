@@ -29,6 +29,15 @@ pub struct SpaceResponse {
     pub controllability: Option<Controllability>,
 }
 
+impl SpaceResponse {
+    /// What the target does per depth, then per displacement of the paddles: 3 rows, a column per control.
+    pub fn per_control(&self) -> DMatrix<f64> {
+        let mut all = self.jacobian.clone().insert_column(0, 0.0);
+        all.set_column(0, &self.target_per_depth);
+        all
+    }
+}
+
 /// The condensed body at rest: what answers for any set of attached paddles.
 #[derive(Debug)]
 pub struct CondensedRest<'m> {
@@ -134,4 +143,20 @@ impl<'m> CondensedRest<'m> {
             jacobian,
         })
     }
+}
+
+/// What is attached: every paddle, every pair, nothing; by place in the scene's list.
+pub(super) fn all_sets(model: &SpaceModel) -> Vec<Vec<usize>> {
+    let scene = model.scene();
+    let singles = (0..scene.paddles.len()).map(|p| vec![p]);
+    singles.chain(scene.pairs.iter().map(|pair| pair.to_vec())).chain([Vec::new()]).collect()
+}
+
+/// Responses of every paddle, then every pair, then without any, at rest.
+///
+/// # Errors
+/// [`ModelError`] when the body at rest cannot be solved.
+pub fn rest_responses(model: &SpaceModel) -> Result<Vec<SpaceResponse>, ModelError> {
+    let rest = CondensedRest::new(model)?;
+    all_sets(model).iter().map(|attached| rest.response(attached)).collect()
 }

@@ -1,7 +1,8 @@
 //! The placement study in space: every paddle and every pair of them, static and dynamic.
 
 use super::controllability::Controllability;
-use super::rest::{CondensedRest, SpaceResponse};
+use super::insertion::InsertionModel;
+use super::rest::{SpaceResponse, all_sets};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
 use crate::parallel;
@@ -109,60 +110,26 @@ pub struct SpacePlacement {
     pub profile_nodes: usize,
 }
 
-/// What is attached: nothing, one, or two, by place in the scene's list.
-fn all_sets(model: &SpaceModel) -> Vec<Vec<usize>> {
-    let scene = model.scene();
-    let singles = (0..scene.paddles.len()).map(|p| vec![p]);
-    singles.chain(scene.pairs.iter().map(|pair| pair.to_vec())).chain([Vec::new()]).collect()
-}
-
 /// Number of times [`place_in_space`] calls its progress function.
 pub fn steps(model: &SpaceModel) -> u64 {
     all_sets(model).len() as u64 * u64::from(model.scene().needle.increments)
 }
 
-/// Responses of every paddle, then every pair, then without any, at rest.
-///
-/// # Errors
-/// [`ModelError`] when the body at rest cannot be solved.
-pub fn rest_responses(model: &SpaceModel) -> Result<Vec<SpaceResponse>, ModelError> {
-    let rest = CondensedRest::new(model)?;
-    all_sets(model).iter().map(|attached| rest.response(attached)).collect()
-}
-
-/// The pair that controls the target best at rest, or the paddle where there are no pairs, by index.
-///
-/// # Errors
-/// [`ModelError`], among them [`ModelError::NoPaddleControls`].
-pub fn best_to_control(model: &SpaceModel) -> Result<Vec<u32>, ModelError> {
-    let (scene, sets) = (model.scene(), all_sets(model));
-    let wanted = if scene.pairs.is_empty() { 1 } else { 2 };
-    let responses = rest_responses(model)?;
-    let measures = sets.iter().zip(&responses).filter(|(set, _)| set.len() == wanted).filter_map(|(set, response)| {
-        let measure = response.controllability?.measure;
-        measure.is_finite().then_some((set, measure))
-    });
-    let best = measures.min_by(|a, b| a.1.total_cmp(&b.1)).ok_or(ModelError::NoPaddleControls)?;
-    Ok(best.0.iter().map(|&p| scene.paddles[p].index).collect())
-}
-
-/// Studies every paddle and pair of the model's scene: at rest on the model itself (`rest`, from [`rest_responses`]), along
-/// the insertion with what the law's nonlinearity adds on `profile`.
+/// Studies every paddle and pair of a scene: as accurately as its model of insertions answers at rest, along the insertion with
+/// what the law's nonlinearity adds on that.
 ///
 /// # Errors
 /// [`ModelError`] when the body at rest cannot be solved. A static run that stops early and paddles that cannot control the
 /// target are results, not errors.
 pub fn place_in_space(
-    model: &SpaceModel,
-    rest: &[SpaceResponse],
-    profile: &SpaceModel,
+    insertions: &InsertionModel,
     threads: usize,
     progress: &(dyn Fn() + Sync),
 ) -> Result<SpacePlacement, ModelError> {
+    let (model, rest) = (insertions.accurate(), insertions.rest());
     let (scene, sets) = (model.scene(), all_sets(model));
-    // The analysis is shared: made before threads ask for it at once.
-    profile.analysis();
-    let studies = parallel::map(sets.len(), threads, |s| follow(profile, &sets[s], rest[s].target_per_depth, progress));
+    insertions.prepare();
+    let studies = parallel::map(sets.len(), threads, |s| follow(insertions, &sets[s], progress));
     let mut studies = studies.into_iter().collect::<Result<Vec<_>, _>>()?;
     let without = studies.pop().unwrap_or_default();
     let mut answers = rest.iter().zip(studies).map(|(rest, study)| answer(rest, study));
@@ -189,7 +156,7 @@ pub fn place_in_space(
     };
     let per_depth = rest.last().map_or_else(Vector3::zeros, |r| r.target_per_depth);
     let no_paddle = SpaceNoPaddle { target_per_depth: per_depth.into(), static_study: without };
-    Ok(SpacePlacement { paddles, pairs, no_paddle, optimum, optimum_single, profile_nodes: profile.nodes() })
+    Ok(SpacePlacement { paddles, pairs, no_paddle, optimum, optimum_single, profile_nodes: insertions.nodes() })
 }
 
 fn answer(rest: &SpaceResponse, static_study: SpaceStatic) -> SpaceAnswer {
@@ -217,27 +184,23 @@ fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-/// Follows the insertion at the scene's increments with some paddles attached and still, until it stops. What the profile
-/// model's own response at rest is off by does not matter: it says what the law's nonlinearity adds to `per_depth`, which is
-/// the target's displacement per depth on the model of the study.
+/// Follows the insertion at the scene's increments with some paddles attached and still, until it stops.
 fn follow(
-    model: &SpaceModel,
+    insertions: &InsertionModel,
     attached: &[usize],
-    per_depth: Vector3<f64>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<SpaceStatic, ModelError> {
-    let needle = &model.scene().needle;
+    let needle = &insertions.scene().needle;
     // As on graded nodes in the plane: where the law loses its stability matters to an eighth of an increment.
-    let mut body = model.body(attached, NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() })?;
+    let mut body = insertions.body(attached, NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() })?;
     let still = vec![Vector3::zeros(); attached.len()];
-    let own = body.depth_sensitivity()?;
     let mut study = SpaceStatic::default();
     for increment in 1..=needle.increments {
         progress();
         let depth = needle.depth * f64::from(increment) / f64::from(needle.increments);
         match body.drive(depth, &still) {
             Ok(()) => {
-                let displacement = body.target_displacement() + (per_depth - own) * depth;
+                let displacement = body.target_displacement();
                 let axial = displacement.dot(&needle.axis);
                 let orthogonal = (displacement - needle.axis * axial).norm();
                 study.depth.push(depth);
