@@ -239,11 +239,14 @@ impl Pareto {
                 percent(self.open.0)
             ),
         };
+        let peers = if self.peers.is_empty() { "" } else { " DOLFINx was timed once, in a run of its own." };
         let conclusion = VIEWS[0].conclusion(&VIEWS[0].front(self));
         let title = conclusion.unwrap_or_else(|| "No method has a point on the front".to_owned());
         Figure {
             title: format!("{title}: error against time, scene {scene}, {tissue} tissue"),
-            caption: format!("{references}{barrier}. Points of the front are named with method and number of nodes."),
+            caption: format!(
+                "{references}{barrier}. Points of the front are named with method and number of nodes.{peers}"
+            ),
             panels: self.views().map(|view| view.panel(self)).collect(),
             columns: 2,
         }
