@@ -105,14 +105,14 @@ impl<'t> BoardPlant<'t> {
         let sensors = Sensors { target, encoders: Encoders::new(table.paddles[0].index) };
         let tissue = LinearTissue::new(table);
         let uncontrolled = tissue.error(&tissue.target(depth_end, &Vector2::zeros())).abs();
-        Self { world: World::of(tissue, drive, PaddleActuator::new(actuator), sensors), tick: 0, uncontrolled }
+        Self { world: World::of(tissue, drive, [PaddleActuator::new(actuator)], sensors), tick: 0, uncontrolled }
     }
 
     /// One period under `command`, if there is one: the error, length, and the inputs of the next step.
     fn advance(&mut self, command: Option<&PaddleCommand>) -> (f64, Inputs) {
         let (truth, inputs) = self.world.tick(self.tick, command, MS).unwrap();
         self.tick += 1;
-        (self.world.tissue.error(&Vector2::from(truth.target)).abs(), inputs)
+        (self.world.tissue.error(&truth.target()).abs(), inputs)
     }
 }
 
@@ -282,7 +282,7 @@ fn the_watchdog_says_safe_and_the_board_starts_disarmed() {
     let (_, inputs) = plant.advance(None);
     assert_eq!(device.step(&inputs, PATIENCE).unwrap(), None, "samples are not answered without a run");
     device.begin(&bytes, &settings()).unwrap();
-    let measured = plant.world.actuator.position();
+    let measured = plant.world.paddle(0).unwrap();
     let first = (0..10).map(|_| drive(&mut device, &mut plant, 1).last).find(PaddleCommand::is_valid).unwrap();
     assert_eq!(Vector2::from(to_plane(first.displacement[0])), measured);
     assert_eq!(first.state, Mode::Hold as u32);

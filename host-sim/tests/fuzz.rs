@@ -92,7 +92,13 @@ fn a_recording() -> Vec<u8> {
     let settings = Settings::new(1_000_000, 20_000_000, 0);
     let header =
         RecordingHeader { mode: RunMode::Lockstep, seed: 1, scene_hash: [7; 32], settings, table: vec![1, 2, 3] };
-    let truth = |tick| Truth { tick, time_ns: tick * 1_000_000, depth: 0.1, target: [0.1, 0.2], paddle: [0.0, 0.3] };
+    let truth = |tick| Truth {
+        tick,
+        time_ns: tick * 1_000_000,
+        depth: 0.1,
+        target: [0.1, 0.2, 0.0],
+        paddles: [[0.0, 0.3, 0.0], [0.0; 3]],
+    };
     let records = (0..20).map(|n| Record { tick: tick(n), truth: (n % 2 == 0).then(|| truth(n)) }).collect();
     Recording { header, records }.encode()
 }

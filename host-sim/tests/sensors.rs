@@ -26,10 +26,10 @@ fn medians(scene: &str, table_tissue: TissueVariant, seeds: u64, change: fn(Sett
             let (mut peak, mut squares, mut way, mut count) = (0.0_f64, 0.0, 0.0, 0.0);
             for tick in 0..simulation.ticks() {
                 let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns).unwrap();
-                let error = scene.needle.orthogonal().dot(&Vector2::from(truth.target));
+                let error = scene.needle.orthogonal().dot(&truth.target::<2>());
                 (peak, squares, count) = (peak.max(error.abs()), squares + error * error, count + 1.0);
-                way += (Vector2::from(truth.paddle) - before).norm();
-                before = Vector2::from(truth.paddle);
+                way += (truth.paddle::<2>() - before).norm();
+                before = truth.paddle();
                 command = Some(controller.step(&mut state, &inputs));
                 if world.since_start_s(truth.time_ns) >= simulation.duration_s {
                     break;

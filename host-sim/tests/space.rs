@@ -1,8 +1,17 @@
 //! The closed loop on a body in space, through the command.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Stdio};
 
+use host_sim::record::recording::{Record, Recording};
+use host_sim::runtime::accounting::tick::ControllerTick;
+use host_sim::runtime::executor::AnyTable;
+use host_sim::world::simulation::Simulation;
+use host_sim::world::space::PreparedBody;
+use model_offline::placement::space::workflow::insertion_model;
+use model_offline::scene::SensorPreset;
+use model_offline::scene::space::{AnyScene, SpaceScene};
+use nalgebra::Vector3;
 use serde_json::Value;
 
 fn run(directory: &Path, arguments: &[&str]) -> std::process::Output {
@@ -32,7 +41,7 @@ fn a_controlled_pair_is_ten_times_better_than_the_best_fixture() {
     let directory = tempfile::tempdir().unwrap();
     // Of all fifteen pairs the best to control is 5 + 6 in both tissues, the best fixture that or 3 + 4.
     let scene = with_pairs(directory.path(), "[[3, 4], [5, 6]]");
-    let output = run_scene(&scene, directory.path(), &["--sensor", "camera"]);
+    let output = run_scene(&scene, directory.path(), &["--sensor", "camera", "--mode", "lockstep"]);
     assert!(output.status.success(), "{output:?}");
     let result = result(directory.path());
     let cases = result["cases"].as_array().unwrap();
@@ -73,7 +82,7 @@ fn an_insertion_follows_its_seed() {
     let directory = tempfile::tempdir().unwrap();
     let scene = with_pairs(directory.path(), "[[5, 6]]");
     let series = |seed: &str| {
-        let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--seed", seed];
+        let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep", "--seed", seed];
         let output = run_scene(&scene, directory.path(), &options);
         assert!(output.status.success(), "{output:?}");
         result(directory.path())["cases"][0]["dynamic"]["series"].clone()
@@ -83,12 +92,212 @@ fn an_insertion_follows_its_seed() {
     assert_ne!(first, series("2"));
 }
 
+/// A scene in space.
+fn read(path: &Path) -> SpaceScene {
+    let AnyScene::Space(scene) = AnyScene::read(path).unwrap() else { panic!("{} is not in space", path.display()) };
+    *scene
+}
+
+/// A command of `host-sim` with these words.
+fn host_sim(words: &[&str], path: &Path) -> std::process::Output {
+    Command::new(env!("CARGO_BIN_EXE_host-sim")).args(words).arg(path).output().unwrap()
+}
+
+/// The columns of a table by the first word of their names.
+fn columns(bytes: &[u8]) -> std::collections::BTreeMap<String, Vec<String>> {
+    let text = std::str::from_utf8(bytes).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let rows: Vec<Vec<String>> = lines.collect();
+    assert!(rows.iter().all(|row| row.len() == names.len()));
+    let column = |k: usize| rows.iter().map(|row| row[k].clone()).collect();
+    let of = |(k, name): (usize, &String)| (name.split(' ').next().unwrap().to_owned(), column(k));
+    names.iter().enumerate().map(of).collect()
+}
+
+/// A recorded pair is replayed bit by bit, and its table has all components of both paddles.
+#[test]
+fn a_recorded_pair_is_replayed_and_exported() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = with_pairs(directory.path(), "[[5, 6]]");
+    let output = run_scene(
+        &scene,
+        directory.path(),
+        &["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep"],
+    );
+    assert!(output.status.success(), "{output:?}");
+    let report = directory.path().join("report");
+    let dynamic = result(directory.path())["cases"][0]["dynamic"].clone();
+    let path = report.join(dynamic["recording"]["file"].as_str().unwrap());
+    let mut recording = Recording::read(&path).unwrap();
+    let ticks = recording.records.len();
+    assert_eq!(dynamic["recording"]["ticks"], ticks);
+    let replayed = host_sim(&["replay"], &path);
+    let said = String::from_utf8_lossy(&replayed.stdout).into_owned();
+    assert!(said.contains(&format!("{ticks} of {ticks} commands agree bit by bit")), "{said}");
+
+    // A line per tick, the same from the recording as from the run.
+    let file = directory.path().join("ticks.csv");
+    let exported = host_sim(&["export", "--csv", file.to_str().unwrap()], &path);
+    assert!(exported.status.success(), "{exported:?}");
+    let bytes = std::fs::read(&file).unwrap();
+    assert_eq!(bytes, std::fs::read(report.join(dynamic["csv"].as_str().unwrap())).unwrap());
+    let columns = columns(&bytes);
+    let last = |name: &str| columns[name].last().unwrap().parse::<f64>().unwrap();
+    let vector = |name: &str| ["x", "y", "z"].map(|axis| last(&format!("{name}_{axis}")));
+    let end = recording.records.last().unwrap();
+    let truth = end.truth.unwrap();
+    assert_eq!([vector("true_paddle"), vector("true_second_paddle")], truth.paddles);
+    assert_eq!([vector("command"), vector("second_command")], end.tick.command.displacement);
+    assert_eq!(vector("measured_second_paddle"), end.tick.inputs.paddles[1].unwrap().displacement);
+    assert!(vector("true_target") == truth.target && truth.paddles.iter().flatten().all(|component| *component != 0.0));
+    in_mcap(&path, &recording);
+    // What is left of the target's way without its part along the needle.
+    let axis = read(&scene).needle.axis;
+    let target = Vector3::from(truth.target);
+    let off = (target - axis * axis.dot(&target)).norm();
+    assert!((last("true_orthogonal_error") - off).abs() < 1e-12 * target.norm(), "{off}");
+
+    // Not a bit of the second paddle's third component is excused.
+    let command = &mut recording.records[ticks / 2].tick.command;
+    command.displacement[1][2] = f64::from_bits(command.displacement[1][2].to_bits() ^ 1);
+    std::fs::write(&path, recording.encode()).unwrap();
+    let replayed = host_sim(&["replay"], &path);
+    let said = String::from_utf8_lossy(&replayed.stderr).replace(['\n', '│'], " ");
+    let said: Vec<&str> = said.split_whitespace().collect();
+    assert_eq!(replayed.status.code(), Some(1));
+    assert!(said.join(" ").contains("displacement z of the second paddle"), "{said:?}");
+}
+
+/// In MCAP the second paddle has a topic of its own, and every component is there.
+fn in_mcap(path: &Path, recording: &Recording) {
+    let file = path.with_extension("exported.mcap");
+    let exported = host_sim(&["export", "--mcap", file.to_str().unwrap()], path);
+    assert!(exported.status.success(), "{exported:?}");
+    let bytes = std::fs::read(&file).unwrap();
+    let messages: Vec<mcap::Message<'_>> = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    let of = |topic: &str| messages.iter().filter(|message| message.channel.topic == topic).collect::<Vec<_>>();
+    let last = |topic: &str| serde_json::from_slice::<Value>(&of(topic).last().unwrap().data).unwrap();
+    let (ticks, end) = (recording.records.len(), recording.records.last().unwrap());
+    assert_eq!((of("/paddle").len(), of("/second_paddle").len()), (ticks, ticks));
+    // JSON's reader is off by a last bit now and then.
+    let same = |told: &Value, value: f64| (told.as_f64().unwrap() / value - 1.0).abs() < 1e-14;
+    assert!(same(&last("/second_paddle")["z"], end.tick.inputs.paddles[1].unwrap().displacement[2]));
+    assert!(same(&last("/command")["second_z"], end.tick.command.displacement[1][2]));
+    let (truth, told) = (end.truth.unwrap(), last("/truth"));
+    assert!(same(&told["target_z"], truth.target[2]) && same(&told["second_paddle_y"], truth.paddles[1][1]));
+}
+
+/// Two processes over shared memory do what one process does, tick by tick and bit by bit: samples of both paddles, commands and truth.
+#[test]
+fn two_processes_do_what_one_does() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = with_pairs(directory.path(), "[[5, 6]]");
+    let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep"];
+    let output = run_scene(&path, directory.path(), &options);
+    assert!(output.status.success(), "{output:?}");
+    let dynamic = result(directory.path())["cases"][0]["dynamic"].clone();
+    let file = directory.path().join("report").join(dynamic["recording"]["file"].as_str().unwrap());
+    let recording = Recording::read(&file).unwrap();
+
+    let scene = read(&path);
+    let model = insertion_model(&scene).unwrap().without_inclusions().unwrap();
+    let table = AnyTable::decode(&recording.header.table).unwrap();
+    let body = PreparedBody::new(&model, &table.paddles(), true, 2).unwrap();
+    let (depth, unit) = (scene.needle.depth, &scene.length_unit);
+    let sensor = SensorPreset::of_unit(unit).sensor(depth, unit).unwrap();
+    let simulation = Simulation::in_space(&scene, sensor).with_insertion(0.5);
+    let settings = recording.header.settings;
+    let mut world = body.world(&simulation);
+    let mut controller = table.on_this_machine(&settings).unwrap();
+    let (mut records, mut command) = (Vec::new(), None);
+    for tick in 0.. {
+        let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns).unwrap();
+        if world.since_start_s(truth.time_ns) >= simulation.duration_s {
+            break;
+        }
+        let answer = controller.step(&inputs).unwrap();
+        records.push(Record { tick: ControllerTick { inputs, command: answer }, truth: Some(truth) });
+        command = Some(answer);
+    }
+    assert!(
+        records.len() > 1000 && records.iter().all(|record| record.tick.inputs.paddles.iter().all(Option::is_some))
+    );
+    let one = Recording { header: recording.header.clone(), records };
+    assert!(one.encode() == std::fs::read(&file).unwrap());
+    let (one, two) = (controller.ledger().unwrap(), &dynamic["ledger"]);
+    for (stream, place) in [("paddle", 0), ("second_paddle", 1)] {
+        assert_eq!(two[stream]["consumed"], one.paddles[place].consumed, "{stream}");
+        assert_eq!(two[stream]["published"], recording.records.len(), "{stream}");
+    }
+    assert_eq!((&two["unaccounted"], &two["ticks"]["due"]), (&0.into(), &recording.records.len().into()));
+    by_hand(directory.path(), &path, &recording);
+}
+
+/// Plant and controller in two terminals do the same; a plant with other paddles than the controller's table is refused.
+fn by_hand(directory: &Path, scene: &Path, recording: &Recording) {
+    let [table, record, json] = ["pair.table", "by-hand.rec", "plant.json"].map(|name| directory.join(name));
+    std::fs::write(&table, &recording.header.table).unwrap();
+    for (paddles, refused) in [("5", Some("for paddles 5 and 6, the plant has paddle 5")), ("5,6", None)] {
+        let link = format!("test-space-{}-{}", std::process::id(), paddles.len());
+        let host_sim = || Command::new(env!("CARGO_BIN_EXE_host-sim"));
+        let mut controller = host_sim();
+        controller.args(["controller", "--link", &link, "--table"]).arg(&table).arg("--record").arg(&record);
+        let controller = controller.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--paddle", paddles, "--link", &link];
+        let mut plant = host_sim();
+        plant.args(["plant", "--scene"]).arg(scene).args(options).arg("--json").arg(&json);
+        let plant = plant.output().unwrap();
+        let controller = { controller }.wait().unwrap();
+        let said = String::from_utf8_lossy(&plant.stderr).replace(['\n', '│'], " ");
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        let Some(refused) = refused else {
+            assert!(plant.status.success() && controller.success(), "{said}");
+            continue;
+        };
+        assert!(plant.status.code() == Some(2) && said.contains(refused), "{said}");
+    }
+    let ticks = |recording: &Recording| recording.records.iter().map(|record| record.tick).collect::<Vec<_>>();
+    assert_eq!(ticks(&Recording::read(&record).unwrap()), ticks(recording));
+    let plant: Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    assert_eq!((&plant["published"][2], &plant["published_second_paddle"]), (&plant["ticks"], &plant["ticks"]));
+}
+
+/// On the machine's clock everything of both paddles is accounted for, and what was recorded is replayed.
+#[test]
+fn a_free_run_in_space_accounts_for_everything() {
+    let directory = tempfile::tempdir().unwrap();
+    let scene = with_pairs(directory.path(), "[[5, 6]]");
+    let options = ["--tissue", "homogeneous", "--insertion-time", "1", "--mode", "free-run", "--sensor", "camera"];
+    let output = run_scene(&scene, directory.path(), &options);
+    assert!(output.status.success(), "{output:?}");
+    let result = result(directory.path());
+    let dynamic = &result["cases"][0]["dynamic"];
+    assert_eq!((&result["mode"], &dynamic["mode"]), (&"free-run".into(), &"free-run".into()));
+    let ledger = &dynamic["ledger"];
+    assert_eq!(ledger["unaccounted"], 0, "{ledger}");
+    assert!(ledger["ticks"]["due"].as_u64().unwrap() >= 1500, "{ledger}");
+    let published = ledger["second_paddle"]["published"].as_u64().unwrap();
+    assert!(published > 1000 && ledger["paddle"]["published"] == published, "{ledger}");
+    for side in ["timing", "plant_timing"] {
+        let timing = &dynamic[side];
+        assert!(timing["ticks"].as_u64().unwrap() + timing["skipped"].as_u64().unwrap() >= 1500, "{timing}");
+    }
+    // Late, lost or skipped: where the controller was in RUN for most of the way, it has held the target.
+    let number = |strategy: &str, what: &str| result["cases"][0][strategy][what].as_f64().unwrap();
+    if number("dynamic", "run_share") > 0.99 {
+        assert!(number("dynamic", "max_orthogonal_error") < 0.5 * number("none", "max_orthogonal_error"), "{dynamic}");
+    }
+    let file = directory.path().join("report").join(dynamic["recording"]["file"].as_str().unwrap());
+    let replayed = host_sim(&["replay"], &file);
+    assert!(replayed.status.success(), "{replayed:?}");
+}
+
 /// What no simulation in space has is refused by name, before anything is computed or written.
 #[test]
 fn what_is_not_there_in_space_is_refused_by_name() {
     for (options, named) in [
-        (&["--mode", "free-run"][..], "--mode free-run"),
-        (&["--controller", "qemu"], "--controller qemu"),
+        (&["--controller", "qemu"][..], "--controller qemu"),
         (&["--view"], "--view"),
         (&["--plant", "full"], "--plant"),
         (&["--world", "shaft"], "--world"),

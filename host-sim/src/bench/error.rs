@@ -226,6 +226,7 @@ fn is_input_of_a_run(error: &RuntimeError) -> bool {
         RuntimeError::Settings(_)
             | RuntimeError::OtherScene
             | RuntimeError::OtherUnits { .. }
+            | RuntimeError::OtherPaddles { .. }
             | RuntimeError::Link(LinkError::Name { .. })
             | RuntimeError::World(WorldError::NoPaddle { .. } | WorldError::TooSlow { .. })
     )

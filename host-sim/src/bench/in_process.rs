@@ -3,7 +3,6 @@
 
 use firmware::{Controller, Feedback, Mode, Settings, State};
 use model_offline::model::TissueModel;
-use nalgebra::Vector2;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -144,8 +143,8 @@ impl<'a> InProcess<'a> {
             command = controller.as_ref().map(|controller| controller.step(&mut state, &inputs));
             visit(Moment {
                 since_start_s,
-                error: normal.dot(&Vector2::from(truth.target)),
-                axial: axis.dot(&Vector2::from(truth.target)),
+                error: normal.dot(&truth.target::<2>()),
+                axial: axis.dot(&truth.target::<2>()),
                 counts: since_start_s >= 0.0 && since_start_s >= simulation.needle.wait_s(),
                 in_run: command.as_ref().is_some_and(|command| command.state == Mode::Run as u32),
             });

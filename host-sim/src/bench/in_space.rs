@@ -1,35 +1,44 @@
 //! Strategies compared on a body in space: no paddle, the best fixture, and the paddles that control the target best.
 //!
-//! One process and simulated time: the firmware's own controller on the body's [table of states](model_offline::reduction::tabulated).
+//! The controller is a process of its own, as in the plane; a [table of states](model_offline::reduction::tabulated) is the tissue.
 
 use std::hint::black_box;
+use std::path::Path;
 use std::time::Instant;
 
-use firmware::inputs::Ledger;
 use firmware::{Faults, Mode};
 use model_offline::output::table_text::hex;
 use model_offline::placement::space::insertion::InsertionModel;
 use model_offline::placement::space::study::{SpaceOptimum, place_in_space};
 use model_offline::placement::space::workflow::insertion_model;
-use model_offline::reduction::{Tabulated, TabulatedBody, TabulationOptions, TabulationReport};
+use model_offline::reduction::{TabulatedBody, TabulationReport};
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
-use model_offline::table::TableOptions;
 use model_offline::table::space::SpaceTable;
-use nalgebra::Vector3;
+use model_offline::table::{TableBuildError, TableOptions};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::error::SimError;
-use crate::runtime::executor::AnyTable;
+use super::insertion::Label;
+use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
+use super::result::RecordingResult;
+use super::strategy::Strategy;
+use crate::record::export::{csv, mcap};
+use crate::record::files::Artifact;
+use crate::record::recording::Record;
+use crate::runtime::accounting::ledger::LedgerResult;
+use crate::runtime::executor::{AnyTable, Hardware};
 use crate::runtime::names;
+use crate::runtime::plant::PlantLoop;
+use crate::runtime::plant::rehearsal::space_in_time;
+use crate::runtime::signals;
+use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
-use crate::world::error::WorldError;
 use crate::world::simulation::Simulation;
-use crate::world::space::{SpaceTissue, SpaceTruth, SpaceWorld};
+use crate::world::space::{PreparedBody, SpaceTissue};
+use crate::world::truth::{Truth, from_frame};
 
-/// Error of the tabulated tissue that is aimed at, over the target's largest orthogonal displacement.
-const TOLERANCE: f64 = 0.01;
 /// Points of a time series in the result.
 const SERIES_POINTS: usize = 500;
 /// States at which the tissue is held against the model that it was tabulated from, after a run.
@@ -46,7 +55,7 @@ pub struct SpaceRun {
     pub dimension: u32,
     /// Labels of length and stress.
     pub units: [String; 2],
-    /// What drove time.
+    /// What drove time in the comparison of strategies.
     pub mode: RunMode,
     /// Seed of the sensors' noise.
     pub seed: u64,
@@ -86,6 +95,9 @@ pub struct SpaceCase {
     pub fixture: SpaceStrategyResult,
     /// The table's paddles, controlled.
     pub dynamic: SpaceStrategyResult,
+    /// The same once more on the machine's clock, where that was not asked for alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dynamic_free_run: Option<SpaceStrategyResult>,
     /// Largest error of `static` over that of `dynamic`.
     pub improvement: f64,
     /// Largest error without a paddle over that of `dynamic`.
@@ -110,6 +122,8 @@ pub struct SpaceTableResult {
 /// One simulated insertion.
 #[derive(Clone, Debug, Serialize)]
 pub struct SpaceStrategyResult {
+    /// What drove time.
+    pub mode: RunMode,
     /// The attached paddles.
     pub paddles: Vec<u32>,
     /// Largest true target displacement orthogonal to the needle, length.
@@ -128,12 +142,23 @@ pub struct SpaceStrategyResult {
     /// Every fault that was ever present.
     #[serde(with = "names::faults")]
     pub faults: Faults,
-    /// Accounts of samples and ticks; none without a controller.
-    pub ledger: Option<Ledger>,
+    /// Faults of the ticks that did not end in RUN, from the needle's start on.
+    #[serde(with = "names::faults")]
+    pub outside_run_for: Faults,
+    /// Accounts of samples, commands and ticks over both processes; none without a controller.
+    pub ledger: Option<LedgerResult>,
+    /// Timing of the controller's loop; free-run only.
+    pub timing: Option<LoopTiming>,
+    /// Timing of the plant's loop; free-run only.
+    pub plant_timing: Option<LoopTiming>,
     /// Seed of the sensors' noise.
     pub seed: u64,
     /// SHA-256 of the table's bytes.
     pub table_hash: Option<String>,
+    /// The recording; none without a controller.
+    pub recording: Option<RecordingResult>,
+    /// Name of the time series.
+    pub csv: Option<String>,
     /// What answered for the tissue.
     pub plant: SpacePlantAccount,
     /// The way of target and paddles, thinned out.
@@ -178,19 +203,35 @@ struct Tissue {
     optimum: SpaceOptimum,
 }
 
+/// What is to be compared.
+#[derive(Clone, Copy, Debug)]
+pub struct SpaceOptions<'a> {
+    /// This program, which is also the controller.
+    pub program: &'a Path,
+    /// Tissue of the simulation; none: both, and the one with inclusions by what homogeneous tissue says.
+    pub tissue: Option<TissueVariant>,
+    /// Tissue that planner and table believe in; none: the simulation's.
+    pub table_tissue: Option<TissueVariant>,
+    /// What drives time; none: lockstep, then the controlled paddles once more in free-run.
+    pub mode: Option<RunMode>,
+    /// Whether controlled insertions are written as MCAP, too.
+    pub mcap: bool,
+    /// Threads for placement and tabulation.
+    pub threads: usize,
+}
+
 /// Compares strategies on a body in space: on both of its tissues, and on the one with inclusions by what homogeneous tissue
-/// says; or on one tissue alone.
+/// says; or on one tissue alone. Recordings and time series come with the result.
 ///
 /// # Errors
 /// [`SimError`].
 pub fn compare(
     scene: &SpaceScene,
-    tissue: Option<TissueVariant>,
-    table_tissue: Option<TissueVariant>,
+    options: &SpaceOptions<'_>,
     simulation: &Simulation,
-    threads: usize,
-) -> Result<SpaceRun, SimError> {
+) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
     let start = Instant::now();
+    let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
     if scene.inclusions.is_empty() && [tissue, table_tissue].contains(&Some(TissueVariant::Inclusion)) {
         return Err(SimError::NoInclusion { scene: scene.name.clone() });
     }
@@ -205,29 +246,22 @@ pub fn compare(
             (TissueVariant::Inclusion, TissueVariant::Homogeneous),
         ],
     };
-    let with = insertion_model(scene)?;
-    let nodes = with.nodes();
-    let study = |model: InsertionModel| -> Result<Tissue, SimError> {
-        let placement = place_in_space(&model, threads, &|| ())?;
-        Ok(Tissue { optimum: placement.optimum, model })
-    };
-    let homogeneous = study(with.without_inclusions()?)?;
-    let inclusion = if scene.inclusions.is_empty() { None } else { Some(study(with)?) };
+    let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
     let of = |variant| match (variant, &inclusion) {
         (TissueVariant::Inclusion, Some(tissue)) => tissue,
         _ => &homogeneous,
     };
-    let mut cases = Vec::new();
+    let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
     for (tissue, believed) in wanted {
-        cases.push(case((tissue, of(tissue)), (believed, of(believed)), simulation, threads)?);
+        cases.push(case((tissue, of(tissue)), (believed, of(believed)), simulation, options, &mut artifacts)?);
     }
     let settings = simulation.loop_settings;
-    Ok(SpaceRun {
+    let result = SpaceRun {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: scene.name.clone(),
         dimension: 3,
         units: [scene.length_unit.clone(), scene.stress_unit.clone()],
-        mode: RunMode::Lockstep,
+        mode: options.mode.unwrap_or(RunMode::Lockstep),
         seed: simulation.seed,
         rate_hz: settings.rate,
         target_rate_hz: settings.target_rate,
@@ -235,31 +269,60 @@ pub fn compare(
         noise: settings.noise_for(simulation.depth),
         depth: simulation.depth,
         insertion_s: simulation.needle.insertion_s(),
-        nodes,
+        nodes: homogeneous.model.nodes(),
         cases,
         wall_s: start.elapsed().as_secs_f64(),
-    })
+    };
+    Ok((result, artifacts))
+}
+
+/// The homogeneous tissue of a scene, and the one with its inclusions where there are any, with what is best on them.
+fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>), SimError> {
+    let with = insertion_model(scene)?;
+    let study = |model: InsertionModel| -> Result<Tissue, SimError> {
+        let placement = place_in_space(&model, threads, &|| ())?;
+        Ok(Tissue { optimum: placement.optimum, model })
+    };
+    let homogeneous = study(with.without_inclusions()?)?;
+    let inclusion = if scene.inclusions.is_empty() { None } else { Some(study(with)?) };
+    Ok((homogeneous, inclusion))
 }
 
 fn case(
     (tissue, world): (TissueVariant, &Tissue),
     (table_tissue, believed): (TissueVariant, &Tissue),
     simulation: &Simulation,
-    threads: usize,
+    options: &SpaceOptions<'_>,
+    artifacts: &mut Vec<Artifact>,
 ) -> Result<SpaceCase, SimError> {
-    let options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
-    let table = SpaceTable::build(&believed.model, &believed.optimum.dynamic, &options)?;
+    let SpaceOptions { program, threads, .. } = *options;
+    let label = |strategy| Label { tissue, table_tissue, strategy };
+    let table_options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
+    let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
+        let body = PreparedBody::new(&world.model, paddles, false, threads)?;
+        Insertion { body: &body, simulation, label: label(strategy), mcap: false }.uncontrolled(artifacts)
+    };
+    let (table, none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
+        let table = SpaceTable::build(&believed.model, &believed.optimum.dynamic, &table_options)?;
+        Ok((table, still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
+    })?;
     let bytes = table.to_bytes()?;
-    let hash = hex(&Sha256::digest(&bytes));
-    let run = Insertion { model: &world.model, simulation, threads };
-    let none = run.of(&[], None)?;
-    let fixture = run.of(&believed.optimum.fixture, None)?;
-    let dynamic = run.of(&believed.optimum.dynamic, Some((&bytes, &hash)))?;
+    let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
+    let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
+        let hardware = Hardware::Native;
+        let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched: false };
+        let label = label(Strategy::dynamic(mode));
+        Insertion { body: &body, simulation, label, mcap: options.mcap }.controlled(controller, artifacts)
+    };
+    let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
+    // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
+    let once_more = options.mode.is_none() && tissue == table_tissue;
+    let dynamic_free_run = if once_more { Some(controlled(RunMode::FreeRun)?) } else { None };
     Ok(SpaceCase {
         tissue,
         table_tissue,
         table: SpaceTableResult {
-            hash,
+            hash: hex(&Sha256::digest(&bytes)),
             scene_hash: hex(&believed.model.scene().hash()),
             paddles: table.paddles(),
             bytes: bytes.len(),
@@ -270,82 +333,91 @@ fn case(
         none,
         fixture,
         dynamic,
+        dynamic_free_run,
     })
 }
 
 /// An insertion that is to be simulated.
-struct Insertion<'a> {
-    model: &'a InsertionModel,
+struct Insertion<'a, 'm> {
+    body: &'a PreparedBody<'m>,
     simulation: &'a Simulation,
-    threads: usize,
+    label: Label,
+    mcap: bool,
 }
 
-impl Insertion<'_> {
-    /// With these paddles attached, steered by a controller with this table, or still.
-    fn of(&self, paddles: &[u32], table: Option<(&[u8], &str)>) -> Result<SpaceStrategyResult, SimError> {
-        let Self { model, simulation, threads } = self;
-        let scene = model.scene();
-        let places = paddles.iter().map(|&index| scene.paddle_position(index)).collect::<Result<Vec<_>, _>>();
-        let attached = places.map_err(model_offline::model::ModelError::from)?;
-        let options = TabulationOptions { tolerance: TOLERANCE, steered: table.is_some(), threads: *threads };
-        let (states, tabulation) = Tabulated::learn(model, &attached, &options).map_err(WorldError::Tabulation)?;
-        let tissue = SpaceTissue::new(model, &attached, &states);
-        let mut world = SpaceWorld::new(tissue, &simulation.needle, paddles, simulation);
-        let settings = simulation.loop_settings.settings(simulation.depth);
-        let decoded = table.map(|(bytes, _)| AnyTable::decode(bytes)).transpose();
-        let decoded = decoded.map_err(model_offline::table::TableBuildError::Invalid)?;
-        let mut controller = decoded.as_ref().map(|table| table.on_this_machine(&settings)).transpose()?;
-        if controller.is_none() {
-            world.started.at(0);
-        }
-        let (mut truths, mut faults) = (Vec::new(), Faults::NONE);
-        let (mut in_run, mut command) = (0_u64, None);
-        for tick in 0..simulation.ticks() {
-            let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns)?;
-            let since_start_s = world.started.since_s(truth.time_ns);
-            if since_start_s >= simulation.duration_s {
-                break;
-            }
-            command = controller.as_mut().map(|controller| controller.step(&inputs)).transpose()?;
-            if since_start_s >= 0.0 {
-                in_run += u64::from(command.as_ref().is_some_and(|command| command.state == Mode::Run as u32));
-                truths.push((since_start_s, truth));
-            }
-            faults |= command.map_or(Faults::NONE, |command| Faults::from_bits(command.faults));
-        }
-        let ledger = controller.as_mut().map(|controller| controller.ledger()).transpose()?;
-        let largest_error = held_against_full(&mut world.tissue, &truths);
-        let plant = SpacePlantAccount {
-            tabulation,
-            step_us: step_us(states.body(), &truths),
-            fallbacks: world.tissue.fallbacks,
-            first_fallback: world.tissue.first_fallback.clone(),
-            largest_estimate: world.tissue.largest_estimate,
-            largest_error,
+impl Insertion<'_, '_> {
+    /// Without a controller: paddles stay where they rest.
+    fn uncontrolled(&self, artifacts: &mut Vec<Artifact>) -> Result<SpaceStrategyResult, SimError> {
+        let mut plant = PlantLoop::new(self.body.world(self.simulation), self.simulation);
+        plant.uncontrolled(self.simulation.loop_settings.period_ns(), &|| ())?;
+        Ok(self.measured(&mut plant, RunMode::Lockstep, &[], artifacts))
+    }
+
+    /// Steered by a controller in a process of its own.
+    fn controlled(
+        &self,
+        controller: LinkedController<'_>,
+        artifacts: &mut Vec<Artifact>,
+    ) -> Result<SpaceStrategyResult, SimError> {
+        let Self { body, simulation, label, mcap } = *self;
+        let world = match controller.mode {
+            RunMode::Lockstep => body.world(simulation),
+            RunMode::FreeRun => signals::ends_at_once(|| space_in_time(body, simulation))?,
         };
-        let mut result = self.measured(paddles, &truths, plant);
-        result.run_share = controller.is_some().then(|| in_run as f64 / truths.len().max(1) as f64);
-        result.final_state = command.and_then(|command| Mode::from_wire(command.state));
-        (result.faults, result.ledger) = (faults, ledger);
-        result.table_hash = table.map(|(_, hash)| hash.to_owned());
+        let linked = LinkedInsertion { controller, simulation, progress: &|| () };
+        let mut run = linked.run(PlantLoop::new(world, simulation), |_| ())?;
+        let table = AnyTable::decode(controller.table_bytes).map_err(TableBuildError::Invalid)?;
+        let recording = run.recording(&controller, simulation, body.model().scene().hash(), table.depth_end());
+        let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);
+        let RunShare { share, outside } = run.run_share(started_ns);
+        let measured = || self.measured(&mut run.plant, controller.mode, &recording.records, artifacts);
+        let mut result = signals::ends_at_once(measured);
+        let file = Artifact { name: label.file("rec"), bytes: recording.encode() };
+        result.recording = Some(RecordingResult::of(&file, recording.records.len() as u64));
+        artifacts.push(file);
+        if mcap {
+            let scene = body.model().scene();
+            let (orthogonal, paddles) = (scene.needle.orthogonal(), body.paddles().len());
+            let series = csv::Series { orthogonal: &orthogonal, paddles, length: &scene.length_unit };
+            let bytes = mcap::encode(&recording, &series, mcap::Known::default())?;
+            artifacts.push(Artifact { name: label.file("mcap"), bytes });
+        }
+        result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
+        (result.run_share, result.outside_run_for) = (Some(share), outside);
+        (result.final_state, result.faults) = (run.accounts.final_state, run.accounts.faults);
+        (result.timing, result.plant_timing) = (run.accounts.timing, run.plant_timing);
+        result.ledger = Some(run.ledger);
         Ok(result)
     }
 
-    /// What the true motion of the target amounts to.
-    fn measured(&self, paddles: &[u32], truths: &[(f64, SpaceTruth)], plant: SpacePlantAccount) -> SpaceStrategyResult {
-        let needle = &self.model.scene().needle;
-        let (orthogonal, axis) = (needle.orthogonal(), needle.axis);
-        let error = |truth: &SpaceTruth| orthogonal.tr_mul(&truth.target).norm();
-        let worst = truths.iter().map(|(_, truth)| truth).max_by(|a, b| error(a).total_cmp(&error(b)));
-        let squares: f64 = truths.iter().map(|(_, truth)| error(truth).powi(2)).sum();
-        let way = |pair: &[(f64, SpaceTruth)]| -> f64 {
-            let steps = pair[0].1.paddles.iter().zip(&pair[1].1.paddles);
-            steps.map(|(from, to)| (to - from).norm()).sum()
+    /// What the true motion of the target amounts to, with its time series.
+    fn measured(
+        &self,
+        plant: &mut PlantLoop<SpaceTissue<'_>, 3>,
+        mode: RunMode,
+        records: &[Record],
+        artifacts: &mut Vec<Artifact>,
+    ) -> SpaceStrategyResult {
+        let Self { body, simulation, label, .. } = *self;
+        let (scene, paddles) = (body.model().scene(), body.paddles());
+        let (orthogonal, axis) = (scene.needle.orthogonal(), scene.needle.axis);
+        let series = csv::Series { orthogonal: &orthogonal, paddles: paddles.len(), length: &scene.length_unit };
+        let table = Artifact { name: label.file("csv"), bytes: series.insertion(plant.truths(), records) };
+        let started_ns = plant.world().needle_started_ns().unwrap_or(0);
+        let moving = plant.truths().partition_point(|truth| truth.time_ns < started_ns);
+        let truths = plant.truths()[moving..].to_vec();
+        let error = |truth: &Truth| orthogonal.tr_mul(&truth.target::<3>()).norm();
+        let worst = truths.iter().max_by(|a, b| error(a).total_cmp(&error(b)));
+        let squares: f64 = truths.iter().map(|truth| error(truth).powi(2)).sum();
+        let way = |pair: &[Truth]| -> f64 {
+            let steps = pair[0].paddles.iter().zip(&pair[1].paddles);
+            steps.map(|(from, to)| (from_frame::<3>(*to) - from_frame::<3>(*from)).norm()).sum()
         };
         let stride = truths.len().div_ceil(SERIES_POINTS - 1).max(1);
         let last = truths.len().saturating_sub(1);
         let kept = truths.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
-        SpaceStrategyResult {
+        let result = SpaceStrategyResult {
+            mode,
             paddles: paddles.to_vec(),
             max_orthogonal_error: worst.map_or(0.0, error),
             max_error_depth: worst.map_or(0.0, |truth| truth.depth),
@@ -355,38 +427,60 @@ impl Insertion<'_> {
             final_state: None,
             run_share: None,
             faults: Faults::NONE,
+            outside_run_for: Faults::NONE,
             ledger: None,
-            seed: self.simulation.seed,
+            timing: None,
+            plant_timing: None,
+            seed: simulation.seed,
             table_hash: None,
-            plant,
+            recording: None,
+            csv: Some(table.name.clone()),
+            plant: self.plant_account(&mut plant.world().tissue, &truths),
             series: kept
-                .map(|(_, (time_s, truth))| SpaceSeriesPoint {
-                    time_s: *time_s,
+                .map(|(_, truth)| SpaceSeriesPoint {
+                    time_s: csv::seconds_since(truth.time_ns, started_ns),
                     depth: truth.depth,
                     orthogonal_error: error(truth),
-                    axial: axis.dot(&truth.target),
-                    paddles: truth.paddles.iter().map(|p: &Vector3<f64>| (*p).into()).collect(),
+                    axial: axis.dot(&truth.target::<3>()),
+                    paddles: truth.paddles.iter().take(paddles.len()).copied().collect(),
                 })
                 .collect(),
+        };
+        artifacts.push(table);
+        result
+    }
+
+    /// What answered for the tissue, and how well.
+    fn plant_account(&self, tissue: &mut SpaceTissue<'_>, truths: &[Truth]) -> SpacePlantAccount {
+        let Self { body, .. } = *self;
+        let (fallbacks, first_fallback) = (tissue.fallbacks, tissue.first_fallback.clone());
+        SpacePlantAccount {
+            tabulation: body.report.clone(),
+            step_us: step_us(body.table().body(), body.paddles().len(), truths),
+            fallbacks,
+            first_fallback,
+            largest_estimate: tissue.largest_estimate,
+            largest_error: held_against_full(tissue, truths),
         }
     }
 }
 
 /// Mean time of a step, µs, on the way of a run.
-fn step_us(mut body: TabulatedBody, truths: &[(f64, SpaceTruth)]) -> f64 {
+fn step_us(mut body: TabulatedBody, paddles: usize, truths: &[Truth]) -> f64 {
     let start = Instant::now();
-    for (_, truth) in truths {
+    for truth in truths {
         // Where the table does not reach, finding that out is what a step takes.
-        let _ = black_box(body.drive(truth.depth, &truth.paddles));
+        let places = truth.paddles.map(from_frame);
+        let _ = black_box(body.drive(truth.depth, &places[..paddles]));
     }
     start.elapsed().as_secs_f64() * 1e6 / truths.len().max(1) as f64
 }
 
 /// The largest distance of the tissue from its full model at some states of a run, in their order.
-fn held_against_full(tissue: &mut SpaceTissue<'_>, truths: &[(f64, SpaceTruth)]) -> Option<f64> {
+fn held_against_full(tissue: &mut SpaceTissue<'_>, truths: &[Truth]) -> Option<f64> {
     let every = truths.len().div_ceil(CHECKS).max(1);
     let mut largest = 0.0_f64;
-    for (_, truth) in truths.iter().step_by(every).chain(truths.last()) {
+    for truth in truths.iter().step_by(every).chain(truths.last()) {
         largest = largest.max(tissue.held_against_full(truth).ok()?);
     }
     Some(largest)

@@ -7,11 +7,13 @@ use model_offline::discretization::Integration;
 pub use model_offline::output::{Geometry, PaddleGeometry};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
 
 use super::causes::CausesResult;
 use super::strategy::Strategy;
 use super::study_failure::StudyFailure;
 use super::table_tissue::TableTissue;
+use crate::record::files::Artifact;
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
@@ -19,6 +21,7 @@ use crate::runtime::time::mode::RunMode;
 use crate::world::tissue::PlantAccount;
 use crate::world::truth::NeedleMoment;
 use model_offline::needle::StationState;
+use model_offline::output::table_text::hex;
 use model_offline::scene::TissueVariant;
 
 /// Version of this format.
@@ -419,6 +422,13 @@ pub struct RecordingResult {
     pub sha256: String,
     /// Its ticks.
     pub ticks: u64,
+}
+
+impl RecordingResult {
+    /// Of this file with so many ticks.
+    pub fn of(file: &Artifact, ticks: u64) -> Self {
+        Self { file: file.name.clone(), sha256: hex(&Sha256::digest(&file.bytes)), ticks }
+    }
 }
 
 /// A point of a time series.

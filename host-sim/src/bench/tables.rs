@@ -115,7 +115,7 @@ fn insert<T: Scalar>(
     let mut command: Option<PaddleCommand> = None;
     for tick in 0..simulation.ticks() {
         let (truth, inputs) = world.tick(tick, command.as_ref(), settings.loop_period_ns)?;
-        largest = largest.max(Vector2::from(truth.target).dot(&normal).abs());
+        largest = largest.max(truth.target::<2>().dot(&normal).abs());
         command = Some(controller.step(&mut state, &inputs));
         seen.push(inputs);
         if world.since_start_s(truth.time_ns) >= simulation.duration_s {

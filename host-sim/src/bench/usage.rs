@@ -11,9 +11,7 @@ use crate::world::needle::RecordedNeedleError;
 #[non_exhaustive]
 pub enum UsageError {
     /// What no simulation of a body in space has yet.
-    #[error(
-        "{option} is for scenes in the plane: a body in space is simulated in lockstep, in one process, by its table of states"
-    )]
+    #[error("{option} is for scenes in the plane: a body in space is simulated by its table of states")]
     NotInSpace {
         /// The option.
         option: String,

@@ -93,7 +93,8 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
         control_loop = control_loop.with_panic_at(tick);
     }
     let parent = args.parent.and_then(rustix::process::Pid::from_raw);
-    let introduction = Introduction { scene_hash: hex(&table.scene_hash()), units: table.units() };
+    let (scene_hash, units, paddles) = (hex(&table.scene_hash()), table.units(), table.paddles());
+    let introduction = Introduction { scene_hash, units, paddles };
     let service = Service { mode: args.mode, loop_settings, timeout, parent, introduction };
     let served = serve(control_loop, &Space::new(&args.link)?, &service)?;
     hand_in(args, served)

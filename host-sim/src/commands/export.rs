@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use firmware::contract::{Header, decode};
 use host_sim::SimError;
+use host_sim::bench::usage::UsageError;
 use host_sim::record::export::foxglove::Stage;
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
@@ -40,20 +42,41 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
     check_outputs(&inputs, &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
     let Salvaged { recording, damage } =
         if args.salvage { Recording::salvage(&args.recording)? } else { Recording::read(&args.recording)?.into() };
-    let table = firmware::contract::decode::<f64, 2, 1, 1>(&recording.header.table)
-        .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
+    let shape = Header::read(&recording.header.table).map_or((2, 2), |header| (header.dimension, header.paddle_dof));
+    let files = match shape {
+        (3, 3) => files::<3, 2, 1>(args, &recording),
+        (3, _) => files::<3, 2, 2>(args, &recording),
+        _ => files::<2, 1, 1>(args, &recording),
+    };
     let mut said: Vec<String> = damage.map(|damage| format!("damaged: {damage}")).into_iter().collect();
-    if let Some(path) = &args.mcap {
-        let stage = args.scene.as_deref().map(|scene| stage(scene, &recording, table.paddles[0].index)).transpose()?;
-        let known = mcap::Known { stage: stage.as_ref(), ..mcap::Known::default() };
-        let bytes = mcap::encode(&recording, table.orthogonal.into(), known)?;
+    for (path, bytes) in files? {
         said.push(written(path, &bytes)?);
-    }
-    if let Some(path) = &args.csv {
-        said.push(written(path, &csv::recording(&recording, &table.orthogonal, table.units.length.as_str()))?);
     }
     println!("{} ticks, {}\n{}", recording.records.len(), recording.header.mode, said.join("\n"));
     Ok(())
+}
+
+/// What was asked for, of a recording in D dimensions with N directions orthogonal to the needle and P paddles.
+fn files<'a, const D: usize, const N: usize, const P: usize>(
+    args: &'a ExportArgs,
+    recording: &Recording,
+) -> Result<Vec<(&'a Path, Vec<u8>)>, SimError> {
+    let table = decode::<f64, D, N, P>(&recording.header.table)
+        .map_err(|source| SimError::Table { path: args.recording.clone(), source })?;
+    let series = csv::Series { orthogonal: &table.orthogonal, paddles: P, length: table.units.length.as_str() };
+    let mut files = Vec::new();
+    if let Some(path) = &args.mcap {
+        if D > 2 && args.scene.is_some() {
+            return Err(UsageError::NotInSpace { option: "--scene".to_owned() }.into());
+        }
+        let stage = args.scene.as_deref().map(|scene| stage(scene, recording, table.paddles[0].index)).transpose()?;
+        let known = mcap::Known { stage: stage.as_ref(), ..mcap::Known::default() };
+        files.push((path.as_path(), mcap::encode(recording, &series, known)?));
+    }
+    if let Some(path) = &args.csv {
+        files.push((path.as_path(), series.recording(recording)));
+    }
+    Ok(files)
 }
 
 /// The scene of a recording, with or without its inclusions.

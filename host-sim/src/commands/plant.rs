@@ -4,19 +4,27 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
+use firmware::contract::frames::MAX_PADDLES;
 use host_sim::SimError;
 use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
+use host_sim::runtime::peer::introduction::Expected;
 use host_sim::runtime::plant::PlantLoop;
-use host_sim::runtime::plant::process::{Expected, OnDeath, Visit, serve};
-use host_sim::runtime::plant::rehearsal::world_in_time;
+use host_sim::runtime::plant::process::{OnDeath, PlantResult, Visit, serve};
+use host_sim::runtime::plant::rehearsal::{space_in_time, world_in_time};
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::World;
+use host_sim::world::simulation::Simulation;
+use host_sim::world::space::PreparedBody;
 use host_sim::world::tissue::{AttachedPaddle, Reductions};
 use model_offline::output::table_text::hex;
+use model_offline::parallel;
 use model_offline::placement::model_with_paddle;
+use model_offline::placement::space::workflow::insertion_model;
 use model_offline::scene::TissueVariant;
+use model_offline::scene::space::SpaceScene;
+use model_offline::table::TableBuildError;
 
 use super::world_args::{PATIENCE, WorldArgs};
 use model_offline::output::check_outputs;
@@ -30,9 +38,10 @@ pub(crate) struct PlantArgs {
     /// Tissue of the simulation [default: the scene as it is]
     #[arg(long, value_enum)]
     pub(crate) tissue: Option<TissueVariant>,
-    /// Index of the attached paddle [default: the best dynamic one]
-    #[arg(long, value_name = "K")]
-    pub(crate) paddle: Option<u32>,
+    /// Index of the attached paddle; of a scene in space one or two, as in `5,6` [default: the best to control with, in space
+    /// the best pair]
+    #[arg(long, value_name = "K", value_delimiter = ',', num_args = 1)]
+    pub(crate) paddle: Vec<u32>,
     /// Name of the link in shared memory; the same on both sides
     #[arg(long, default_value = "by-hand", value_name = "NAME")]
     pub(crate) link: String,
@@ -61,37 +70,100 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     signals::install();
     super::sweep();
     PATIENCE.check(args.patience)?;
+    if let Some(scene) = args.world.scene_in_space()? {
+        return in_space(args, &scene);
+    }
     let whole = args.world.scene()?;
     let scene = args.tissue.unwrap_or(TissueVariant::Inclusion).of(&whole);
     let simulation = args.world.simulation(&scene)?;
-    let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).collect();
-    check_outputs(&inputs, &[("--json", args.json.as_deref())])?;
-    let (model, paddle) = signals::ends_at_once(|| model_with_paddle(&scene, args.paddle))?;
+    check_json(args, &[])?;
+    let paddle = match args.paddle[..] {
+        [] => None,
+        [index] => Some(index),
+        _ => return Err(TableBuildError::Paddles(args.paddle.len()).into()),
+    };
+    let (model, paddle) = signals::ends_at_once(|| model_with_paddle(&scene, paddle))?;
     let world = signals::ends_at_once(|| match args.mode {
         RunMode::Lockstep => World::new(&model, Some(paddle), &simulation),
         RunMode::FreeRun => world_in_time(&model, AttachedPaddle::Moved(paddle), &simulation, &Reductions::default()),
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
-    let visit = Visit {
+    let expected = Expected {
+        scene_hashes: [&whole, &whole.without_a_past()]
+            .into_iter()
+            .flat_map(|scene| TissueVariant::ALL.iter().map(|tissue| hex(&tissue.of(scene).hash())))
+            .collect(),
+        units: [scene.length_unit.clone(), scene.stress_unit.clone()],
+        paddles: None,
+    };
+    let visit = visit(args, &simulation, expected);
+    let result = serve(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
+    end(args, &result, &format!("paddle {paddle}"))
+}
+
+/// The same of a body in space.
+fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
+    let simulation = args.world.simulation_in_space(scene)?;
+    let files: Vec<&Path> = scene.files.iter().map(PathBuf::as_path).collect();
+    check_json(args, &files)?;
+    if scene.inclusions.is_empty() && args.tissue == Some(TissueVariant::Inclusion) {
+        return Err(SimError::NoInclusion { scene: scene.name.clone() });
+    }
+    let (whole, paddles) = signals::ends_at_once(|| -> Result<_, SimError> {
+        let whole = insertion_model(scene)?;
+        let paddles = match args.paddle.is_empty() {
+            true => whole.best_to_control()?,
+            false => args.paddle.clone(),
+        };
+        Ok((whole, paddles))
+    })?;
+    if !(1..=MAX_PADDLES).contains(&paddles.len()) {
+        return Err(TableBuildError::Paddles(paddles.len()).into());
+    }
+    let homogeneous = whole.without_inclusions();
+    let model = if args.tissue == Some(TissueVariant::Homogeneous) { &homogeneous } else { &whole };
+    let threads = parallel::threads(None);
+    let world = signals::ends_at_once(|| -> Result<_, SimError> {
+        let body = PreparedBody::new(model, &paddles, true, threads)?;
+        Ok(match args.mode {
+            RunMode::Lockstep => body.world(&simulation),
+            RunMode::FreeRun => space_in_time(&body, &simulation)?,
+        })
+    })?;
+    let mut plant = PlantLoop::new(world, &simulation);
+    let expected = Expected {
+        scene_hashes: [&whole, &homogeneous].map(|model| hex(&model.scene().hash())).into(),
+        units: [scene.length_unit.clone(), scene.stress_unit.clone()],
+        paddles: Some(paddles.clone()),
+    };
+    let visit = visit(args, &simulation, expected);
+    let result = serve(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
+    let names: Vec<String> = paddles.iter().map(u32::to_string).collect();
+    end(args, &result, &format!("paddle {}", names.join(" + ")))
+}
+
+/// Refuses a result that would replace what is read.
+fn check_json(args: &PlantArgs, files: &[&Path]) -> Result<(), SimError> {
+    let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).chain(files.iter().copied()).collect();
+    Ok(check_outputs(&inputs, &[("--json", args.json.as_deref())])?)
+}
+
+/// How the plant is served; its controller's table is to be as `expected`.
+fn visit(args: &PlantArgs, simulation: &Simulation, expected: Expected) -> Visit {
+    Visit {
         mode: args.mode,
         loop_settings: simulation.loop_settings,
         timeout: Duration::from_secs_f64(args.patience),
         on_death: if args.keep { OnDeath::AwaitNext } else { OnDeath::Stop },
-        expected: (!args.allow_other_scene).then(|| Expected {
-            scene_hashes: [&whole, &whole.without_a_past()]
-                .into_iter()
-                .flat_map(|scene| TissueVariant::ALL.iter().map(|tissue| hex(&tissue.of(scene).hash())))
-                .collect(),
-            units: [scene.length_unit.clone(), scene.stress_unit.clone()],
-        }),
-    };
-    let result = serve(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
-    if let Some(path) = &args.json {
-        write_json(path, &result)?;
+        expected: (!args.allow_other_scene).then_some(expected),
     }
-    println!(
-        "{} ticks with paddle {paddle}; largest orthogonal target displacement {:.6}",
-        result.ticks, result.largest_error
-    );
+}
+
+/// Writes and says what happened.
+fn end(args: &PlantArgs, result: &PlantResult, with: &str) -> Result<(), SimError> {
+    if let Some(path) = &args.json {
+        write_json(path, result)?;
+    }
+    println!("{} ticks with {with}; largest orthogonal target displacement {:.6}", result.ticks, result.largest_error);
     Ok(())
 }

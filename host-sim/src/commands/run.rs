@@ -110,11 +110,9 @@ impl RunArgs {
     fn in_space(&self) -> SpaceJob<'_> {
         let given = [
             (self.table.is_some(), "--table"),
-            (self.mode == Some(RunMode::FreeRun), "--mode free-run"),
             (self.hardware != Hardware::Native, "--controller qemu"),
             (self.scalar != TableScalar::F64, "--scalar f32"),
             (self.view, "--view"),
-            (self.mcap, "--mcap"),
             (self.vtu, "--vtu"),
             (self.causes, "--causes"),
         ];
@@ -122,6 +120,8 @@ impl RunArgs {
             world: &self.world,
             tissue: self.tissue,
             table_tissue: self.table_tissue,
+            mode: self.mode,
+            mcap: self.mcap,
             out: &self.out,
             json: self.json.as_deref(),
             quiet: self.quiet,

@@ -1,12 +1,13 @@
 //! `host-sim run` of a body in space.
 
 use host_sim::SimError;
-use host_sim::bench::in_space;
+use host_sim::bench::in_space::{self, SpaceOptions};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_space_run};
 use host_sim::report::terminal::space_summary::summary;
-use host_sim::runtime::signals;
+use host_sim::runtime::error::RuntimeError;
+use host_sim::runtime::time::mode::RunMode;
 use model_offline::parallel;
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
@@ -24,6 +25,10 @@ pub(super) struct SpaceJob<'a> {
     pub(super) tissue: Option<TissueVariant>,
     /// Tissue that the table believes in.
     pub(super) table_tissue: Option<TissueVariant>,
+    /// What drives time.
+    pub(super) mode: Option<RunMode>,
+    /// Controlled insertions as MCAP, too.
+    pub(super) mcap: bool,
     /// Directory for the report.
     pub(super) out: &'a Path,
     /// File for the result.
@@ -49,9 +54,11 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     let inputs: Vec<&Path> = args.world.scene.iter().chain(&scene.files).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json, args.out)?;
     let threads = parallel::threads(args.threads);
-    let compared =
-        signals::ends_at_once(|| in_space::compare(scene, args.tissue, args.table_tissue, &simulation, threads))?;
-    write_space_run(args.out, &compared)?;
+    let program = std::env::current_exe().map_err(RuntimeError::Spawn)?;
+    let SpaceJob { tissue, table_tissue, mode, mcap, .. } = *args;
+    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, mcap, threads };
+    let (compared, artifacts) = in_space::compare(scene, &options, &simulation)?;
+    write_space_run(args.out, &compared, artifacts)?;
     if let Some(path) = args.json {
         write_json(path, &compared)?;
     }

@@ -1,5 +1,7 @@
 //! Little-endian fields, written and read one after the other.
 
+use firmware::contract::frames::MAX_DIMENSION;
+
 /// Appends fields.
 #[derive(Clone, Debug, Default)]
 pub struct ByteWriter(pub Vec<u8>);
@@ -23,12 +25,6 @@ impl ByteWriter {
     /// Appends the bits of a number.
     pub fn f64(&mut self, value: f64) {
         self.u64(value.to_bits());
-    }
-
-    /// Appends two numbers.
-    pub fn vector(&mut self, vector: &[f64; 2]) {
-        self.f64(vector[0]);
-        self.f64(vector[1]);
     }
 }
 
@@ -66,8 +62,8 @@ impl<'a> ByteReader<'a> {
         self.u64().map(f64::from_bits)
     }
 
-    /// Takes two numbers.
-    pub fn vector(&mut self) -> Option<[f64; 2]> {
-        Some([self.f64()?, self.f64()?])
+    /// Takes the components of a displacement.
+    pub fn displacement(&mut self) -> Option<[f64; MAX_DIMENSION]> {
+        Some([self.f64()?, self.f64()?, self.f64()?])
     }
 }

@@ -1,9 +1,9 @@
-//! What goes between plant and controller: in shared memory five publish–subscribe services of iceoryx2 and nothing else,
+//! What goes between plant and controller: in shared memory five publish–subscribe services of iceoryx2, six with a second paddle, and nothing else,
 //! and the serial line to a controller on a [`board`].
 //!
 //! | service | from | to | when |
 //! |---|---|---|---|
-//! | `needle`, `paddle` | plant | controller | at loop rate |
+//! | `needle`, `paddle`, `second-paddle` | plant | controller | at loop rate |
 //! | `target` | plant | controller | at the sensor's own rate, late by its latency |
 //! | `clock` | plant | controller | lockstep: every tick; free-run: start and stop |
 //! | `command` | controller | plant | one per tick |

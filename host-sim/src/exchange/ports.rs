@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use firmware::contract::frames::MAX_PADDLES;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::io::{CommandSink, SampleSource};
 use iceoryx2::node::{Node, NodeBuilder};
@@ -22,6 +23,9 @@ fn node<S: Service>(space: &Space) -> Result<Node<S>, LinkError> {
         .create::<S>()
         .map_err(LinkError::Node)
 }
+
+/// Name of the service that carries the second paddle's samples.
+const SECOND_PADDLE: &str = "second-paddle";
 
 /// How long a place is tried that the dead still hold, and how often.
 const DEAD_TIMEOUT: Duration = Duration::from_secs(5);
@@ -60,8 +64,10 @@ pub struct PlantPorts<S: Service> {
     pub needle: Sender<S, NeedleSample>,
     /// Target samples out.
     pub target: Sender<S, TargetSample>,
-    /// Paddle samples out.
+    /// Samples of the only or the first paddle out.
     pub paddle: Sender<S, PaddleSample>,
+    /// Samples of the second paddle out, where there is one.
+    pub second_paddle: Option<Sender<S, PaddleSample>>,
     /// Clock frames out.
     pub clock: Sender<S, ClockFrame>,
     /// Commands in.
@@ -73,11 +79,19 @@ pub struct PlantPorts<S: Service> {
 }
 
 impl<S: Service> PlantPorts<S> {
-    /// Opens the plant's side.
+    /// Opens the plant's side for one paddle.
     ///
     /// # Errors
     /// [`LinkError`].
     pub fn open(space: &Space) -> Result<Self, LinkError> {
+        Self::open_for(space, 1)
+    }
+
+    /// Opens the plant's side for one paddle or two.
+    ///
+    /// # Errors
+    /// [`LinkError`].
+    pub fn open_for(space: &Space, paddles: usize) -> Result<Self, LinkError> {
         patiently::<S, _>(space, |presence| {
             let node = node::<S>(space)?;
             Ok(Self {
@@ -85,6 +99,7 @@ impl<S: Service> PlantPorts<S> {
                 needle: Sender::new(&node)?,
                 target: Sender::new(&node)?,
                 paddle: Sender::new(&node)?,
+                second_paddle: (paddles > 1).then(|| Sender::of(&node, SECOND_PADDLE)).transpose()?,
                 clock: Sender::new(&node)?,
                 space: space.clone(),
                 _node: node,
@@ -93,7 +108,17 @@ impl<S: Service> PlantPorts<S> {
         })
     }
 
-    /// Whether the controller has opened its side.
+    /// Publishes the samples of a tick, in the order of the controller's table.
+    ///
+    /// # Errors
+    /// [`LinkError::Send`].
+    pub fn send_paddles(&mut self, samples: &[Option<PaddleSample>; MAX_PADDLES]) -> Result<(), LinkError> {
+        let senders = [Some(&mut self.paddle), self.second_paddle.as_mut()];
+        let mut sent = senders.into_iter().zip(samples).filter_map(|(sender, sample)| sender.zip(*sample));
+        sent.try_for_each(|(sender, sample)| sender.send(sample))
+    }
+
+    /// Whether the controller has opened its side. It may be one of fewer paddles, which hears nothing of the second.
     pub fn has_peer(&self) -> bool {
         self.needle.has_reader()
             && self.target.has_reader()
@@ -111,6 +136,7 @@ impl<S: Service> PlantPorts<S> {
         self.needle.connect()?;
         self.target.connect()?;
         self.paddle.connect()?;
+        self.second_paddle.iter().try_for_each(Sender::connect)?;
         self.clock.connect()?;
         self.space.secure()
     }
@@ -131,6 +157,7 @@ pub struct ControllerPorts<S: Service> {
     needle: Receiver<S, NeedleSample>,
     target: Receiver<S, TargetSample>,
     paddle: Receiver<S, PaddleSample>,
+    second_paddle: Option<Receiver<S, PaddleSample>>,
     /// Clock frames in.
     pub clock: Receiver<S, ClockFrame>,
     /// Commands out.
@@ -143,17 +170,26 @@ pub struct ControllerPorts<S: Service> {
 }
 
 impl<S: Service> ControllerPorts<S> {
-    /// Opens the controller's side; its command publisher comes last and tells the plant that all is ready.
+    /// Opens the side of a controller of one paddle; its command publisher comes last and tells the plant that all is ready.
     ///
     /// # Errors
     /// [`LinkError`]; [`LinkError::Taken`] for a second controller.
     pub fn open(space: &Space) -> Result<Self, LinkError> {
+        Self::open_for(space, 1)
+    }
+
+    /// The same of a controller of one paddle or two.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_for(space: &Space, paddles: usize) -> Result<Self, LinkError> {
         patiently::<S, _>(space, |presence| {
             let node = node::<S>(space)?;
             Ok(Self {
                 needle: Receiver::new(&node)?,
                 target: Receiver::new(&node)?,
                 paddle: Receiver::new(&node)?,
+                second_paddle: (paddles > 1).then(|| Receiver::of(&node, SECOND_PADDLE)).transpose()?,
                 clock: Receiver::new(&node)?,
                 command: Sender::new(&node)?,
                 failed: None,
@@ -177,6 +213,16 @@ impl<S: Service> ControllerPorts<S> {
         let _owner_only = Space::owner_only();
         self.command.connect()?;
         self.space.secure()
+    }
+
+    /// Whether a second paddle is heard of.
+    pub fn has_second_paddle(&self) -> bool {
+        self.second_paddle.is_some()
+    }
+
+    /// The newest samples of the paddles, in the order of the table.
+    pub fn paddles(&mut self) -> [Option<PaddleSample>; MAX_PADDLES] {
+        std::array::from_fn(|place| self.paddle(place))
     }
 
     /// What the receivers of needle, target and paddle samples counted.
@@ -207,12 +253,13 @@ impl<S: Service> SampleSource for ControllerPorts<S> {
         self.keep(outcome)
     }
 
-    /// One paddle so far: nothing is ever heard of a second one.
     fn paddle(&mut self, place: usize) -> Option<PaddleSample> {
-        if place > 0 {
-            return None;
-        }
-        let outcome = self.paddle.newest();
+        let receiver = match place {
+            0 => Some(&mut self.paddle),
+            1 => self.second_paddle.as_mut(),
+            _ => None,
+        };
+        let outcome = receiver?.newest();
         self.keep(outcome)
     }
 }

@@ -26,8 +26,8 @@ const IN_FLUX_TIMEOUT: Duration = Duration::from_millis(500);
 
 type Factory<S, F> = PortFactory<S, Wire<F>, ()>;
 
-fn open<S: Service, F: WireFrame>(node: &Node<S>) -> Result<Factory<S, F>, LinkError> {
-    let name: ServiceName = F::SERVICE.try_into().expect("the names of services are short and plain");
+fn open<S: Service, F: WireFrame>(node: &Node<S>, service: &'static str) -> Result<Factory<S, F>, LinkError> {
+    let name: ServiceName = service.try_into().expect("the names of services are short and plain");
     let until = Instant::now() + IN_FLUX_TIMEOUT;
     loop {
         let opened = node
@@ -45,7 +45,7 @@ fn open<S: Service, F: WireFrame>(node: &Node<S>) -> Result<Factory<S, F>, LinkE
                 std::thread::sleep(Duration::from_millis(5));
             }
             Err(source) => {
-                return Err(LinkError::Service { service: F::SERVICE, source });
+                return Err(LinkError::Service { service, source });
             }
             Ok(factory) => return Ok(factory),
         }
@@ -76,22 +76,27 @@ fn in_flux(error: &PublishSubscribeOpenOrCreateError) -> bool {
 pub struct Sender<S: Service, F: WireFrame> {
     publisher: Publisher<S, Wire<F>, ()>,
     factory: Factory<S, F>,
+    service: &'static str,
     published: u64,
 }
 
 impl<S: Service, F: WireFrame> Sender<S, F> {
     pub(super) fn new(node: &Node<S>) -> Result<Self, LinkError> {
-        let factory = open(node)?;
-        let publisher =
-            factory.publisher_builder().backpressure_strategy(BackpressureStrategy::DiscardData).create().map_err(
-                |source| match source {
-                    PublisherCreateError::ExceedsMaxSupportedPublishers => {
-                        LinkError::Taken { service: F::SERVICE, role: "publishes" }
-                    }
-                    source => LinkError::Publisher { service: F::SERVICE, source },
-                },
-            )?;
-        Ok(Self { publisher, factory, published: 0 })
+        Self::of(node, F::SERVICE)
+    }
+
+    /// The same by a service of this name.
+    pub(super) fn of(node: &Node<S>, service: &'static str) -> Result<Self, LinkError> {
+        let factory = open(node, service)?;
+        let publisher = factory
+            .publisher_builder()
+            .backpressure_strategy(BackpressureStrategy::DiscardData)
+            .create()
+            .map_err(|source| match source {
+            PublisherCreateError::ExceedsMaxSupportedPublishers => LinkError::Taken { service, role: "publishes" },
+            source => LinkError::Publisher { service, source },
+        })?;
+        Ok(Self { publisher, factory, service, published: 0 })
     }
 
     /// Publishes a frame without waiting for anybody.
@@ -99,7 +104,7 @@ impl<S: Service, F: WireFrame> Sender<S, F> {
     /// # Errors
     /// [`LinkError::Send`].
     pub fn send(&mut self, frame: F) -> Result<(), LinkError> {
-        self.publisher.send_copy(Wire(frame)).map_err(|source| LinkError::Send { service: F::SERVICE, source })?;
+        self.publisher.send_copy(Wire(frame)).map_err(|source| LinkError::Send { service: self.service, source })?;
         self.published += 1;
         Ok(())
     }
@@ -117,7 +122,7 @@ impl<S: Service, F: WireFrame> Sender<S, F> {
 
     /// Connects to readers that have come since; without this, the first frames are lost to them.
     pub(super) fn connect(&self) -> Result<(), LinkError> {
-        self.publisher.update_connections().map_err(|source| LinkError::Connect { service: F::SERVICE, source })
+        self.publisher.update_connections().map_err(|source| LinkError::Connect { service: self.service, source })
     }
 }
 
@@ -126,21 +131,25 @@ impl<S: Service, F: WireFrame> Sender<S, F> {
 pub struct Receiver<S: Service, F: WireFrame> {
     subscriber: Subscriber<S, Wire<F>, ()>,
     factory: Factory<S, F>,
+    service: &'static str,
     received: u64,
     superseded: u64,
 }
 
 impl<S: Service, F: WireFrame> Receiver<S, F> {
     pub(super) fn new(node: &Node<S>) -> Result<Self, LinkError> {
-        let factory = open(node)?;
+        Self::of(node, F::SERVICE)
+    }
+
+    /// The same by a service of this name.
+    pub(super) fn of(node: &Node<S>, service: &'static str) -> Result<Self, LinkError> {
+        let factory = open(node, service)?;
         let subscriber =
             factory.subscriber_builder().buffer_size(BUFFERED_FRAMES).create().map_err(|source| match source {
-                SubscriberCreateError::ExceedsMaxSupportedSubscribers => {
-                    LinkError::Taken { service: F::SERVICE, role: "reads" }
-                }
-                source => LinkError::Subscriber { service: F::SERVICE, source },
+                SubscriberCreateError::ExceedsMaxSupportedSubscribers => LinkError::Taken { service, role: "reads" },
+                source => LinkError::Subscriber { service, source },
             })?;
-        Ok(Self { subscriber, factory, received: 0, superseded: 0 })
+        Ok(Self { subscriber, factory, service, received: 0, superseded: 0 })
     }
 
     /// The oldest frame that waits.
@@ -148,7 +157,8 @@ impl<S: Service, F: WireFrame> Receiver<S, F> {
     /// # Errors
     /// [`LinkError::Receive`].
     pub fn oldest(&mut self) -> Result<Option<F>, LinkError> {
-        let sample = self.subscriber.receive().map_err(|source| LinkError::Receive { service: F::SERVICE, source })?;
+        let sample =
+            self.subscriber.receive().map_err(|source| LinkError::Receive { service: self.service, source })?;
         Ok(sample.map(|sample| {
             self.received += 1;
             sample.payload().0

@@ -8,7 +8,7 @@ use iceoryx2::prelude::ZeroCopySend;
 
 /// A frame with its service and its type name in shared memory. Sealed: the list below has been looked at.
 pub trait WireFrame: Copy + Debug + sealed::Plain + 'static {
-    /// Name of the service that carries it.
+    /// Name of the service that carries it; a second paddle's samples have one of their own.
     const SERVICE: &'static str;
     /// Name of the type with the version of its layout; peers with another one are refused.
     const TYPE_NAME: &'static str;

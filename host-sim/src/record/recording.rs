@@ -36,9 +36,9 @@ pub mod stream;
 use layout::{decode_header, decode_record, encode_header, encode_record};
 
 const MAGIC: [u8; 8] = *b"STILLREC";
-/// Versions 1 and 2 had frames of two components and one paddle, and hold tables that are refused: replay needs a run of its
-/// own build.
-const FORMAT_VERSION: u32 = 3;
+/// Versions 1 and 2 had frames of two components and one paddle, and hold tables that are refused; what is true had two
+/// components and one paddle in version 3. Replay of those needs the build that wrote them.
+const FORMAT_VERSION: u32 = 4;
 const BODY_BYTES: usize = 384;
 const HASH_BYTES: usize = 32;
 const RECORD_BYTES: usize = BODY_BYTES + HASH_BYTES;

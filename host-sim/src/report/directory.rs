@@ -60,9 +60,10 @@ pub fn write_run(directory: &Path, result: &RunResult, mut artifacts: Vec<Artifa
 ///
 /// # Errors
 /// As [`write_run`].
-pub fn write_space_run(directory: &Path, result: &SpaceRun) -> Result<(), SimError> {
+pub fn write_space_run(directory: &Path, result: &SpaceRun, mut artifacts: Vec<Artifact>) -> Result<(), SimError> {
     let page = Artifact { name: REPORT_FILE.to_owned(), bytes: space::render(result).into_bytes() };
-    write_directory(directory, &[page, encoded(directory, result)?])
+    artifacts.extend([page, encoded(directory, result)?]);
+    write_directory(directory, &artifacts)
 }
 
 fn encoded(directory: &Path, result: &impl Serialize) -> Result<Artifact, SimError> {

@@ -91,6 +91,15 @@ pub enum RuntimeError {
         /// Those of the scene.
         expected: [String; 2],
     },
+    /// The controller's table is for other paddles.
+    #[error("the controller's table is for {}, the plant has {}", paddles(found), paddles(expected))]
+    #[diagnostic(help("give the controller a table of the plant's paddles, or name those of the table with --paddle"))]
+    OtherPaddles {
+        /// Paddles of the table.
+        found: Vec<u32>,
+        /// Those of the plant.
+        expected: Vec<u32>,
+    },
     /// The user, or somebody else, asked for the end.
     #[error("stopped by {signal}; nothing was written")]
     Interrupted {
@@ -105,4 +114,13 @@ pub enum RuntimeError {
         /// What kept it.
         faults: Faults,
     },
+}
+
+/// Paddles by their indices.
+fn paddles(indices: &[u32]) -> String {
+    match indices {
+        [] => "no paddle".to_owned(),
+        [index] => format!("paddle {index}"),
+        indices => format!("paddles {}", indices.iter().map(u32::to_string).collect::<Vec<_>>().join(" and ")),
+    }
 }

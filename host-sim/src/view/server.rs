@@ -23,6 +23,7 @@ use super::watch::Watch;
 use crate::bench::error::SimError;
 use crate::runtime::error::RuntimeError;
 use crate::runtime::plant::observer::{ObservedInsertion, Observer, Spectator};
+use crate::world::tissue::TissuePlant;
 
 /// Header lines, and bytes of all of them together with the request line.
 const MAX_HEADERS: usize = 64;
@@ -83,7 +84,7 @@ impl Drop for View {
 }
 
 impl Spectator for View {
-    fn observe(&self, insertion: ObservedInsertion<'_>) -> Box<dyn Observer> {
+    fn observe<'m>(&self, insertion: ObservedInsertion<'m>) -> Box<dyn Observer<TissuePlant<'m>>> {
         Box::new(Watch::new(&self.shared, insertion))
     }
 }

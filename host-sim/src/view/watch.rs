@@ -101,10 +101,10 @@ impl Watch {
     }
 }
 
-impl Observer for Watch {
+impl<'m> Observer<TissuePlant<'m>> for Watch {
     /// Leaves a state if one is due and nobody reads the last one. Waits for nobody, unless time is held after this tick:
     /// then the page is to show this one, and no earlier one.
-    fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment) {
+    fn offer(&mut self, tissue: &TissuePlant<'m>, moment: &Moment) {
         let now = now_ns();
         self.solve_ns = self.solve_ns.max(now.saturating_sub(moment.began_ns));
         if self.mode == RunMode::FreeRun {
@@ -114,7 +114,8 @@ impl Observer for Watch {
             self.late_ns = self.late_ns.max(moment.began_ns.saturating_sub(due_ns));
             self.expected_ns = Some(time_ns + self.pacing.period_ns);
         }
-        let [x, y] = moment.truth.target;
+        let target: [f64; 2] = moment.truth.target::<2>().into();
+        let [x, y] = target;
         let error = self.normal[0] * x + self.normal[1] * y;
         if moment.is_counted {
             self.largest = self.largest.max(error.abs());
@@ -134,8 +135,8 @@ impl Observer for Watch {
         state.depth = moment.truth.depth;
         state.answer = moment.answer;
         state.largest = self.largest;
-        state.target = moment.truth.target;
-        state.paddle = moment.truth.paddle;
+        state.target = target;
+        state.paddle = moment.truth.paddle::<2>().into();
         state.solve_ns = std::mem::take(&mut self.solve_ns);
         state.late_ns = std::mem::take(&mut self.late_ns);
         let [solve_us, late_us] = [state.solve_ns, state.late_ns].map(|ns| ns as f64 * 1e-3);
@@ -143,7 +144,7 @@ impl Observer for Watch {
         if moment.time_s < 0.0 {
             return;
         }
-        state.history.push([moment.time_s, error, solve_us, late_us], moment.truth.target);
+        state.history.push([moment.time_s, error, solve_us, late_us], target);
     }
 
     /// Whether the page wants the insertion to end now.
@@ -189,7 +190,7 @@ mod tests {
             title: String::new(),
         };
         let mut watch = Watch::new(&shared, insertion);
-        let truth = Truth { tick: 1, time_ns: 0, depth: 0.0, target: [0.0; 2], paddle: [0.0; 2] };
+        let truth = Truth { tick: 1, ..Truth::default() };
         let moment = Moment { truth, time_s: 0.0, began_ns: 0, is_counted: true, answer: None };
         let reader = shared.state();
         watch.offer(&tissue, &moment);

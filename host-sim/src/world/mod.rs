@@ -17,11 +17,11 @@ pub mod space;
 pub mod tissue;
 pub mod truth;
 
-use firmware::contract::frames::to_plane;
+use firmware::contract::frames::MAX_PADDLES;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 use firmware::{Inputs, Mode};
 use model_offline::model::TissueModel;
-use nalgebra::Vector2;
+use nalgebra::SVector;
 
 use self::actuator::PaddleActuator;
 use self::error::WorldError;
@@ -29,19 +29,19 @@ use self::needle::{NeedleDrive, NeedleMotion, NeedleStart, NeedleTrajectory};
 use self::sensors::{Encoders, TargetSensor};
 use self::simulation::Simulation;
 use self::tissue::{AttachedPaddle, Insertion, PlantAccount, Reductions, TissuePlant, TissueResponse};
-use self::truth::Truth;
+use self::truth::{Truth, from_frame, to_frame};
 
-/// The simulated world, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
+/// The simulated world in D dimensions, whatever answers for the tissue and drives the needle. A tick is [`World::act`],
 /// [`World::advance`], then [`World::encoders`] and [`World::target_samples`]; [`World::tick`] is all of them.
 #[derive(Debug)]
-pub struct World<T, N = NeedleTrajectory> {
+pub struct World<T, N = NeedleTrajectory, const D: usize = 2> {
     /// The tissue.
     pub tissue: T,
     /// The needle's drive.
     pub drive: N,
-    /// The paddle and its actuator.
-    pub actuator: PaddleActuator,
-    target_sensor: TargetSensor,
+    /// The paddles' actuators, in the order of the controller's table; at most as many as it moves.
+    pub actuators: Vec<PaddleActuator<D>>,
+    target_sensor: TargetSensor<D>,
     encoders: Encoders,
     needle: NeedleMotion,
     started: NeedleStart,
@@ -49,10 +49,10 @@ pub struct World<T, N = NeedleTrajectory> {
 
 /// What the controller's samples come from.
 #[derive(Clone, Debug)]
-pub struct Sensors {
+pub struct Sensors<const D: usize = 2> {
     /// The target's camera.
-    pub target: TargetSensor,
-    /// Encoders of needle and paddle.
+    pub target: TargetSensor<D>,
+    /// Encoders of needle and paddles.
     pub encoders: Encoders,
 }
 
@@ -105,28 +105,32 @@ impl<'m> World<TissuePlant<'m>> {
 impl<T: TissueResponse> World<T> {
     /// A tissue with the needle drive, the actuator and the sensors of a simulation; the paddle's encoder has this index.
     pub fn simulated(tissue: T, paddle_index: u32, simulation: &Simulation) -> Self {
-        let settings = simulation.loop_settings.settings(simulation.depth);
-        let drive = simulation.needle.clone();
-        let sensors = Sensors {
-            target: TargetSensor::new(
-                settings.target_period_ns,
-                settings.target_latency_ns,
-                simulation.loop_settings.noise_for(simulation.depth),
-                simulation.seed,
-            )
-            .with_defects_of(&simulation.sensor, simulation.seed),
-            encoders: Encoders::new(paddle_index),
-        };
-        Self::of(tissue, drive, PaddleActuator::new(simulation.actuator), sensors)
+        let target = TargetSensor::of(simulation).with_defects_of(&simulation.sensor, simulation.seed);
+        Self::with_sensor(tissue, &[paddle_index], simulation, target)
     }
 }
 
-impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
-    /// A world of these parts, before its first tick.
-    pub fn of(tissue: T, drive: N, actuator: PaddleActuator, sensors: Sensors) -> Self {
+impl<T: TissueResponse<D>, const D: usize> World<T, NeedleTrajectory, D> {
+    /// The same with paddles of these indices, and this camera.
+    fn with_sensor(tissue: T, paddles: &[u32], simulation: &Simulation, target: TargetSensor<D>) -> Self {
+        let actuators = paddles.iter().map(|_| PaddleActuator::new(simulation.actuator));
+        let sensors = Sensors { target, encoders: Encoders::of(paddles) };
+        Self::of(tissue, simulation.needle.clone(), actuators, sensors)
+    }
+}
+
+impl<T: TissueResponse<D>, N: NeedleDrive, const D: usize> World<T, N, D> {
+    /// A world of these parts, before its first tick; of actuators no more than a controller moves.
+    pub fn of(
+        tissue: T,
+        drive: N,
+        actuators: impl IntoIterator<Item = PaddleActuator<D>>,
+        sensors: Sensors<D>,
+    ) -> Self {
         let Sensors { target, encoders } = sensors;
-        let needle = NeedleMotion::default();
-        Self { tissue, drive, actuator, target_sensor: target, encoders, needle, started: NeedleStart::default() }
+        let actuators = actuators.into_iter().take(MAX_PADDLES).collect();
+        let (needle, started) = (NeedleMotion::default(), NeedleStart::default());
+        Self { tissue, drive, actuators, target_sensor: target, encoders, needle, started }
     }
 
     /// The needle starts now. It waits for the controller's RUN, or for nobody without a controller.
@@ -159,9 +163,9 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
         // The command is the answer to the tick before: where it says RUN first, the needle started then.
         self.act(command, time_ns.saturating_sub(period_ns), period_ns);
         let truth = self.advance(tick, time_ns)?;
-        let (needle, paddle) = self.encoders(time_ns);
+        let (needle, paddles) = self.encoders(time_ns);
         let target = self.target_samples(&truth).last();
-        Ok((truth, Inputs { tick, time_ns, needle: Some(needle), target, paddles: [Some(paddle), None] }))
+        Ok((truth, Inputs { tick, time_ns, needle: Some(needle), target, paddles }))
     }
 
     /// Time goes on under `command`, if there is one. The first RUN starts the needle.
@@ -169,10 +173,24 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
         if command.is_some_and(|command| command.state == Mode::Run as u32) {
             self.start_needle(time_ns);
         }
-        let goal = command
-            .filter(|command| command.is_valid())
-            .map(|command| Vector2::from(to_plane(command.displacement[0])));
-        self.actuator.advance(goal, elapsed_ns as f64 * 1e-9);
+        let command = command.filter(|command| command.is_valid());
+        for (place, actuator) in self.actuators.iter_mut().enumerate() {
+            let goal = command.and_then(|command| command.displacement.get(place)).map(|goal| from_frame(*goal));
+            actuator.advance(goal, elapsed_ns as f64 * 1e-9);
+        }
+    }
+
+    /// Where the paddle at this place is, length; none where there is no paddle.
+    pub fn paddle(&self, place: usize) -> Option<SVector<f64, D>> {
+        self.actuators.get(place).map(PaddleActuator::position)
+    }
+
+    /// Where the paddles are, and how many there are.
+    fn paddles(&self) -> ([SVector<f64, D>; MAX_PADDLES], usize) {
+        (
+            std::array::from_fn(|place| self.paddle(place).unwrap_or_else(SVector::zeros)),
+            self.actuators.len().min(MAX_PADDLES),
+        )
     }
 
     /// The needle moves on to this time, and the tissue answers. Returns what is true then.
@@ -181,20 +199,22 @@ impl<T: TissueResponse, N: NeedleDrive> World<T, N> {
     /// [`WorldError::Tissue`].
     pub fn advance(&mut self, tick: u64, time_ns: u64) -> Result<Truth, WorldError> {
         self.needle = self.drive.motion(self.since_start_s(time_ns));
-        let (depth, paddle) = (self.needle.depth, self.actuator.position());
-        let target = self.tissue.step_at(self.since_start_s(time_ns), depth, paddle)?;
-        Ok(Truth { tick, time_ns, depth, target: target.into(), paddle: paddle.into() })
+        let (depth, (paddles, count)) = (self.needle.depth, self.paddles());
+        let target = self.tissue.step_at(self.since_start_s(time_ns), depth, &paddles[..count])?;
+        let paddles = paddles.map(|paddle| to_frame(&paddle));
+        Ok(Truth { tick, time_ns, depth, target: to_frame(&target), paddles })
     }
 
-    /// Samples of the needle's and the paddle's encoder.
-    pub fn encoders(&mut self, time_ns: u64) -> (NeedleSample, PaddleSample) {
-        self.encoders.sample(time_ns, self.needle, &self.actuator.position())
+    /// Samples of the needle's encoder, and of each paddle's in the order of the controller's table.
+    pub fn encoders(&mut self, time_ns: u64) -> (NeedleSample, [Option<PaddleSample>; MAX_PADDLES]) {
+        let (paddles, count) = self.paddles();
+        self.encoders.sample(time_ns, self.needle, &paddles[..count])
     }
 
     /// The target sensor measures if that is due; returns the samples that arrive at this tick, oldest first.
     pub fn target_samples(&mut self, truth: &Truth) -> impl Iterator<Item = TargetSample> + '_ {
         let time_ns = truth.time_ns;
-        self.target_sensor.measure(time_ns, &Vector2::from(truth.target));
+        self.target_sensor.measure(time_ns, &truth.target());
         std::iter::from_fn(move || self.target_sensor.arrived(time_ns))
     }
 }

@@ -1,7 +1,6 @@
 //! The tissue solved again along an insertion that is over: nothing is added to a loop on the machine's clock.
 
 use model_offline::model::TissueModel;
-use nalgebra::Vector2;
 
 use super::error::WorldError;
 use super::tissue::{TissuePlant, TissueResponse as _, WantedPlant};
@@ -48,7 +47,7 @@ impl<'m> Retrace<'m> {
             let at = from + (index - from) * step / self.steps;
             let truth = &self.truths[at];
             let since_start_s = truth.time_ns.saturating_sub(self.started_ns) as f64 * 1e-9;
-            self.tissue.step_at(since_start_s, truth.depth, Vector2::from(truth.paddle))?;
+            self.tissue.step_at(since_start_s, truth.depth, &[truth.paddle()])?;
             self.reached = at;
         }
         Ok(&self.tissue)

@@ -5,14 +5,16 @@
 
 use std::collections::VecDeque;
 
-use firmware::contract::frames::{MAX_DIMENSION, TARGET_VISIBLE, from_plane};
+use firmware::contract::frames::{MAX_PADDLES, TARGET_VISIBLE};
 use firmware::contract::{NeedleSample, PaddleSample, TargetSample};
 use model_offline::scene::{Outages, Sensor};
-use nalgebra::{SVector, Vector2};
+use nalgebra::SVector;
 use rand_distr::{Distribution, Exp1, StandardNormal};
 use rand_pcg::Pcg64;
 
 use super::needle::NeedleMotion;
+use super::simulation::Simulation;
+use super::truth::to_frame;
 
 /// Stream numbers of the generator: sensors do not share random numbers.
 const TARGET_STREAM: u128 = 1;
@@ -51,6 +53,13 @@ impl<const D: usize> TargetSensor<D> {
             next_ns: None,
             on_their_way: VecDeque::new(),
         }
+    }
+
+    /// The rates, the latency, the noise and the seed of a simulation.
+    pub fn of(simulation: &Simulation) -> Self {
+        let settings = simulation.loop_settings.settings(simulation.depth);
+        let noise = simulation.loop_settings.noise_for(simulation.depth);
+        Self::new(settings.target_period_ns, settings.target_latency_ns, noise, simulation.seed)
     }
 
     /// The same with results in steps of this length; 0: none.
@@ -102,11 +111,6 @@ impl TargetSensor {
     }
 }
 
-/// A displacement as frames have it: what is missing of three components is 0.
-pub fn to_frame<const D: usize>(displacement: &SVector<f64, D>) -> [f64; MAX_DIMENSION] {
-    std::array::from_fn(|k| displacement.as_slice().get(k).copied().unwrap_or(0.0))
-}
-
 /// When nothing is seen: gaps of exponential length between outages.
 #[derive(Clone, Debug)]
 struct OutageSchedule {
@@ -142,13 +146,18 @@ impl OutageSchedule {
 #[derive(Clone, Copy, Debug)]
 pub struct Encoders {
     sequence: u32,
-    paddle_index: u32,
+    paddles: [Option<u32>; MAX_PADDLES],
 }
 
 impl Encoders {
     /// Encoders of the needle and of the paddle of this index.
     pub fn new(paddle_index: u32) -> Self {
-        Self { sequence: 0, paddle_index }
+        Self::of(&[paddle_index])
+    }
+
+    /// Encoders of the needle and of the paddles of these indices, as many as a controller moves.
+    pub fn of(paddles: &[u32]) -> Self {
+        Self { sequence: 0, paddles: std::array::from_fn(|place| paddles.get(place).copied()) }
     }
 
     /// The same, whose first samples carry this sequence number.
@@ -157,23 +166,21 @@ impl Encoders {
         Self { sequence, ..self }
     }
 
-    /// Samples of one tick.
-    pub fn sample(
+    /// Samples of one tick, of the paddles where they are.
+    pub fn sample<const D: usize>(
         &mut self,
         time_ns: u64,
         needle: NeedleMotion,
-        paddle: &Vector2<f64>,
-    ) -> (NeedleSample, PaddleSample) {
+        paddles: &[SVector<f64, D>],
+    ) -> (NeedleSample, [Option<PaddleSample>; MAX_PADDLES]) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
         let needle = NeedleSample { sequence, reserved: 0, time_ns, depth: needle.depth, velocity: needle.velocity };
-        let paddle = PaddleSample {
-            sequence,
-            paddle_index: self.paddle_index,
-            time_ns,
-            displacement: from_plane((*paddle).into()),
+        let sample = |place: usize| {
+            let (paddle_index, displacement) = (self.paddles[place]?, to_frame(paddles.get(place)?));
+            Some(PaddleSample { sequence, paddle_index, time_ns, displacement })
         };
-        (needle, paddle)
+        (needle, std::array::from_fn(sample))
     }
 }
 
@@ -181,6 +188,7 @@ impl Encoders {
 mod tests {
     use super::*;
     use model_offline::scene::Scene;
+    use nalgebra::Vector2;
 
     const MS: u64 = 1_000_000;
 

@@ -31,10 +31,14 @@ pub(crate) fn recording(bytes: &[u8]) {
         assert_eq!(recording.encode(), bytes, "what is read is what was written");
     }
     if let Ok(Salvaged { recording, .. }) = Recording::whole_records(bytes) {
-        let table = csv::recording(&recording, &nalgebra::Vector2::x(), "mm");
+        let series = csv::Series { orthogonal: &nalgebra::Vector2::x(), paddles: 1, length: "mm" };
+        let table = series.recording(&recording);
         let lines = table.iter().filter(|byte| **byte == b'\n').count();
         assert_eq!(lines, recording.records.len() + 1);
-        assert!(mcap::encode(&recording, [1.0, 0.0], mcap::Known::default()).is_ok());
+        assert!(mcap::encode(&recording, &series, mcap::Known::default()).is_ok());
+        let in_space = csv::Series { orthogonal: &nalgebra::Matrix3x2::identity(), paddles: 2, length: "mm" };
+        assert_eq!(in_space.recording(&recording).iter().filter(|byte| **byte == b'\n').count(), lines);
+        assert!(mcap::encode(&recording, &in_space, mcap::Known::default()).is_ok());
     }
 }
 

@@ -4,7 +4,7 @@ pub use csv::Error as CsvError;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// A header and one line per item; fields that need quotes get them.
+/// A header and one line per item, as long as the header; fields that need quotes get them.
 ///
 /// # Example
 /// ```
@@ -13,13 +13,13 @@ use std::path::Path;
 /// let bytes = table(["depth", "what"], [(0.1, "needle, in"), (0.2, "out")], |(depth, what)| [depth.to_string(), what.to_owned()]);
 /// assert_eq!(bytes, b"depth,what\n0.1,\"needle, in\"\n0.2,out\n");
 /// ```
-pub fn table<T, H: AsRef<[u8]>, const N: usize>(
-    header: [H; N],
+pub fn table<T, H: AsRef<[u8]>, L: IntoIterator<Item = String>>(
+    header: impl IntoIterator<Item = H>,
     items: impl IntoIterator<Item = T>,
-    line: impl Fn(T) -> [String; N],
+    line: impl Fn(T) -> L,
 ) -> Vec<u8> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    // Lines have the header's length by their type, and memory takes everything.
+    // Memory takes everything.
     let _ = writer.write_record(header);
     for item in items {
         let _ = writer.write_record(line(item));

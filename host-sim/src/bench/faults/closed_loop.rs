@@ -89,7 +89,7 @@ impl Setup {
             target: TargetSensor::new(period_ns, latency_ns, self.noise, self.seed),
             encoders: Encoders::new(table.paddles[0].index).starting_at(self.sequence),
         };
-        World::of(LinearTissue::new(table), drive, actuator, sensors)
+        World::of(LinearTissue::new(table), drive, [actuator], sensors)
     }
 }
 
@@ -211,7 +211,7 @@ impl<'t> ClosedLoop<'t> {
 
     /// Where the paddle is, length.
     pub fn paddle(&self) -> Vector2<f64> {
-        self.world.actuator.position()
+        self.world.paddle(0).unwrap_or_default()
     }
 
     /// The tissue.
@@ -308,11 +308,13 @@ impl<'t> ClosedLoop<'t> {
             command = Some(*sent);
             self.on_their_way.pop_front();
         }
-        self.world.actuator.set_gain(actuator.gain);
-        if !stuck {
-            let goal =
-                command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(to_plane(command.displacement[0])));
-            self.world.actuator.advance(goal, period_s);
+        let goal =
+            command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(to_plane(command.displacement[0])));
+        for moved in &mut self.world.actuators {
+            moved.set_gain(actuator.gain);
+            if !stuck {
+                moved.advance(goal, period_s);
+            }
         }
         self.world.drive.hurry = speed;
         // The needle starts with the first RUN, as in a real insertion.
@@ -325,7 +327,7 @@ impl<'t> ClosedLoop<'t> {
     fn sense(&mut self, time_ns: u64) {
         // A linear tissue always has an answer.
         let Ok(truth) = self.world.advance(self.tick, time_ns) else { return };
-        self.error = self.world.tissue.error(&Vector2::from(truth.target));
+        self.error = self.world.tissue.error(&truth.target());
         self.max_error = self.max_error.max(self.error.abs());
         let stopped = self.active.contains(&Fault::PeerStopped);
         let (mut needle, mut paddle, mut seen) = (None, None, None);
@@ -337,9 +339,10 @@ impl<'t> ClosedLoop<'t> {
                 _ => None,
             });
             self.injected += u64::from(identity.is_some());
-            let (from_needle, mut from_paddle) = self.world.encoders(time_ns);
-            from_paddle.paddle_index = identity.unwrap_or(from_paddle.paddle_index);
-            (needle, paddle) = (Some(from_needle), Some(from_paddle));
+            let (from_needle, [from_paddle, _]) = self.world.encoders(time_ns);
+            let named =
+                |sample: PaddleSample| PaddleSample { paddle_index: identity.unwrap_or(sample.paddle_index), ..sample };
+            (needle, paddle) = (Some(from_needle), from_paddle.map(named));
             seen = self.world.target_samples(&truth).next();
             if let Some(sample) = &mut seen {
                 self.injected += see(sample, &self.active, &mut self.random);

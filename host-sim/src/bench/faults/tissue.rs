@@ -46,7 +46,7 @@ impl<'t> LinearTissue<'t> {
 }
 
 impl TissueResponse for LinearTissue<'_> {
-    fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
-        Ok(self.target(depth, &paddle))
+    fn step(&mut self, depth: f64, paddles: &[Vector2<f64>]) -> Result<Vector2<f64>, WorldError> {
+        Ok(self.target(depth, &paddles.first().copied().unwrap_or_default()))
     }
 }

@@ -3,13 +3,13 @@
 use firmware::Faults;
 use model_offline::model::TissueModel;
 use model_offline::output::NodalFields;
-use nalgebra::Vector2;
 
 use crate::bench::result::{BodyFrame, NeedlePoint, NeedleResult, SeriesPoint, StrategyResult};
 use crate::record::export;
 use crate::runtime::plant::PlantLoop;
 use crate::runtime::time::mode::RunMode;
 use crate::world::retrace::Retrace;
+use crate::world::tissue::TissuePlant;
 use crate::world::truth::{NeedleMoment, Truth};
 use model_offline::output::table_text::hex;
 
@@ -23,7 +23,7 @@ const FRAME_NUMBERS: usize = 20_000;
 /// What the true motion of the target amounts to.
 pub(super) fn measure(
     model: &TissueModel,
-    plant: &mut PlantLoop<'_>,
+    plant: &mut PlantLoop<TissuePlant<'_>>,
     mode: RunMode,
     paddle: Option<u32>,
     seed: u64,
@@ -35,7 +35,7 @@ pub(super) fn measure(
     let waited_s = plant.world().drive.wait_s();
     let (normal, axis) = (model.scene().needle.orthogonal(), model.scene().needle.axis);
     let truths = plant.truths();
-    let error = |truth: &Truth| Vector2::from(truth.target).dot(&normal);
+    let error = |truth: &Truth| truth.target::<2>().dot(&normal);
     // Before the needle moves nothing is to be held; at its start it has not moved.
     let waits = |truth: &Truth| {
         let since_start_s = export::csv::seconds_since(truth.time_ns, started_ns);
@@ -44,8 +44,7 @@ pub(super) fn measure(
     let counted = &truths[truths.partition_point(waits)..];
     let worst = counted.iter().max_by(|a, b| error(a).abs().total_cmp(&error(b).abs()));
     let squares: f64 = counted.iter().map(|truth| error(truth).powi(2)).sum();
-    let travel =
-        truths.windows(2).map(|pair| (Vector2::from(pair[1].paddle) - Vector2::from(pair[0].paddle)).norm()).sum();
+    let travel = truths.windows(2).map(|pair| (pair[1].paddle::<2>() - pair[0].paddle::<2>()).norm()).sum();
     let stride = truths.len().div_ceil(SERIES_POINTS - 1).max(1);
     let last = truths.len().saturating_sub(1);
     let series = truths
@@ -56,8 +55,8 @@ pub(super) fn measure(
             time_s: export::csv::seconds_since(truth.time_ns, started_ns),
             depth: truth.depth,
             orthogonal_error: error(truth),
-            axial: Vector2::from(truth.target).dot(&axis),
-            paddle: truth.paddle,
+            axial: truth.target::<2>().dot(&axis),
+            paddle: truth.paddle::<2>().into(),
         })
         .collect();
     StrategyResult {

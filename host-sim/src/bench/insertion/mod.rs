@@ -1,53 +1,35 @@
 //! One insertion: simulated, measured, recorded.
 
+pub(super) mod linked;
 mod measure;
 
-use firmware::{Faults, Mode};
 use std::path::Path;
-use std::time::Duration;
 
 use firmware::contract::Table;
-use iceoryx2::service::ipc;
 use model_offline::model::TissueModel;
 use model_offline::scene::TissueVariant;
 use sha2::{Digest, Sha256};
 
+use self::linked::{FinishedInsertion, LinkedController, LinkedInsertion, RunShare};
 use self::measure::measure;
 use super::result::{RecordingResult, StrategyResult};
 use super::strategy::Strategy;
 use crate::bench::error::SimError;
-use crate::exchange::{Departure, PlantPorts, Space};
-use crate::record::error::FileError;
 use crate::record::export::foxglove::Stage;
 use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
-use crate::record::recording::{Record, Recording, RecordingHeader};
-use crate::runtime::accounting::accounts::{CommandAccount, ControllerAccounts};
-use crate::runtime::accounting::ledger::LedgerResult;
-use crate::runtime::accounting::tick::ControllerTick;
-use crate::runtime::error::RuntimeError;
+use crate::record::recording::{Record, Recording};
 use crate::runtime::executor::Hardware;
-use crate::runtime::peer::child::{ControllerCall, ControllerProcess};
-use crate::runtime::peer::{Patience, Peer};
-use crate::runtime::plant::free_run::FreeRun;
-use crate::runtime::plant::lockstep::{self, Pace};
+use crate::runtime::plant::PlantLoop;
 use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
 use crate::runtime::plant::rehearsal::world_in_time;
-use crate::runtime::plant::{PlantLoop, published, waiting_command};
 use crate::runtime::signals;
-use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::World;
 use crate::world::simulation::Simulation;
-use crate::world::tissue::{AttachedPaddle, Reductions};
+use crate::world::tissue::{AttachedPaddle, Reductions, TissuePlant};
 use crate::world::truth::Truth;
 use model_offline::output::table_text::hex;
-
-/// How long the other process may be silent before a run is given up.
-const PEER_TIMEOUT: Duration = Duration::from_secs(30);
-
-/// The same for a controller whose plant a spectator may pause.
-const WATCHED_PATIENCE_S: f64 = 24.0 * 3600.0;
 
 /// A result and the files that belong to it.
 #[derive(Clone, Debug)]
@@ -75,7 +57,8 @@ impl Label {
         Self { tissue, table_tissue: tissue, strategy }
     }
 
-    fn file(&self, extension: &str) -> String {
+    /// Name of its file with this extension.
+    pub(super) fn file(&self, extension: &str) -> String {
         format!("{}.{extension}", self.stem())
     }
 
@@ -117,6 +100,14 @@ pub struct ControllerSetup<'a> {
     pub hardware: Hardware,
     /// Somebody who looks on.
     pub spectator: Option<&'a dyn Spectator>,
+}
+
+impl<'a> ControllerSetup<'a> {
+    /// What of it is no matter of dimensions.
+    fn linked(&self) -> LinkedController<'a> {
+        let Self { program, table_bytes, mode, hardware, spectator, .. } = *self;
+        LinkedController { program, table_bytes, mode, hardware, is_watched: spectator.is_some() }
+    }
 }
 
 /// One insertion that is to be simulated.
@@ -161,15 +152,6 @@ impl std::fmt::Debug for SimulatedInsertion<'_> {
     }
 }
 
-/// A controlled insertion that is over.
-pub(super) struct FinishedInsertion<'m> {
-    plant: PlantLoop<'m>,
-    accounts: ControllerAccounts,
-    ticks: Vec<ControllerTick>,
-    ledger: LedgerResult,
-    plant_timing: Option<LoopTiming>,
-}
-
 impl<'a> SimulatedInsertion<'a> {
     /// An insertion without files for other tools, whose progress nobody follows.
     pub fn new(model: &'a TissueModel, simulation: &'a Simulation, label: Label) -> Self {
@@ -187,20 +169,9 @@ impl<'a> SimulatedInsertion<'a> {
         let world =
             World::sharing(model, paddle.map_or(AttachedPaddle::None, AttachedPaddle::Held), simulation, reductions)?;
         let mut plant = PlantLoop::new(world, simulation);
-        plant.world().start_needle(0);
-        let period_ns = simulation.loop_settings.period_ns();
-        for tick in 0.. {
-            let time_ns = tick * period_ns;
-            if plant.is_over(time_ns) {
-                break;
-            }
-            signals::check()?;
-            plant.solve(tick, time_ns)?;
-            progress();
-        }
+        plant.uncontrolled(simulation.loop_settings.period_ns(), progress)?;
         let mut result = measure(model, &mut plant, RunMode::Lockstep, paddle, simulation.seed);
-        let normal = model.scene().needle.orthogonal();
-        let series = csv::insertion(plant.truths(), &[], &normal, &model.scene().length_unit);
+        let series = self.series(plant.truths(), &[]);
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         result.csv = Some(artifacts[0].name.clone());
         let needle = self.needle_tables(&mut plant);
@@ -230,12 +201,17 @@ impl<'a> SimulatedInsertion<'a> {
     pub(super) fn with_controller(
         &self,
         controller: &ControllerSetup<'_>,
-        plant: PlantLoop<'a>,
-    ) -> Result<FinishedInsertion<'a>, SimError> {
-        let space = Space::unique()?;
-        let outcome = self.in_space(controller, &space, plant);
-        space.leave::<ipc::Service>(Departure::Last);
-        outcome
+        plant: PlantLoop<TissuePlant<'a>>,
+    ) -> Result<FinishedInsertion<TissuePlant<'a>>, SimError> {
+        let Self { model, simulation, progress, .. } = *self;
+        let linked = LinkedInsertion { controller: controller.linked(), simulation, progress };
+        linked.run(plant, |plant| {
+            if let Some(spectator) = controller.spectator {
+                let (paddle, period_ns) = (controller.table.paddles[0].index, simulation.loop_settings.period_ns());
+                let (mode, title) = (controller.mode, self.label.title());
+                plant.observed_by(spectator.observe(ObservedInsertion { model, paddle, mode, period_ns, title }));
+            }
+        })
     }
 
     /// What the insertion amounts to, with its files.
@@ -245,34 +221,27 @@ impl<'a> SimulatedInsertion<'a> {
     pub(super) fn measured(
         &self,
         controller: &ControllerSetup<'_>,
-        mut run: FinishedInsertion<'a>,
+        mut run: FinishedInsertion<TissuePlant<'a>>,
     ) -> Result<MeasuredInsertion, SimError> {
         let Self { model, simulation, label, .. } = *self;
         let paddle = controller.table.paddles[0].index;
         let mut result = measure(model, &mut run.plant, controller.mode, Some(paddle), simulation.seed);
-        let recording = self.recording(controller, &run);
-        let bytes = recording.encode();
-        result.recording = Some(RecordingResult {
-            file: label.file("rec"),
-            sha256: hex(&Sha256::digest(&bytes)),
-            ticks: recording.records.len() as u64,
-        });
+        let (scene_hash, depth_end) = (model.scene().hash(), controller.table.validity.depth_end);
+        let recording = run.recording(&controller.linked(), simulation, scene_hash, depth_end);
+        let file = Artifact { name: label.file("rec"), bytes: recording.encode() };
+        result.recording = Some(RecordingResult::of(&file, recording.records.len() as u64));
         result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
         let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);
         let mut artifacts = self.files(controller, &recording, &mut run.plant, started_ns)?;
-        artifacts.insert(1, Artifact { name: label.file("rec"), bytes });
+        artifacts.insert(1, file);
         result.csv = Some(artifacts[0].name.clone());
         let needle = self.needle_tables(&mut run.plant);
         result.needle_csv = needle.iter().map(|table| table.name.clone()).collect();
         artifacts.extend(needle);
         result.final_state = run.accounts.final_state;
         result.faults = run.accounts.faults;
-        let moving = || recording.records.iter().map(|record| &record.tick).filter(|t| t.inputs.time_ns >= started_ns);
-        let (in_run, outside) = moving().fold((0, Faults::NONE), |(in_run, faults), tick| match tick.command.state {
-            state if state == Mode::Run as u32 => (in_run + 1, faults),
-            _ => (in_run, faults | Faults::from_bits(tick.command.faults)),
-        });
-        result.run_share = Some(f64::from(in_run) / moving().count().max(1) as f64);
+        let RunShare { share, outside } = run.run_share(started_ns);
+        result.run_share = Some(share);
         result.outside_run_for = outside;
         result.ledger = Some(run.ledger);
         result.timing = run.accounts.timing;
@@ -280,36 +249,25 @@ impl<'a> SimulatedInsertion<'a> {
         Ok(MeasuredInsertion { result, artifacts })
     }
 
-    fn recording(&self, controller: &ControllerSetup<'_>, run: &FinishedInsertion<'_>) -> Recording {
-        let settings = self.simulation.loop_settings.settings(controller.table.validity.depth_end);
-        let header = RecordingHeader {
-            mode: controller.mode,
-            seed: self.simulation.seed,
-            scene_hash: self.model.scene().hash(),
-            settings,
-            table: controller.table_bytes.to_vec(),
-        };
-        Recording { header, records: merge(&run.ticks, run.plant.truths()) }
-    }
-
     /// The time series, and what else was asked for.
     fn files(
         &self,
         controller: &ControllerSetup<'_>,
         recording: &Recording,
-        plant: &mut PlantLoop<'_>,
+        plant: &mut PlantLoop<TissuePlant<'_>>,
         started_ns: u64,
     ) -> Result<Vec<Artifact>, SimError> {
         let Self { model, label, extras, .. } = *self;
-        let normal = model.scene().needle.orthogonal();
-        let series = csv::insertion(plant.truths(), &recording.records, &normal, &model.scene().length_unit);
+        let series = self.series(plant.truths(), &recording.records);
         let mut artifacts = vec![Artifact { name: label.file("csv"), bytes: series }];
         if extras.mcap {
             let name = label.file("mcap");
             let needle = mcap::NeedleForces { started_ns, moments: plant.world().tissue.needle() };
             let stage = Stage::new(model.scene(), controller.table.paddles[0].index);
             let known = mcap::Known { needle, stage: Some(&stage) };
-            let bytes = mcap::encode(recording, controller.table.orthogonal.into(), known)?;
+            let table = controller.table;
+            let series = csv::Series { orthogonal: &table.orthogonal, paddles: 1, length: &model.scene().length_unit };
+            let bytes = mcap::encode(recording, &series, known)?;
             artifacts.push(Artifact { name, bytes });
             artifacts.push(Artifact { name: label.file("foxglove.json"), bytes: stage.layout_file() });
         }
@@ -320,8 +278,15 @@ impl<'a> SimulatedInsertion<'a> {
         Ok(artifacts)
     }
 
+    /// The time series, a line per tick of the plant.
+    fn series(&self, truths: &[Truth], records: &[Record]) -> Vec<u8> {
+        let scene = self.model.scene();
+        let series = csv::Series { orthogonal: &scene.needle.orthogonal(), paddles: 1, length: &scene.length_unit };
+        series.insertion(truths, records)
+    }
+
     /// What the needle met, where the world has one that slips.
-    fn needle_tables(&self, plant: &mut PlantLoop<'_>) -> Vec<Artifact> {
+    fn needle_tables(&self, plant: &mut PlantLoop<TissuePlant<'_>>) -> Vec<Artifact> {
         let scene = self.model.scene();
         let units = csv::Units { length: &scene.length_unit, stress: &scene.stress_unit };
         let first_ns = plant.truths().first().map_or(0, |truth| truth.time_ns);
@@ -341,7 +306,7 @@ impl<'a> SimulatedInsertion<'a> {
     ///
     /// # Errors
     /// [`SimError`].
-    pub(super) fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<'a>, SimError> {
+    pub(super) fn plant(&self, controller: &ControllerSetup<'_>) -> Result<PlantLoop<TissuePlant<'a>>, SimError> {
         let Self { model, simulation, reductions, .. } = *self;
         let paddle = AttachedPaddle::Steered(controller.table);
         let own = Reductions::default();
@@ -352,94 +317,4 @@ impl<'a> SimulatedInsertion<'a> {
         };
         Ok(PlantLoop::new(world, simulation))
     }
-
-    /// Starts the controller, runs the insertion, and closes the accounts.
-    fn in_space(
-        &self,
-        controller: &ControllerSetup<'_>,
-        space: &Space,
-        mut plant: PlantLoop<'a>,
-    ) -> Result<FinishedInsertion<'a>, SimError> {
-        let Self { model, simulation, .. } = *self;
-        let table = space.root().join("controller.table");
-        std::fs::write(&table, controller.table_bytes).map_err(FileError::write(&table))?;
-        let paddle = controller.table.paddles[0].index;
-        let mut ports = PlantPorts::<ipc::Service>::open(space)?;
-        let mut peer = Peer::Child(self.start(controller, space, &table)?);
-        let mut patience = Patience::new(PEER_TIMEOUT);
-        while !ports.has_peer() {
-            patience.wait::<ipc::Service>(&mut peer)?;
-        }
-        ports.connect()?;
-        if let Some(spectator) = controller.spectator {
-            let period_ns = simulation.loop_settings.period_ns();
-            let (mode, title) = (controller.mode, self.label.title());
-            plant.observed_by(spectator.observe(ObservedInsertion { model, paddle, mode, period_ns, title }));
-        }
-        let (mut commands, plant_timing) = self.drive(&mut plant, &mut ports, &mut peer, controller.mode)?;
-        let Peer::Child(child) = peer else {
-            unreachable!("the peer of a run is its child");
-        };
-        let (accounts, ticks) = child.finish()?;
-        commands.end(waiting_command(&mut ports)?);
-        let ledger = accounts.ledger(published(&ports), &commands);
-        Ok(FinishedInsertion { plant, accounts, ticks, ledger, plant_timing })
-    }
-
-    fn start(
-        &self,
-        controller: &ControllerSetup<'_>,
-        space: &Space,
-        table: &Path,
-    ) -> Result<ControllerProcess, RuntimeError> {
-        let patience_s = match controller.spectator {
-            Some(_) => WATCHED_PATIENCE_S,
-            None => PEER_TIMEOUT.as_secs_f64(),
-        };
-        ControllerProcess::start(&ControllerCall {
-            program: controller.program,
-            table,
-            space,
-            mode: controller.mode,
-            hardware: controller.hardware,
-            loop_settings: self.simulation.loop_settings,
-            depth: self.simulation.depth,
-            capacity: self.simulation.ticks(),
-            patience_s,
-        })
-    }
-
-    fn drive(
-        &self,
-        plant: &mut PlantLoop<'_>,
-        ports: &mut PlantPorts<ipc::Service>,
-        peer: &mut Peer,
-        mode: RunMode,
-    ) -> Result<(CommandAccount, Option<LoopTiming>), RuntimeError> {
-        let settings = &self.simulation.loop_settings;
-        let (rate_hz, period_ns) = (settings.rate, settings.period_ns());
-        match mode {
-            RunMode::Lockstep => {
-                let pace = Pace { period_ns, timeout: PEER_TIMEOUT };
-                Ok((lockstep::run(plant, ports, peer, &pace, self.progress)?, None))
-            }
-            RunMode::FreeRun => {
-                let patience = PEER_TIMEOUT;
-                let free_run = FreeRun { ports, peer, rate_hz, period_ns, patience, succession: None };
-                let (account, timing) = free_run.run(plant, self.progress)?;
-                Ok((account, Some(timing)))
-            }
-        }
-    }
-}
-
-/// Both sides of every tick; the truth is that of the plant's tick of the same number.
-fn merge(ticks: &[ControllerTick], truths: &[Truth]) -> Vec<Record> {
-    ticks
-        .iter()
-        .map(|tick| Record {
-            tick: *tick,
-            truth: truths.binary_search_by_key(&tick.inputs.tick, |truth| truth.tick).ok().map(|found| truths[found]),
-        })
-        .collect()
 }

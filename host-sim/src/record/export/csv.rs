@@ -1,36 +1,13 @@
 //! Tables with a time column, for PlotJuggler and spreadsheets.
 
-use firmware::contract::frames::to_plane;
+use firmware::contract::frames::{MAX_DIMENSION, MAX_PADDLES};
 use firmware::{Faults, Mode};
 use model_offline::output::csv::table;
-use nalgebra::Vector2;
+use nalgebra::SMatrix;
 
 use crate::record::recording::{Record, Recording};
 use crate::runtime::accounting::tick::ControllerTick;
 use crate::world::truth::{NeedleMoment, Truth};
-
-/// Columns of the time series of a run and of a recording; `{}` is the unit of length. Empty where there is nothing: samples that
-/// have not arrived, a truth that nobody told, commands before the paddle's place is known.
-const SERIES: [&str; 18] = [
-    "time [s]",
-    "tick [1]",
-    "true_depth [{}]",
-    "true_target_x [{}]",
-    "true_target_y [{}]",
-    "true_orthogonal_error [{}]",
-    "true_paddle_x [{}]",
-    "true_paddle_y [{}]",
-    "measured_depth [{}]",
-    "measured_needle_velocity [{}/s]",
-    "measured_target_x [{}]",
-    "measured_target_y [{}]",
-    "measured_paddle_x [{}]",
-    "measured_paddle_y [{}]",
-    "command_x [{}]",
-    "command_y [{}]",
-    "state [name]",
-    "faults [names]",
-];
 
 /// What a needle that slips met: one line per moment. `{}` is the unit of length, `{f}` that of force per thickness.
 const NEEDLE: [&str; 7] = [
@@ -68,55 +45,103 @@ fn zero_ns(records: &[Record]) -> u64 {
     first.map_or(0, |record| record.truth.map_or(record.tick.inputs.time_ns, |truth| truth.time_ns))
 }
 
-/// The columns with this unit of length.
-fn columns<const N: usize>(columns: [&str; N], length: &str) -> [String; N] {
-    columns.map(|column| column.replace("{}", length))
+/// Time series of runs and recordings in D dimensions, N of them orthogonal to the needle. Columns are empty where there is
+/// nothing: samples that have not arrived, a truth that nobody told, commands before the paddles' places are known.
+#[derive(Clone, Copy, Debug)]
+pub struct Series<'s, const D: usize = 2, const N: usize = 1> {
+    /// Directions orthogonal to the needle: orthonormal columns.
+    pub orthogonal: &'s SMatrix<f64, D, N>,
+    /// Paddles, of which there are columns.
+    pub paddles: usize,
+    /// Unit of lengths.
+    pub length: &'s str,
 }
 
-/// A line of [`SERIES`] at a time since the first tick, s; `orthogonal` is n.
-fn line(
-    time_s: f64,
-    number: u64,
-    truth: Option<&Truth>,
-    tick: Option<&ControllerTick>,
-    orthogonal: &Vector2<f64>,
-) -> [String; 18] {
-    let inputs = tick.map(|tick| &tick.inputs);
-    let command = tick.map(|tick| &tick.command);
-    let [tx, ty] = pair(truth.map(|truth| truth.target));
-    let [tpx, tpy] = pair(truth.map(|truth| truth.paddle));
-    let error = truth.map(|truth| text(Vector2::from(truth.target).dot(orthogonal))).unwrap_or_default();
-    let true_depth = truth.map(|truth| text(truth.depth)).unwrap_or_default();
-    let needle = inputs.and_then(|inputs| inputs.needle);
-    let [depth, velocity] = pair(needle.map(|sample| [sample.depth, sample.velocity]));
-    let [mx, my] = pair(inputs.and_then(|inputs| inputs.target).map(|sample| to_plane(sample.displacement)));
-    let [mpx, mpy] = pair(inputs.and_then(|inputs| inputs.paddles[0]).map(|sample| to_plane(sample.displacement)));
-    let [cx, cy] = pair(command.filter(|command| command.is_valid()).map(|command| to_plane(command.displacement[0])));
-    let [state, faults] = command.map_or_else(Default::default, |command| verdict(command.state, command.faults));
-    let time = format!("{time_s:.6}");
-    let number = text(number);
-    [time, number, true_depth, tx, ty, error, tpx, tpy, depth, velocity, mx, my, mpx, mpy, cx, cy, state, faults]
-}
+/// What comes before the name of a quantity that both paddles have.
+const PLACES: [&str; MAX_PADDLES] = ["", "second_"];
 
-/// One line per tick of the plant, with what the controller saw and said where there was one. `orthogonal` is n, `length` the
-/// unit of lengths.
-pub fn insertion(truths: &[Truth], records: &[Record], orthogonal: &Vector2<f64>, length: &str) -> Vec<u8> {
-    let start_ns = truths.first().map_or(0, |truth| truth.time_ns);
-    table(columns(SERIES, length), truths, |truth| {
-        let tick = records.binary_search_by_key(&truth.tick, |record| record.tick.inputs.tick).ok();
-        let tick = tick.and_then(|found| records.get(found)).map(|record| &record.tick);
-        line(seconds_since(truth.time_ns, start_ns), truth.tick, Some(truth), tick, orthogonal)
-    })
-}
+impl<const D: usize, const N: usize> Series<'_, D, N> {
+    /// Names of the columns.
+    fn columns(&self) -> Vec<String> {
+        let length = self.length;
+        let vector = |name: &str| -> Vec<String> {
+            ["x", "y", "z"].iter().take(D).map(|axis| format!("{name}_{axis} [{length}]")).collect()
+        };
+        let of_paddles = |before: &str, name: &str| -> Vec<String> {
+            let places = PLACES.iter().take(self.paddles);
+            places.flat_map(|place| -> Vec<String> { vector(&format!("{before}{place}{name}")) }).collect()
+        };
+        [
+            vec!["time [s]".to_owned(), "tick [1]".to_owned(), format!("true_depth [{length}]")],
+            vector("true_target"),
+            vec![format!("true_orthogonal_error [{length}]")],
+            of_paddles("true_", "paddle"),
+            vec![format!("measured_depth [{length}]"), format!("measured_needle_velocity [{length}/s]")],
+            vector("measured_target"),
+            of_paddles("measured_", "paddle"),
+            of_paddles("", "command"),
+            vec!["state [name]".to_owned(), "faults [names]".to_owned()],
+        ]
+        .concat()
+    }
 
-/// One line per tick of the controller. `orthogonal` is n, `length` the unit of lengths.
-pub fn recording(recording: &Recording, orthogonal: &Vector2<f64>, length: &str) -> Vec<u8> {
-    let start_ns = zero_ns(&recording.records);
-    table(columns(SERIES, length), &recording.records, |record| {
-        let inputs = &record.tick.inputs;
-        let time_s = seconds_since(inputs.time_ns, start_ns);
-        line(time_s, inputs.tick, record.truth.as_ref(), Some(&record.tick), orthogonal)
-    })
+    /// A line at a time since the first tick, s.
+    fn line(&self, time_s: f64, number: u64, truth: Option<&Truth>, tick: Option<&ControllerTick>) -> Vec<String> {
+        let inputs = tick.map(|tick| &tick.inputs);
+        let command = tick.map(|tick| &tick.command);
+        let needle = inputs.and_then(|inputs| inputs.needle);
+        let vector = |components: Option<[f64; MAX_DIMENSION]>| -> Vec<String> {
+            (0..D).map(|k| components.map(|components| text(components[k])).unwrap_or_default()).collect()
+        };
+        let of_paddles = |at: &dyn Fn(usize) -> Option<[f64; MAX_DIMENSION]>| -> Vec<String> {
+            (0..self.paddles.min(MAX_PADDLES)).flat_map(|place| vector(at(place))).collect()
+        };
+        let told = command.filter(|command| command.is_valid());
+        [
+            vec![format!("{time_s:.6}"), text(number), truth.map(|truth| text(truth.depth)).unwrap_or_default()],
+            vector(truth.map(|truth| truth.target)),
+            vec![truth.map(|truth| text(self.error(truth))).unwrap_or_default()],
+            of_paddles(&|place| truth.map(|truth| truth.paddles[place])),
+            vec![
+                needle.map(|sample| text(sample.depth)).unwrap_or_default(),
+                needle.map(|sample| text(sample.velocity)).unwrap_or_default(),
+            ],
+            vector(inputs.and_then(|inputs| inputs.target).map(|sample| sample.displacement)),
+            of_paddles(&|place| inputs.and_then(|inputs| inputs.paddles[place]).map(|sample| sample.displacement)),
+            of_paddles(&|place| told.map(|command| command.displacement[place])),
+            command.map_or_else(|| vec![String::new(); 2], |command| verdict(command.state, command.faults).into()),
+        ]
+        .concat()
+    }
+
+    /// How far the target is off the needle's line, length: to which side in the plane, in space how far alone.
+    pub(super) fn error(&self, truth: &Truth) -> f64 {
+        let target = truth.target::<D>();
+        match N {
+            1 => target.dot(&self.orthogonal.column(0)),
+            _ => self.orthogonal.tr_mul(&target).norm(),
+        }
+    }
+
+    /// One line per tick of the plant, with what the controller saw and said where there was one.
+    pub fn insertion(&self, truths: &[Truth], records: &[Record]) -> Vec<u8> {
+        let start_ns = truths.first().map_or(0, |truth| truth.time_ns);
+        table(self.columns(), truths, |truth| {
+            let tick = records.binary_search_by_key(&truth.tick, |record| record.tick.inputs.tick).ok();
+            let tick = tick.and_then(|found| records.get(found)).map(|record| &record.tick);
+            self.line(seconds_since(truth.time_ns, start_ns), truth.tick, Some(truth), tick)
+        })
+    }
+
+    /// One line per tick of the controller.
+    pub fn recording(&self, recording: &Recording) -> Vec<u8> {
+        let start_ns = zero_ns(&recording.records);
+        table(self.columns(), &recording.records, |record| {
+            let inputs = &record.tick.inputs;
+            let time_s = seconds_since(inputs.time_ns, start_ns);
+            self.line(time_s, inputs.tick, record.truth.as_ref(), Some(&record.tick))
+        })
+    }
 }
 
 /// Labels of the units of length and stress.
@@ -144,7 +169,7 @@ impl Units<'_> {
     }
 }
 
-/// Forces on a needle that slips, moment by moment; time zero is the start of the run's first tick, as in [`insertion`],
+/// Forces on a needle that slips, moment by moment; time zero is the start of the run's first tick, as in [`Series::insertion`],
 /// `started_s` the start of the needle.
 pub fn needle(moments: &[NeedleMoment], started_s: f64, units: Units<'_>) -> Vec<u8> {
     table(units.columns(NEEDLE), moments, |NeedleMoment { since_start_s, reading }| {
@@ -182,10 +207,6 @@ fn text(value: impl ToString) -> String {
     value.to_string()
 }
 
-fn pair(values: Option<[f64; 2]>) -> [String; 2] {
-    values.map_or_else(Default::default, |values| values.map(text))
-}
-
 /// State and fault codes of a command.
 fn verdict(state: u32, faults: u64) -> [String; 2] {
     let state = Mode::from_wire(state).map_or("?", Mode::name);
@@ -195,14 +216,19 @@ fn verdict(state: u32, faults: u64) -> [String; 2] {
 #[cfg(test)]
 mod tests {
     use firmware::Settings;
+    use nalgebra::ArrayStorage;
 
     use super::*;
     use crate::record::recording::RecordingHeader;
     use crate::runtime::time::mode::RunMode;
 
+    const X: SMatrix<f64, 2, 1> = SMatrix::from_array_storage(ArrayStorage([[1.0, 0.0]]));
+    const SERIES: Series<'_> = Series { orthogonal: &X, paddles: 1, length: "mm" };
+
     fn record(tick: u64, time_ns: u64, truth_ns: Option<u64>) -> Record {
         let inputs = firmware::Inputs { tick, time_ns, ..Default::default() };
-        let truth = truth_ns.map(|time_ns| Truth { tick, time_ns, depth: 0.5, target: [1.0, 2.0], paddle: [3.0, 4.0] });
+        let (target, paddles) = ([1.0, 2.0, 3.5], [[3.0, 4.0, 6.5], [7.0, 8.0, 9.0]]);
+        let truth = truth_ns.map(|time_ns| Truth { tick, time_ns, depth: 0.5, target, paddles });
         Record { tick: ControllerTick { inputs, ..Default::default() }, truth }
     }
 
@@ -214,7 +240,7 @@ mod tests {
     fn recorded(records: Vec<Record>) -> Vec<Vec<String>> {
         let settings = Settings::new(1_000_000, 20_000_000, 0);
         let header = RecordingHeader { mode: RunMode::Lockstep, seed: 1, scene_hash: [0; 32], settings, table: vec![] };
-        lines(&recording(&Recording { header, records }, &Vector2::x(), "mm"))
+        lines(&SERIES.recording(&Recording { header, records }))
     }
 
     #[test]
@@ -222,7 +248,7 @@ mod tests {
         let at = |tick| 200 + tick * 1_000_000;
         let records: Vec<_> = (0..5).map(|tick| record(tick, at(tick), Some(at(tick)))).collect();
         let truths: Vec<_> = records.iter().filter_map(|record| record.truth).collect();
-        let plant = lines(&insertion(&truths, &records, &Vector2::x(), "mm"));
+        let plant = lines(&SERIES.insertion(&truths, &records));
         let controller = recorded(records);
         assert_eq!(plant, controller, "in lockstep one is the other");
         assert!(plant[0].iter().all(|name| name.contains('[') && name.ends_with(']')), "{:?}", plant[0]);
@@ -265,6 +291,36 @@ mod tests {
             let known = ["time", "tick"].contains(&name);
             assert_eq!(value(1, name).is_empty(), !known, "{name}");
         }
+    }
+
+    /// Every component of every paddle has a column of its own, in the plane those that were always there.
+    #[test]
+    fn the_plane_has_two_components_and_space_three_of_each_paddle() {
+        let mut whole = record(0, 0, Some(0));
+        whole.tick.command.displacement = [[10.0, 11.0, 12.0], [13.0, 14.0, 15.0]];
+        whole.tick.command.flags = firmware::contract::frames::COMMAND_VALID;
+        let truth = whole.truth.unwrap();
+        let said = |bytes: Vec<u8>| {
+            let lines = lines(&bytes);
+            let there = lines[0].iter().zip(&lines[1]).filter(|(_, value)| !value.is_empty());
+            there.map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>()
+        };
+        let plane = said(SERIES.insertion(&[truth], &[whole]));
+        let expected = "time [s] 0.000000;tick [1] 0;true_depth [mm] 0.5;true_target_x [mm] 1;true_target_y [mm] 2;\
+            true_orthogonal_error [mm] 1;true_paddle_x [mm] 3;true_paddle_y [mm] 4;command_x [mm] 10;command_y [mm] 11;\
+            state [name] ?;faults [names] NONE";
+        assert_eq!(plane.join(";"), expected);
+        // Across a needle along z what is off its line is the hypotenuse of x and y.
+        let across = SMatrix::<f64, 3, 2>::identity();
+        let space = Series { orthogonal: &across, paddles: 2, length: "mm" };
+        let found = said(space.insertion(&[truth], &[whole])).join(";");
+        let expected = format!(
+            "true_target_z [mm] 3.5;true_orthogonal_error [mm] {};true_paddle_x [mm] 3;true_paddle_y [mm] 4;true_paddle_z [mm] 6.5;\
+             true_second_paddle_x [mm] 7;true_second_paddle_y [mm] 8;true_second_paddle_z [mm] 9;command_x [mm] 10;\
+             command_y [mm] 11;command_z [mm] 12;second_command_x [mm] 13;second_command_y [mm] 14;second_command_z [mm] 15;state",
+            5.0_f64.sqrt()
+        );
+        assert!(found.contains(&expected), "{found}");
     }
 
     #[test]

@@ -290,10 +290,10 @@ impl Stage {
     pub(super) fn at_tick(&self, truth: &Truth) -> SceneUpdate {
         let geometry = &self.geometry;
         let moved = |point: [f64; 2], by: [f64; 2]| [point[0] + by[0], point[1] + by[1]];
-        let target = self.ball("target", truth.time_ns, moved(geometry.target, truth.target));
+        let target = self.ball("target", truth.time_ns, moved(geometry.target, truth.target::<2>().into()));
         let mut paddle = SceneEntity::new("paddle", truth.time_ns);
         if let Some(at_rest) = geometry.paddles.iter().find(|paddle| paddle.index == self.paddle) {
-            let now = at_rest.segment.map(|point| moved(point, truth.paddle));
+            let now = at_rest.segment.map(|point| moved(point, truth.paddle::<2>().into()));
             paddle.lines.push(LinePrimitive::new(&now, false, TOOL, BLUE));
         }
         SceneUpdate { deletions: Vec::new(), entities: vec![self.needle(truth), paddle, target] }
@@ -387,8 +387,8 @@ mod tests {
         let truth = Truth {
             time_ns: 3_000_000_007,
             depth: 0.05,
-            target: [0.01, -0.02],
-            paddle: [0.0, -0.03],
+            target: [0.01, -0.02, 0.0],
+            paddles: [[0.0, -0.03, 0.0], [0.0; 3]],
             ..Truth::default()
         };
         let update = serde_json::to_value(stage.at_tick(&truth)).unwrap();

@@ -1,8 +1,8 @@
-//! A recording as [MCAP](https://mcap.dev): ten topics of JSON messages, each with its JSON Schema, compressed.
+//! A recording as [MCAP](https://mcap.dev): eleven topics of JSON messages, each with its JSON Schema, compressed.
 //!
 //! | topic | one message per | log time |
 //! |---|---|---|
-//! | `/needle`, `/target`, `/paddle` | sample that the controller used, with the time of its measurement | arrival |
+//! | `/needle`, `/target`, `/paddle`, `/second_paddle` | sample that the controller used, with the time of its measurement | arrival |
 //! | `/command` | tick of the controller | tick |
 //! | `/truth` | tick of the plant | tick |
 //! | `/needle_forces` | moment of a needle that slips; of a run, not of a recording alone | that moment |
@@ -12,7 +12,7 @@
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
 //! free-run. A metadata record `stillpoint` says which, with seed and hashes.
 
-use firmware::contract::frames::to_plane;
+use firmware::contract::PaddleSample;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::Cursor;
@@ -28,6 +28,7 @@ use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::csv::Series;
 use super::foxglove::{self, FrameTransform, Log, SceneUpdate, Stage};
 use crate::record::recording::Recording;
 use crate::runtime::accounting::tick::ControllerTick;
@@ -58,6 +59,9 @@ pub struct TargetMessage {
     pub x: f64,
     /// Measured displacement along y, length.
     pub y: f64,
+    /// Measured displacement along z, length; in space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z: Option<f64>,
 }
 
 /// A sample of the paddle's encoder.
@@ -73,6 +77,9 @@ pub struct PaddleMessage {
     pub x: f64,
     /// Displacement along y, length.
     pub y: f64,
+    /// Displacement along z, length; in space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z: Option<f64>,
 }
 
 /// A command of the controller.
@@ -90,6 +97,18 @@ pub struct CommandMessage {
     /// Commanded displacement along y, length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub y: Option<f64>,
+    /// Commanded displacement along z, length; in space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub z: Option<f64>,
+    /// Commanded displacement of the second paddle along x, length; where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_x: Option<f64>,
+    /// The same along y, length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_y: Option<f64>,
+    /// The same along z, length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_z: Option<f64>,
 }
 
 /// What really happened, which the controller does not see.
@@ -103,12 +122,27 @@ pub struct TruthMessage {
     pub target_x: f64,
     /// Target displacement along y, length.
     pub target_y: f64,
-    /// Target displacement orthogonal to the needle, length.
+    /// Target displacement along z, length; in space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target_z: Option<f64>,
+    /// Target displacement orthogonal to the needle, length: with a sign in the plane, its norm in space.
     pub orthogonal_error: f64,
     /// Paddle displacement along x, length.
     pub paddle_x: f64,
     /// Paddle displacement along y, length.
     pub paddle_y: f64,
+    /// Paddle displacement along z, length; in space.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub paddle_z: Option<f64>,
+    /// Displacement of the second paddle along x, length; where there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_paddle_x: Option<f64>,
+    /// The same along y, length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_paddle_y: Option<f64>,
+    /// The same along z, length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_paddle_z: Option<f64>,
 }
 
 /// Forces on a needle that slips, by the full model, per unit thickness: positive where they push it in.
@@ -174,11 +208,12 @@ fn schema_of<T: JsonSchema>() -> schemars::Schema {
 }
 
 /// Topic, name of the schema and schema of every kind of message.
-pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 10] {
+pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 11] {
     [
         ("/needle", "stillpoint.NeedleMessage", schema_of::<NeedleMessage>()),
         ("/target", "stillpoint.TargetMessage", schema_of::<TargetMessage>()),
         ("/paddle", "stillpoint.PaddleMessage", schema_of::<PaddleMessage>()),
+        ("/second_paddle", "stillpoint.PaddleMessage", schema_of::<PaddleMessage>()),
         ("/command", "stillpoint.CommandMessage", schema_of::<CommandMessage>()),
         ("/truth", "stillpoint.TruthMessage", schema_of::<TruthMessage>()),
         ("/needle_forces", "stillpoint.NeedleForcesMessage", schema_of::<NeedleForcesMessage>()),
@@ -243,7 +278,13 @@ impl Topics {
     }
 
     /// What the controller used and answered in a tick.
-    fn write_tick(&mut self, writer: &mut Output, tick: &ControllerTick) -> Result<(), McapError> {
+    fn write_tick<const D: usize, const N: usize>(
+        &mut self,
+        writer: &mut Output,
+        tick: &ControllerTick,
+        series: &Series<'_, D, N>,
+    ) -> Result<(), McapError> {
+        let third = |z: f64| (D > 2).then_some(z);
         let (inputs, command) = (&tick.inputs, &tick.command);
         let now = inputs.time_ns;
         if let Some(s) = &inputs.needle {
@@ -252,22 +293,29 @@ impl Topics {
             self.write(writer, "/needle", [now, s.time_ns], &message)?;
         }
         if let Some(s) = &inputs.target {
-            let [x, y] = to_plane(s.displacement);
-            let message = TargetMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), x, y };
+            let ([x, y, z], measured_s) = (s.displacement, seconds(s.time_ns));
+            let message = TargetMessage { sequence: s.sequence, measured_s, x, y, z: third(z) };
             self.write(writer, "/target", [now, s.time_ns], &message)?;
         }
-        if let Some(s) = &inputs.paddles[0] {
-            let (paddle_index, [x, y]) = (s.paddle_index, to_plane(s.displacement));
-            let message = PaddleMessage { sequence: s.sequence, measured_s: seconds(s.time_ns), paddle_index, x, y };
-            self.write(writer, "/paddle", [now, s.time_ns], &message)?;
+        for (topic, sample) in ["/paddle", "/second_paddle"].into_iter().zip(&inputs.paddles) {
+            let Some(s) = sample else { continue };
+            let ([x, y, z], measured_s) = (s.displacement, seconds(s.time_ns));
+            let PaddleSample { sequence, paddle_index, .. } = *s;
+            let message = PaddleMessage { sequence, measured_s, paddle_index, x, y, z: third(z) };
+            self.write(writer, topic, [now, s.time_ns], &message)?;
         }
-        let place = command.is_valid().then_some(to_plane(command.displacement[0]));
+        let [place, second] = command.displacement.map(|place| command.is_valid().then_some(place));
+        let second = second.filter(|_| series.paddles > 1);
         let message = CommandMessage {
             tick: inputs.tick,
             state: Mode::from_wire(command.state).map_or("?", Mode::name).to_owned(),
             faults: Faults::from_bits(command.faults).to_string(),
             x: place.map(|place| place[0]),
             y: place.map(|place| place[1]),
+            z: place.and_then(|place| third(place[2])),
+            second_x: second.map(|place| place[0]),
+            second_y: second.map(|place| place[1]),
+            second_z: second.and_then(|place| third(place[2])),
         };
         self.write(writer, "/command", [now, now], &message)
     }
@@ -285,16 +333,29 @@ impl Topics {
         self.write(writer, "/needle_forces", [time_ns; 2], &message)
     }
 
-    /// What really happened at a tick; `orthogonal` is n.
-    fn write_truth(&mut self, writer: &mut Output, truth: &Truth, orthogonal: [f64; 2]) -> Result<(), McapError> {
+    /// What really happened at a tick.
+    fn write_truth<const D: usize, const N: usize>(
+        &mut self,
+        writer: &mut Output,
+        truth: &Truth,
+        series: &Series<'_, D, N>,
+    ) -> Result<(), McapError> {
+        let third = |z: f64| (D > 2).then_some(z);
+        let [paddle, second] = truth.paddles;
+        let second = Some(second).filter(|_| series.paddles > 1);
         let message = TruthMessage {
             tick: truth.tick,
             depth: truth.depth,
             target_x: truth.target[0],
             target_y: truth.target[1],
-            orthogonal_error: truth.target[0] * orthogonal[0] + truth.target[1] * orthogonal[1],
-            paddle_x: truth.paddle[0],
-            paddle_y: truth.paddle[1],
+            target_z: third(truth.target[2]),
+            orthogonal_error: series.error(truth),
+            paddle_x: paddle[0],
+            paddle_y: paddle[1],
+            paddle_z: third(paddle[2]),
+            second_paddle_x: second.map(|place| place[0]),
+            second_paddle_y: second.map(|place| place[1]),
+            second_paddle_z: second.and_then(|place| third(place[2])),
         };
         self.write(writer, "/truth", [truth.time_ns; 2], &message)
     }
@@ -344,11 +405,15 @@ impl Topics {
     }
 }
 
-/// The recording as an MCAP file; `orthogonal` is n.
+/// The recording as an MCAP file.
 ///
 /// # Errors
 /// [`McapError`] of the writer.
-pub fn encode(recording: &Recording, orthogonal: [f64; 2], known: Known<'_>) -> Result<Vec<u8>, McapError> {
+pub fn encode<const D: usize, const N: usize>(
+    recording: &Recording,
+    series: &Series<'_, D, N>,
+    known: Known<'_>,
+) -> Result<Vec<u8>, McapError> {
     let needle = known.needle;
     let compression = Some(::mcap::Compression::Lz4);
     let options = ::mcap::WriteOptions::new().compression(compression).profile("").library("host-sim");
@@ -360,10 +425,10 @@ pub fn encode(recording: &Recording, orthogonal: [f64; 2], known: Known<'_>) -> 
         while let Some((time_ns, reading)) = moments.next_if(|(time_ns, _)| *time_ns <= record.tick.inputs.time_ns) {
             topics.write_forces(&mut writer, time_ns, reading)?;
         }
-        topics.write_tick(&mut writer, &record.tick)?;
+        topics.write_tick(&mut writer, &record.tick, series)?;
         topics.write_change(&mut writer, &mut said, &record.tick)?;
         if let Some(truth) = &record.truth {
-            topics.write_truth(&mut writer, truth, orthogonal)?;
+            topics.write_truth(&mut writer, truth, series)?;
             if let Some(stage) = known.stage {
                 topics.write_picture(&mut writer, stage, &mut shown, truth)?;
             }

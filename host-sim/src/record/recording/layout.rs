@@ -1,6 +1,7 @@
 //! The bytes of headers and records.
 
 use firmware::Settings;
+use firmware::contract::frames::{MAX_DIMENSION, MAX_PADDLES};
 use firmware::law::{Direction, Feedback};
 use firmware::limits::PositionLimit;
 use sha2::{Digest, Sha256};
@@ -113,8 +114,7 @@ pub(super) fn encode_record(record: &Record, writer: &mut ByteWriter) {
         // Number as the controller's: a truth belongs to the tick of its record.
         writer.u64(truth.time_ns);
         writer.f64(truth.depth);
-        writer.vector(&truth.target);
-        writer.vector(&truth.paddle);
+        truth.target.iter().chain(truth.paddles.iter().flatten()).for_each(|component| writer.f64(*component));
     }
 }
 
@@ -126,12 +126,12 @@ pub(super) fn decode_record(reader: &mut ByteReader<'_>) -> Option<Record> {
             tick: tick.inputs.tick,
             time_ns: reader.u64()?,
             depth: reader.f64()?,
-            target: reader.vector()?,
-            paddle: reader.vector()?,
+            target: reader.displacement()?,
+            paddles: [reader.displacement()?, reader.displacement()?],
         }),
         _ => return None,
     };
     Some(Record { tick, truth })
 }
 
-const _: () = assert!(4 + TICK_BYTES + 4 + 8 + 8 + 16 + 16 <= BODY_BYTES);
+const _: () = assert!(4 + TICK_BYTES + 4 + 8 + 8 + (1 + MAX_PADDLES) * MAX_DIMENSION * 8 <= BODY_BYTES);

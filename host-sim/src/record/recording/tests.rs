@@ -29,8 +29,8 @@ fn recording(ticks: u64) -> Recording {
                 tick,
                 time_ns: tick * 1_000_000,
                 depth: 0.5,
-                target: [1.0, 2.0],
-                paddle: [3.0, 4.0],
+                target: [1.0, 2.0, -0.0],
+                paddles: [[3.0, 4.0, 5.0], [6.0, -7.0, 1e-300]],
             }),
         })
         .collect();

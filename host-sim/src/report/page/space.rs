@@ -8,6 +8,7 @@ use model_offline::output::chart::{Axis, Colour, Dash, Panel, Place, ReferenceLi
 use super::embed::panels;
 use super::style;
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
+use crate::runtime::time::mode::RunMode;
 
 /// The whole page; it needs nothing else.
 pub(in crate::report) fn render(run: &SpaceRun) -> String {
@@ -28,7 +29,11 @@ pub(in crate::report) fn render(run: &SpaceRun) -> String {
                         "Insertion to " (length(run.depth)) " " (unit) " in " (run.insertion_s) " s. Loop " (run.rate_hz)
                         " Hz; target seen at " (run.target_rate_hz) " Hz, " (run.target_latency_ms) " ms late, noise "
                         (length(run.noise)) " " (unit) " per component; seed " (run.seed) ". Tissue: linear tetrahedra, "
-                        (run.nodes) " nodes, tabulated along each insertion. One process, simulated time."
+                        (run.nodes) " nodes, tabulated along each insertion. Plant and controller are two processes; "
+                        @match run.mode {
+                            RunMode::Lockstep => "time is simulated.",
+                            RunMode::FreeRun => "the machine's clock drives time.",
+                        }
                     }
                     @for case in &run.cases { (of_case(run, case)) }
                 }

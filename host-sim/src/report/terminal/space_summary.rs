@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use super::summary::{FreeRun, write_free_runs, write_ledgers};
 use crate::bench::in_space::{SpaceRun, SpaceStrategyResult};
+use crate::runtime::time::mode::RunMode;
 use model_offline::number::length;
 
 /// Everything that a person wants to know first.
@@ -23,7 +25,7 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
     for case in &run.cases {
         let _ = writeln!(
             out,
-            "\n{} tissue, table of {} tissue\n  {:<24} {:>14} {:>14} {:>14}  state",
+            "\n{} tissue, table of {} tissue\n  {:<34} {:>14} {:>14} {:>14}  state",
             case.tissue.name(),
             case.table_tissue.name(),
             "",
@@ -31,8 +33,12 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
             "RMS",
             "paddle travel"
         );
-        for (name, result) in [("none", &case.none), ("static", &case.fixture), ("dynamic", &case.dynamic)] {
-            let _ = writeln!(out, "  {:<24} {}", format!("{name}{}", paddles(result)), numbers(result));
+        let strategies =
+            [("none", Some(&case.none)), ("static", Some(&case.fixture)), ("dynamic", Some(&case.dynamic))];
+        let once_more = ("dynamic, free-run", case.dynamic_free_run.as_ref());
+        let strategies = strategies.into_iter().chain([once_more]);
+        for (name, result) in strategies.filter_map(|(name, result)| Some((name, result?))) {
+            let _ = writeln!(out, "  {:<34} {}", format!("{name}{}", paddles(result)), numbers(result));
         }
         let _ = writeln!(
             out,
@@ -50,8 +56,28 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
             plant.fallbacks
         );
     }
+    // A string takes everything.
+    let _ = write_loop(&mut out, run);
     let _ = writeln!(out, "\n{:.1} s · {}", run.wall_s, directory.join("report.html").display());
     out
+}
+
+/// Loops on the machine's clock, and the accounts of all controlled runs.
+fn write_loop(out: &mut String, run: &SpaceRun) -> std::fmt::Result {
+    let controlled = || {
+        run.cases
+            .iter()
+            .flat_map(|case| [Some((case, &case.dynamic)), case.dynamic_free_run.as_ref().map(|r| (case, r))])
+            .flatten()
+    };
+    let on_a_clock = controlled().filter(|(_, result)| result.mode == RunMode::FreeRun);
+    let free_runs = on_a_clock.map(|(case, result)| FreeRun {
+        tissue: case.tissue,
+        timing: [&result.timing, &result.plant_timing],
+        final_state: result.final_state,
+    });
+    write_free_runs(out, run.rate_hz, free_runs)?;
+    write_ledgers(out, controlled().filter_map(|(_, result)| result.ledger.as_ref()))
 }
 
 fn paddles(result: &SpaceStrategyResult) -> String {

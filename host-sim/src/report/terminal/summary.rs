@@ -3,13 +3,15 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use firmware::Mode;
 use model_offline::number::{decimals, smallest_told};
 use model_offline::output::chart::number::plain;
-use model_offline::scene::PlantModel;
+use model_offline::scene::{PlantModel, TissueVariant};
 
 use crate::bench::result::{CaseResult, RunResult, SimulationSettings, StrategyResult};
 use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
+use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
 use crate::world::tissue::PlantAccount;
@@ -255,11 +257,21 @@ fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fm
     }
 }
 
+/// A loop on the machine's clock.
+pub(super) struct FreeRun<'r> {
+    /// Its tissue.
+    pub(super) tissue: TissueVariant,
+    /// Timing of the controller and of the plant.
+    pub(super) timing: [&'r Option<LoopTiming>; 2],
+    /// State at the end.
+    pub(super) final_state: Option<Mode>,
+}
+
 /// Both sides of a loop on the machine's clock: the counts first, then how late.
-fn write_free_run(text: &mut String, case: &CaseResult, free_run: &StrategyResult) -> std::fmt::Result {
+fn write_free_run(text: &mut String, free_run: &FreeRun<'_>) -> std::fmt::Result {
     let us = |ns: u64| ns as f64 * 1e-3;
-    let sides = [("controller", &free_run.timing), ("plant", &free_run.plant_timing)];
-    let sides: Vec<_> = sides.into_iter().filter_map(|(side, timing)| Some((side, timing.as_ref()?))).collect();
+    let sides = ["controller", "plant"].into_iter().zip(free_run.timing);
+    let sides: Vec<_> = sides.filter_map(|(side, timing)| Some((side, timing.as_ref()?))).collect();
     let counts: Vec<_> = sides
         .iter()
         .map(|(side, timing)| {
@@ -268,7 +280,7 @@ fn write_free_run(text: &mut String, case: &CaseResult, free_run: &StrategyResul
         })
         .collect();
     let state = names::mode::name(free_run.final_state);
-    writeln!(text, "  {}: {}; ended in {state}", case.tissue, counts.join("; "))?;
+    writeln!(text, "  {}: {}; ended in {state}", free_run.tissue, counts.join("; "))?;
     for (side, LoopTiming { release_lateness: lateness, scheduling, .. }) in sides {
         let [p50, p99, max] = [lateness.p50_ns, lateness.p99_ns, lateness.max_ns].map(us);
         let policy = &scheduling.policy;
@@ -279,19 +291,39 @@ fn write_free_run(text: &mut String, case: &CaseResult, free_run: &StrategyResul
 
 fn write_loop(text: &mut String, run: &RunResult) -> std::fmt::Result {
     let strategies = || run.cases.iter().map(|case| &case.strategies);
-    if strategies().any(|strategies| strategies.dynamic_free_run.is_some()) {
-        writeln!(text, "\nFree-run at {} Hz, from the scheduled time", run.settings.rate_hz)?;
-    }
-    for case in &run.cases {
-        if let Some(free_run) = &case.strategies.dynamic_free_run {
-            write_free_run(text, case, free_run)?;
-        }
-    }
-    let ledgers: Vec<_> = strategies()
+    let free_runs = run.cases.iter().filter_map(|case| {
+        let StrategyResult { timing, plant_timing, final_state, .. } = case.strategies.dynamic_free_run.as_ref()?;
+        Some(FreeRun { tissue: case.tissue, timing: [timing, plant_timing], final_state: *final_state })
+    });
+    write_free_runs(text, run.settings.rate_hz, free_runs)?;
+    let ledgers = strategies()
         .flat_map(|strategies| [&strategies.dynamic, &strategies.dynamic_free_run])
         .flatten()
-        .filter_map(|strategy| strategy.ledger.as_ref())
-        .collect();
+        .filter_map(|strategy| strategy.ledger.as_ref());
+    write_ledgers(text, ledgers)
+}
+
+/// All loops on the machine's clock, where there are any.
+pub(super) fn write_free_runs<'r>(
+    text: &mut String,
+    rate_hz: f64,
+    free_runs: impl Iterator<Item = FreeRun<'r>>,
+) -> std::fmt::Result {
+    for (k, free_run) in free_runs.enumerate() {
+        if k == 0 {
+            writeln!(text, "\nFree-run at {rate_hz} Hz, from the scheduled time")?;
+        }
+        write_free_run(text, &free_run)?;
+    }
+    Ok(())
+}
+
+/// What is in the accounts of all controlled runs together.
+pub(super) fn write_ledgers<'r>(
+    text: &mut String,
+    ledgers: impl Iterator<Item = &'r LedgerResult>,
+) -> std::fmt::Result {
+    let ledgers: Vec<&LedgerResult> = ledgers.collect();
     let ticks: u64 = ledgers.iter().map(|ledger| ledger.ticks.due).sum();
     let unaccounted: u64 = ledgers.iter().map(|ledger| ledger.unaccounted).sum();
     let not_recorded: u64 = ledgers.iter().map(|ledger| ledger.not_recorded).sum();

@@ -46,6 +46,15 @@ impl RecordAccount {
     }
 }
 
+/// Samples that a plant has published.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Published {
+    /// Of the needle, the target, and the only or the first paddle.
+    pub streams: [u64; 3],
+    /// Of the second paddle, where there is one.
+    pub second_paddle: Option<u64>,
+}
+
 /// The controller's accounts of a whole run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ControllerAccounts {
@@ -53,8 +62,11 @@ pub struct ControllerAccounts {
     pub needle: StreamAccount,
     /// Target samples.
     pub target: StreamAccount,
-    /// Paddle samples.
+    /// Samples of the only or the first paddle.
     pub paddle: StreamAccount,
+    /// Samples of the second paddle, where the table has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_paddle: Option<StreamAccount>,
     /// Ticks.
     pub ticks: TickResult,
     /// Commands that left.
@@ -102,19 +114,25 @@ impl ControllerAccounts {
     }
 
     /// Both sides' accounts together.
-    pub fn ledger(&self, published: [u64; 3], command: &CommandAccount) -> LedgerResult {
-        let [needle, target, paddle] = published;
+    pub fn ledger(&self, published: Published, command: &CommandAccount) -> LedgerResult {
+        let Published { streams: [needle, target, paddle], second_paddle } = published;
         let mut ledger = LedgerResult {
             needle: stream(&self.needle, needle),
             target: stream(&self.target, target),
             paddle: stream(&self.paddle, paddle),
+            second_paddle: match (&self.second_paddle, second_paddle) {
+                (None, None) => None,
+                // Who knows of a paddle that the other does not has samples that nobody accounts for.
+                (account, published) => Some(stream(&account.unwrap_or_default(), published.unwrap_or(0))),
+            },
             command: command.result(self.commands),
             ticks: self.ticks,
             not_recorded: self.not_kept,
             unaccounted: 0,
         };
         ledger.unaccounted = [&ledger.needle, &ledger.target, &ledger.paddle, &ledger.command]
-            .iter()
+            .into_iter()
+            .chain(&ledger.second_paddle)
             .map(|stream| stream.unaccounted)
             .sum::<u64>()
             + ledger.ticks.unaccounted;

@@ -13,8 +13,11 @@ pub struct LedgerResult {
     pub needle: StreamResult,
     /// Target samples.
     pub target: StreamResult,
-    /// Paddle samples.
+    /// Samples of the only or the first paddle.
     pub paddle: StreamResult,
+    /// Samples of the second paddle, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub second_paddle: Option<StreamResult>,
     /// Commands.
     pub command: StreamResult,
     /// Ticks.

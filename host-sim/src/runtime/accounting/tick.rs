@@ -1,7 +1,7 @@
 //! What the controller saw and answered, tick by tick.
 
 use firmware::Inputs;
-use firmware::contract::frames::{MAX_DIMENSION, MAX_PADDLES};
+use firmware::contract::frames::MAX_PADDLES;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 
 use crate::exchange::bytes::{ByteReader, ByteWriter};
@@ -78,7 +78,7 @@ impl ControllerTick {
             sequence: reader.u32()?,
             flags: reader.u32()?,
             time_ns: reader.u64()?,
-            displacement: displacement(reader)?,
+            displacement: reader.displacement()?,
         };
         let paddles = [paddle(reader)?, paddle(reader)?];
         let command = PaddleCommand {
@@ -87,7 +87,7 @@ impl ControllerTick {
             tick: reader.u64()?,
             time_ns: reader.u64()?,
             faults: reader.u64()?,
-            displacement: [displacement(reader)?, displacement(reader)?],
+            displacement: [reader.displacement()?, reader.displacement()?],
             needle_sequence: reader.u32()?,
             target_sequence: reader.u32()?,
             paddle_index: [reader.u32()?, reader.u32()?],
@@ -107,15 +107,11 @@ impl ControllerTick {
     }
 }
 
-fn displacement(reader: &mut ByteReader<'_>) -> Option<[f64; MAX_DIMENSION]> {
-    Some([reader.f64()?, reader.f64()?, reader.f64()?])
-}
-
 fn paddle(reader: &mut ByteReader<'_>) -> Option<PaddleSample> {
     Some(PaddleSample {
         sequence: reader.u32()?,
         paddle_index: reader.u32()?,
         time_ns: reader.u64()?,
-        displacement: displacement(reader)?,
+        displacement: reader.displacement()?,
     })
 }

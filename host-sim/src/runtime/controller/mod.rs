@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use firmware::contract::PaddleCommand;
+use firmware::contract::frames::MAX_PADDLES;
 use firmware::io::{CommandSink, SampleSource};
 use firmware::{Faults, Inputs, Mode};
 use iceoryx2::service::Service;
@@ -45,7 +46,8 @@ pub struct ControlLoop<'c> {
     kept: Vec<ControllerTick>,
     not_kept: u64,
     faults: Faults,
-    spans: [SequenceSpan; 3],
+    /// Of the needle, the target, and each paddle.
+    spans: [SequenceSpan; 2 + MAX_PADDLES],
     /// In free-run the schedule knows better than the ticks that happened.
     scheduled: Option<(u64, u64)>,
     timing: Option<LoopTiming>,
@@ -76,7 +78,7 @@ impl<'c> ControlLoop<'c> {
             kept: Vec::with_capacity(capacity),
             not_kept: 0,
             faults: Faults::NONE,
-            spans: [SequenceSpan::default(); 3],
+            spans: [SequenceSpan::default(); 2 + MAX_PADDLES],
             scheduled: None,
             timing: None,
             modes: [0; 3],
@@ -244,7 +246,7 @@ impl<'c> ControlLoop<'c> {
                     self.executor.rearm()?;
                 }
                 let (needle, target) = (ports.needle(), ports.target());
-                let inputs = Inputs { tick, time_ns, needle, target, paddles: [ports.paddle(0), None] };
+                let inputs = Inputs { tick, time_ns, needle, target, paddles: ports.paddles() };
                 self.executor.step(&inputs).map(|command| (inputs, command))
             };
             catch_unwind(AssertUnwindSafe(step)).ok()
@@ -265,6 +267,7 @@ impl<'c> ControlLoop<'c> {
             inputs.needle.map(|sample| sample.sequence),
             inputs.target.map(|sample| sample.sequence),
             inputs.paddles[0].map(|sample| sample.sequence),
+            inputs.paddles[1].map(|sample| sample.sequence),
         ];
         for (span, sequence) in self.spans.iter_mut().zip(sequences) {
             if let Some(sequence) = sequence {
@@ -317,8 +320,9 @@ impl<'c> ControlLoop<'c> {
         ports: &mut ControllerPorts<S>,
     ) -> Result<(ControllerAccounts, Vec<ControllerTick>), RuntimeError> {
         let ledger = self.executor.ledger()?;
-        let [needle, target, paddle] = self.spans;
-        let waiting = (ports.needle(), ports.target(), ports.paddle(0));
+        let [needle, target, paddle, second] = self.spans;
+        let waiting =
+            (ports.needle(), ports.target(), ports.paddles().map(|waiting| waiting.map(|sample| sample.sequence)));
         let ticks = &ledger.ticks;
         let (due, skipped) = self.scheduled.unwrap_or((ticks.due, ticks.skipped));
         let [hold, run, safe] = self.modes;
@@ -332,7 +336,8 @@ impl<'c> ControlLoop<'c> {
         let accounts = ControllerAccounts {
             needle: needle.account(&ledger.needle, waiting.0.map(|sample| sample.sequence)),
             target: target.account(&ledger.target, waiting.1.map(|sample| sample.sequence)),
-            paddle: paddle.account(&ledger.paddles[0], waiting.2.map(|sample| sample.sequence)),
+            paddle: paddle.account(&ledger.paddles[0], waiting.2[0]),
+            second_paddle: ports.has_second_paddle().then(|| second.account(&ledger.paddles[1], waiting.2[1])),
             ticks: TickResult { due, run, hold, safe, skipped, unaccounted: due.abs_diff(entries) + own },
             commands: ports.command.published(),
             final_state: Some(Mode::from_wire(self.last.state).unwrap_or_default()),

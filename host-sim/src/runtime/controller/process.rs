@@ -37,7 +37,7 @@ pub struct Service {
     pub timeout: Duration,
     /// The plant's process, if it has started this one.
     pub parent: Option<Pid>,
-    /// What the table was computed from.
+    /// What the table was computed from, and for which paddles.
     pub introduction: Introduction,
 }
 
@@ -65,7 +65,7 @@ pub fn serve(control_loop: ControlLoop<'_>, space: &Space, service: &Service) ->
 fn serve_in(mut control_loop: ControlLoop<'_>, space: &Space, service: &Service) -> Result<ServedPlant, RuntimeError> {
     let elsewhere = || Peer::Elsewhere(Box::new(space.clone()), Role::Plant);
     let mut peer = service.parent.map_or_else(elsewhere, Peer::Parent);
-    let mut ports = ControllerPorts::<ipc::Service>::open(space)?;
+    let mut ports = ControllerPorts::<ipc::Service>::open_for(space, service.introduction.paddles.len())?;
     service.introduction.tell(space)?;
     let mut patience = Patience::new(service.timeout);
     while !ports.has_peer() {

@@ -1,4 +1,4 @@
-//! What a controller says about its table before the first sample: of which scene, and in which units.
+//! What a controller says about its table before the first sample: of which scene, in which units, for which paddles.
 //!
 //! A table of another scene, or one in millimetres beside a plant in metres, moves the paddle just as willingly. Where one
 //! process starts the other it has compared them; two processes by hand tell each other in a file of the link's own
@@ -25,6 +25,9 @@ pub struct Introduction {
     pub scene_hash: String,
     /// Units of length and stress.
     pub units: [String; 2],
+    /// Indices of the paddles.
+    #[serde(default)]
+    pub paddles: Vec<u32>,
 }
 
 impl Introduction {
@@ -59,19 +62,36 @@ impl Introduction {
         }
     }
 
-    /// Compares with what the plant simulates: one of `scene_hashes`, in `units`.
+    /// Compares with what the plant simulates.
     ///
     /// # Errors
-    /// [`RuntimeError::OtherScene`], [`RuntimeError::OtherUnits`].
-    pub fn check(&self, scene_hashes: &[String], units: &[String; 2]) -> Result<(), RuntimeError> {
+    /// [`RuntimeError::OtherScene`], [`RuntimeError::OtherUnits`], [`RuntimeError::OtherPaddles`].
+    pub fn check(&self, expected: &Expected) -> Result<(), RuntimeError> {
+        let Expected { scene_hashes, units, paddles } = expected;
         if self.units != *units {
             return Err(RuntimeError::OtherUnits { found: self.units.clone(), expected: units.clone() });
         }
         if !scene_hashes.contains(&self.scene_hash) {
             return Err(RuntimeError::OtherScene);
         }
-        Ok(())
+        match paddles {
+            Some(paddles) if *paddles != self.paddles => {
+                Err(RuntimeError::OtherPaddles { found: self.paddles.clone(), expected: paddles.clone() })
+            }
+            _ => Ok(()),
+        }
     }
+}
+
+/// What a controller's table must have been computed from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Expected {
+    /// SHA-256 of the scenes that will do, as hexadecimal digits.
+    pub scene_hashes: Vec<String>,
+    /// Units of length and stress.
+    pub units: [String; 2],
+    /// Indices of the paddles, in this order; none: whichever they are, the controller sees by their samples.
+    pub paddles: Option<Vec<u32>>,
 }
 
 #[cfg(test)]
@@ -85,14 +105,22 @@ mod tests {
     fn another_scene_and_other_units_are_refused() {
         let space = Space::unique().unwrap();
         let units = ["mm", "kPa"].map(str::to_owned);
-        let introduction = Introduction { scene_hash: "ab".repeat(32), units: units.clone() };
+        let introduction = Introduction { scene_hash: "ab".repeat(32), units: units.clone(), paddles: vec![5, 6] };
         introduction.tell(&space).unwrap();
         let heard = Introduction::hear(&space).unwrap();
         assert_eq!(heard, introduction);
-        assert!(heard.check(&["cd".repeat(32), "ab".repeat(32)], &units).is_ok());
-        assert!(matches!(heard.check(&["cd".repeat(32)], &units), Err(RuntimeError::OtherScene)));
-        let metres = ["m", "kPa"].map(str::to_owned);
-        assert!(matches!(heard.check(&["ab".repeat(32)], &metres), Err(RuntimeError::OtherUnits { .. })));
+        let both = vec!["cd".repeat(32), "ab".repeat(32)];
+        let expected = Expected { scene_hashes: both, units, paddles: None };
+        assert!(heard.check(&expected).is_ok());
+        let paddles = |paddles: &[u32]| heard.check(&Expected { paddles: Some(paddles.to_vec()), ..expected.clone() });
+        assert!(paddles(&[5, 6]).is_ok());
+        for other in [&[6, 5][..], &[5], &[]] {
+            assert!(matches!(paddles(other), Err(RuntimeError::OtherPaddles { .. })), "{other:?}");
+        }
+        let other = Expected { scene_hashes: vec!["cd".repeat(32)], ..expected.clone() };
+        assert!(matches!(heard.check(&other), Err(RuntimeError::OtherScene)));
+        let metres = Expected { units: ["m", "kPa"].map(str::to_owned), ..expected };
+        assert!(matches!(heard.check(&metres), Err(RuntimeError::OtherUnits { .. })));
         space.leave::<local::Service>(Departure::First);
     }
 }

@@ -16,6 +16,7 @@ use crate::runtime::peer::Peer;
 use crate::runtime::time::clock::{now_ns, release_real_time, request_real_time};
 use crate::runtime::time::durations::{LoopDurations, LoopTiming};
 use crate::runtime::time::periodic::PeriodicLoop;
+use crate::world::tissue::TissueResponse;
 
 /// From the start frame to tick 0: time for the controller to fall asleep.
 const LEAD_NS: u64 = 20_000_000;
@@ -92,9 +93,9 @@ impl<S: Service> FreeRun<'_, '_, S> {
     ///
     /// # Errors
     /// [`RuntimeError`].
-    pub fn run(
+    pub fn run<T: TissueResponse<D>, const D: usize>(
         mut self,
-        plant: &mut PlantLoop<'_>,
+        plant: &mut PlantLoop<T, D>,
         progress: &dyn Fn(),
     ) -> Result<(CommandAccount, LoopTiming), RuntimeError> {
         let mut durations = LoopDurations::default();
@@ -115,9 +116,9 @@ impl<S: Service> FreeRun<'_, '_, S> {
         Ok((account, LoopTiming { input_age, target_age, ..timing }))
     }
 
-    fn ticks(
+    fn ticks<T: TissueResponse<D>, const D: usize>(
         &mut self,
-        plant: &mut PlantLoop<'_>,
+        plant: &mut PlantLoop<T, D>,
         periodic: &mut PeriodicLoop,
         durations: &mut LoopDurations,
         progress: &dyn Fn(),

@@ -11,13 +11,14 @@ use crate::runtime::accounting::accounts::CommandAccount;
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::signals;
+use crate::world::tissue::TissueResponse;
 
 /// Runs the whole insertion; `progress` is called at every tick.
 ///
 /// # Errors
 /// [`RuntimeError`].
-pub fn run<S: Service>(
-    plant: &mut PlantLoop<'_>,
+pub fn run<S: Service, T: TissueResponse<D>, const D: usize>(
+    plant: &mut PlantLoop<T, D>,
     ports: &mut PlantPorts<S>,
     peer: &mut Peer,
     pace: &Pace,

@@ -15,31 +15,34 @@ use iceoryx2::service::Service;
 
 use self::ages::InputAges;
 use self::observer::{Answer, Moment, Observer};
+use super::accounting::accounts::Published;
 use super::error::RuntimeError;
+use super::signals;
 use super::time::clock::now_ns;
-use crate::exchange::{LinkError, PlantPorts};
+use crate::exchange::{LinkError, PlantPorts, Sender};
 use crate::world::World;
 use crate::world::error::WorldError;
+use crate::world::needle::NeedleTrajectory;
 use crate::world::simulation::{LONGEST_WAIT_FOR_RUN_NS, Simulation};
-use crate::world::tissue::TissuePlant;
+use crate::world::tissue::TissueResponse;
 use crate::world::truth::Truth;
 
-/// A world in a loop, with everything that is kept of it.
+/// A world in D dimensions in a loop, with everything that is kept of it.
 #[derive(Debug)]
-pub struct PlantLoop<'m> {
-    world: World<TissuePlant<'m>>,
+pub struct PlantLoop<T, const D: usize = 2> {
+    world: World<T, NeedleTrajectory, D>,
     duration_ns: u64,
     truths: Vec<Truth>,
     first_ns: Option<u64>,
     solving: Duration,
-    observer: Option<Box<dyn Observer>>,
+    observer: Option<Box<dyn Observer<T>>>,
     answer: Option<Answer>,
     ages: InputAges,
 }
 
-impl<'m> PlantLoop<'m> {
+impl<T: TissueResponse<D>, const D: usize> PlantLoop<T, D> {
     /// A world before its first tick.
-    pub fn new(world: World<TissuePlant<'m>>, simulation: &Simulation) -> Self {
+    pub fn new(world: World<T, NeedleTrajectory, D>, simulation: &Simulation) -> Self {
         let truths = Vec::with_capacity(simulation.ticks() as usize);
         let duration_ns = simulation.duration_ns();
         let ages = InputAges::default();
@@ -47,13 +50,31 @@ impl<'m> PlantLoop<'m> {
     }
 
     /// Somebody looks on from now.
-    pub fn observed_by(&mut self, observer: Box<dyn Observer>) {
+    pub fn observed_by(&mut self, observer: Box<dyn Observer<T>>) {
         self.observer = Some(observer);
     }
 
     /// The world.
-    pub fn world(&mut self) -> &mut World<TissuePlant<'m>> {
+    pub fn world(&mut self) -> &mut World<T, NeedleTrajectory, D> {
         &mut self.world
+    }
+
+    /// Runs the whole insertion without a controller, time in ticks all the same; `progress` is called at every tick.
+    ///
+    /// # Errors
+    /// [`RuntimeError::World`], [`RuntimeError::Interrupted`].
+    pub fn uncontrolled(&mut self, period_ns: u64, progress: &dyn Fn()) -> Result<(), RuntimeError> {
+        self.world.start_needle(0);
+        for tick in 0.. {
+            let time_ns = tick * period_ns;
+            if self.is_over(time_ns) {
+                break;
+            }
+            signals::check()?;
+            self.solve(tick, time_ns)?;
+            progress();
+        }
+        Ok(())
     }
 
     /// Solves for this moment and notes what really happened.
@@ -82,9 +103,9 @@ impl<'m> PlantLoop<'m> {
     /// [`RuntimeError::World`], [`RuntimeError::Link`].
     fn publish<S: Service>(&mut self, tick: u64, time_ns: u64, ports: &mut PlantPorts<S>) -> Result<(), RuntimeError> {
         let truth = self.solve(tick, time_ns)?;
-        let (needle, paddle) = self.world.encoders(time_ns);
+        let (needle, paddles) = self.world.encoders(time_ns);
         ports.needle.send(needle)?;
-        ports.paddle.send(paddle)?;
+        ports.send_paddles(&paddles)?;
         self.ages.needle(needle.sequence, needle.time_ns);
         for sample in self.world.target_samples(&truth) {
             self.ages.target(sample.sequence, sample.time_ns);
@@ -140,9 +161,12 @@ impl<'m> PlantLoop<'m> {
     }
 }
 
-/// Samples that the plant has published: needle, target, paddle.
-pub fn published<S: Service>(ports: &PlantPorts<S>) -> [u64; 3] {
-    [ports.needle.published(), ports.target.published(), ports.paddle.published()]
+/// Samples that the plant has published.
+pub fn published<S: Service>(ports: &PlantPorts<S>) -> Published {
+    Published {
+        streams: [ports.needle.published(), ports.target.published(), ports.paddle.published()],
+        second_paddle: ports.second_paddle.as_ref().map(Sender::published),
+    }
 }
 
 /// The newest command that waits, for closing the accounts.

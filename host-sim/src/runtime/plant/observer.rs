@@ -31,10 +31,10 @@ pub struct Answer {
     pub faults: Faults,
 }
 
-/// Looks on.
-pub trait Observer: std::fmt::Debug + Send {
+/// Looks on at tissue T.
+pub trait Observer<T>: std::fmt::Debug + Send {
     /// A moment that may be looked at; must not wait, but where it holds time after this moment.
-    fn offer(&mut self, tissue: &TissuePlant<'_>, moment: &Moment);
+    fn offer(&mut self, tissue: &T, moment: &Moment);
 
     /// Whether the insertion is to end now.
     fn ends_early(&self) -> bool;
@@ -61,5 +61,5 @@ pub struct ObservedInsertion<'m> {
 /// Looks on at one insertion after another.
 pub trait Spectator: std::fmt::Debug {
     /// Begins to look on.
-    fn observe(&self, insertion: ObservedInsertion<'_>) -> Box<dyn Observer>;
+    fn observe<'m>(&self, insertion: ObservedInsertion<'m>) -> Box<dyn Observer<TissuePlant<'m>>>;
 }

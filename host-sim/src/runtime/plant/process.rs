@@ -3,20 +3,22 @@
 use std::time::Duration;
 
 use iceoryx2::service::ipc;
-use nalgebra::Vector2;
+use nalgebra::SMatrix;
 use serde::{Deserialize, Serialize};
 
 use super::free_run::{FreeRun, Succession};
 use super::lockstep::Pace;
 use super::{PlantLoop, lockstep, published};
 use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
-use crate::runtime::accounting::accounts::CommandAccount;
+use crate::runtime::accounting::accounts::{CommandAccount, Published};
 use crate::runtime::error::{Role, RuntimeError};
-use crate::runtime::peer::introduction::Introduction;
+use crate::runtime::peer::introduction::{Expected, Introduction};
 use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::loop_settings::LoopSettings;
+use crate::world::tissue::TissueResponse;
+use crate::world::truth::{Truth, from_frame};
 
 /// What `plant --json` writes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,15 +27,18 @@ pub struct PlantResult {
     pub ticks: u64,
     /// Controllers that have come.
     pub controllers: u64,
-    /// Needle, target and paddle samples published.
+    /// Samples published of the needle, the target, and the only or the first paddle.
     pub published: [u64; 3],
+    /// Those of the second paddle, where there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub published_second_paddle: Option<u64>,
     /// Commands executed.
     pub commands: u64,
     /// Commands replaced by newer ones before the plant looked.
     pub overwritten: u64,
     /// Largest orthogonal target displacement, length.
     pub largest_error: f64,
-    /// Largest motion of the paddle per tick, length.
+    /// Largest motion of a paddle per tick, length.
     pub largest_step: f64,
     /// Timing of the loop; free-run only.
     pub timing: Option<LoopTiming>,
@@ -54,15 +59,6 @@ pub struct Visit {
     pub expected: Option<Expected>,
 }
 
-/// What a controller's table must have been computed from.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Expected {
-    /// SHA-256 of the scenes that will do, as hexadecimal digits.
-    pub scene_hashes: Vec<String>,
-    /// Units of length and stress.
-    pub units: [String; 2],
-}
-
 /// What the death of a controller means to the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OnDeath {
@@ -73,53 +69,62 @@ pub enum OnDeath {
 }
 
 /// Commands, controllers, timing, samples published.
-type Inserted = (CommandAccount, u64, Option<LoopTiming>, [u64; 3]);
+type Inserted = (CommandAccount, u64, Option<LoopTiming>, Published);
 
-/// Runs one insertion. Leaves nothing behind in shared memory, however it ends. `orthogonal` is n.
+/// Runs one insertion. Leaves nothing behind in shared memory, however it ends. `orthogonal` are the N directions orthogonal to
+/// the needle.
 ///
 /// # Errors
 /// [`RuntimeError`].
-pub fn serve(
-    plant: &mut PlantLoop<'_>,
+pub fn serve<T: TissueResponse<D>, const D: usize, const N: usize>(
+    plant: &mut PlantLoop<T, D>,
     space: &Space,
     visit: &Visit,
-    orthogonal: &Vector2<f64>,
+    orthogonal: &SMatrix<f64, D, N>,
 ) -> Result<PlantResult, RuntimeError> {
     let outcome = insertion(plant, space, visit);
     space.leave::<ipc::Service>(Departure::Last);
     let (account, controllers, timing, published) = outcome?;
     let truths = plant.truths();
-    let error = |target: [f64; 2]| Vector2::from(target).dot(orthogonal).abs();
+    let error = |truth: &Truth| orthogonal.tr_mul(&truth.target::<D>()).norm();
     let [commands, overwritten] = account.counts();
     Ok(PlantResult {
         ticks: truths.len() as u64,
         controllers,
-        published,
+        published: published.streams,
+        published_second_paddle: published.second_paddle,
         commands,
         overwritten,
-        largest_error: truths.iter().map(|truth| error(truth.target)).fold(0.0, f64::max),
+        largest_error: truths.iter().map(error).fold(0.0, f64::max),
         largest_step: truths
             .windows(2)
             .map(|pair| {
-                let step = (Vector2::from(pair[1].paddle) - Vector2::from(pair[0].paddle)).norm();
-                step / (pair[1].tick - pair[0].tick) as f64
+                let steps = pair[1].paddles.iter().zip(&pair[0].paddles);
+                let step = steps.map(|(to, from)| (from_frame::<D>(*to) - from_frame::<D>(*from)).norm());
+                step.fold(0.0, f64::max) / (pair[1].tick - pair[0].tick) as f64
             })
             .fold(0.0, f64::max),
         timing,
     })
 }
 
-fn insertion(plant: &mut PlantLoop<'_>, space: &Space, visit: &Visit) -> Result<Inserted, RuntimeError> {
-    let mut ports = PlantPorts::<ipc::Service>::open(space)?;
+fn insertion<T: TissueResponse<D>, const D: usize>(
+    plant: &mut PlantLoop<T, D>,
+    space: &Space,
+    visit: &Visit,
+) -> Result<Inserted, RuntimeError> {
+    let paddles = plant.world().actuators.len();
+    let mut ports = PlantPorts::<ipc::Service>::open_for(space, paddles)?;
     let mut peer = Peer::Elsewhere(Box::new(space.clone()), Role::Controller);
     let mut patience = Patience::new(visit.timeout);
     while !ports.has_peer() {
         patience.wait::<ipc::Service>(&mut peer)?;
     }
     ports.connect()?;
-    let agreed = visit.expected.as_ref().map_or(Ok(()), |expected| {
-        Introduction::hear(space).and_then(|told| told.check(&expected.scene_hashes, &expected.units))
-    });
+    let agreed = visit
+        .expected
+        .as_ref()
+        .map_or(Ok(()), |expected| Introduction::hear(space).and_then(|told| told.check(expected)));
     let outcome = agreed.and_then(|()| drive(plant, space, visit, &mut ports, &mut peer));
     if outcome.is_err() {
         // Whatever has happened, the controller need not wait for its end.
@@ -136,8 +141,8 @@ fn insertion(plant: &mut PlantLoop<'_>, space: &Space, visit: &Visit) -> Result<
     Ok((account, controllers, timing, published(&ports)))
 }
 
-fn drive(
-    plant: &mut PlantLoop<'_>,
+fn drive<T: TissueResponse<D>, const D: usize>(
+    plant: &mut PlantLoop<T, D>,
     space: &Space,
     visit: &Visit,
     ports: &mut PlantPorts<ipc::Service>,

@@ -7,7 +7,9 @@ use nalgebra::Vector2;
 
 use crate::world::World;
 use crate::world::error::WorldError;
+use crate::world::needle::NeedleTrajectory;
 use crate::world::simulation::Simulation;
+use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::tissue::{AttachedPaddle, Reductions, TissuePlant, TissueResponse as _, WantedPlant};
 
 /// Steps that are timed.
@@ -76,28 +78,48 @@ pub fn world_in_time<'m>(
 /// # Errors
 /// [`WorldError::Tissue`].
 pub fn rehearse(tissue: &mut TissuePlant<'_>, simulation: &Simulation) -> Result<Rehearsal, WorldError> {
+    let paddle = |aside: f64| Vector2::new(0.0, PADDLE_PER_DEPTH * aside);
+    tissue.aside(|tissue| timed(simulation, |depth, aside| tissue.step(depth, &[paddle(aside)]).map(drop)))
+}
+
+/// The world of a body in space, for a loop that the machine's clock drives: its step is timed on the way that it was tabulated
+/// along.
+///
+/// # Errors
+/// [`WorldError::TooSlow`] when it does not keep the period, [`WorldError::Tissue`].
+pub fn space_in_time<'m>(
+    body: &PreparedBody<'m>,
+    simulation: &Simulation,
+) -> Result<World<SpaceTissue<'m>, NeedleTrajectory, 3>, WorldError> {
+    let mut tissue = body.tissue();
+    let rehearsed = timed(simulation, |depth, _| tissue.step(depth, &body.table().way(depth)).map(drop))?;
+    if rehearsed.keeps_the_period() { Ok(body.world(simulation)) } else { Err(rehearsed.too_slow()) }
+}
+
+/// Times steps from the middle of the insertion on, each told its depth and how far that is from the first.
+fn timed(
+    simulation: &Simulation,
+    mut step: impl FnMut(f64, f64) -> Result<(), WorldError>,
+) -> Result<Rehearsal, WorldError> {
     let trajectory = &simulation.needle;
     let period_us = simulation.loop_settings.period_ns() as f64 * 1e-3;
     let middle_s = trajectory.midway_s();
     let (mut total_us, mut timed) = (0.0, 0_u32);
-    tissue.aside(|tissue| {
-        let middle = trajectory.at(middle_s).depth;
-        tissue.step(middle, Vector2::zeros())?;
-        let mut last = middle;
-        for step in 1..=STEPS {
-            let depth = trajectory.at(middle_s + step as f64 * period_us * 1e-6).depth;
-            // A needle that has arrived leaves nothing to solve for.
-            if depth == last {
-                break;
-            }
-            last = depth;
-            let before = Instant::now();
-            tissue.step(depth, Vector2::new(0.0, PADDLE_PER_DEPTH * (depth - middle)))?;
-            total_us += before.elapsed().as_secs_f64() * 1e6;
-            timed += 1;
+    let middle = trajectory.at(middle_s).depth;
+    step(middle, 0.0)?;
+    let mut last = middle;
+    for k in 1..=STEPS {
+        let depth = trajectory.at(middle_s + k as f64 * period_us * 1e-6).depth;
+        // A needle that has arrived leaves nothing to solve for.
+        if depth == last {
+            break;
         }
-        Ok(())
-    })?;
+        last = depth;
+        let before = Instant::now();
+        step(depth, depth - middle)?;
+        total_us += before.elapsed().as_secs_f64() * 1e6;
+        timed += 1;
+    }
     Ok(Rehearsal { step_us: total_us / f64::from(timed.max(1)), period_us })
 }
 

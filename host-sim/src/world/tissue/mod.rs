@@ -16,7 +16,7 @@ use model_offline::reduction::online::{ReducedBody, ReducedModel};
 use model_offline::reduction::{Condensed, Extrapolated, TrainingError};
 use model_offline::scene::PlantModel;
 use model_offline::solver::equilibrium::NewtonSettings;
-use nalgebra::Vector2;
+use nalgebra::{SVector, Vector2};
 
 use super::error::WorldError;
 use super::needle::NeedleTrajectory;
@@ -52,21 +52,26 @@ pub enum WantedPlant {
     Auto,
 }
 
-/// What answers for the tissue.
-pub trait TissueResponse {
-    /// Takes needle and paddle to where they are now; returns the target displacement, length.
+/// What answers for the tissue in D dimensions.
+pub trait TissueResponse<const D: usize = 2> {
+    /// Takes needle and paddles to where they are now; returns the target displacement, length.
     ///
     /// # Errors
     /// [`WorldError::Tissue`] when there is no equilibrium.
-    fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError>;
+    fn step(&mut self, depth: f64, paddles: &[SVector<f64, D>]) -> Result<SVector<f64, D>, WorldError>;
 
     /// The same so many seconds after the start of the needle (negative: not started), for tissue that has a past.
     ///
     /// # Errors
     /// [`WorldError`].
-    fn step_at(&mut self, since_start_s: f64, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+    fn step_at(
+        &mut self,
+        since_start_s: f64,
+        depth: f64,
+        paddles: &[SVector<f64, D>],
+    ) -> Result<SVector<f64, D>, WorldError> {
         let _ = since_start_s;
-        self.step(depth, paddle)
+        self.step(depth, paddles)
     }
 }
 
@@ -305,7 +310,7 @@ impl<'m> TissuePlant<'m> {
     ///
     /// # Errors
     /// [`WorldError::Tissue`].
-    pub fn aside(&mut self, act: impl FnOnce(&mut Self) -> Result<(), WorldError>) -> Result<(), WorldError> {
+    pub fn aside<R>(&mut self, act: impl FnOnce(&mut Self) -> Result<R, WorldError>) -> Result<R, WorldError> {
         let account = self.account.clone();
         let past = match &self.kind {
             Kind::Course { course, since_start_s } => {
@@ -314,16 +319,16 @@ impl<'m> TissuePlant<'m> {
             Kind::Path(along) => Some(Kind::Path(Box::new(along.afresh()))),
             _ => None,
         };
-        act(self)?;
+        let outcome = act(self)?;
         match past {
             Some(kind) => {
                 (self.kind, self.at) = (kind, (0.0, Vector2::zeros()));
                 self.needle.clear();
             }
-            None => drop(self.step(0.0, Vector2::zeros())?),
+            None => drop(self.step(0.0, &[Vector2::zeros()])?),
         }
         self.account = account;
-        Ok(())
+        Ok(outcome)
     }
 
     /// The coefficients behind the present state, where the model has them (the condensed one has not).
@@ -395,7 +400,7 @@ impl<'m> TissuePlant<'m> {
         } else if !matches!(self.kind, Kind::Full(_) | Kind::Course { .. }) {
             let (depth, paddle) = self.at;
             let full = self.solved_in_full().map(|body| body.target_displacement());
-            if let (Ok(full), Ok(own)) = (full, self.step(depth, paddle)) {
+            if let (Ok(full), Ok(own)) = (full, self.step(depth, &[paddle])) {
                 account.error_at_end = Some((own - full).norm());
             }
         }
@@ -410,7 +415,13 @@ impl<'m> TissuePlant<'m> {
 }
 
 impl TissueResponse for TissuePlant<'_> {
-    fn step_at(&mut self, since_start_s: f64, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+    fn step_at(
+        &mut self,
+        since_start_s: f64,
+        depth: f64,
+        paddles: &[Vector2<f64>],
+    ) -> Result<Vector2<f64>, WorldError> {
+        let paddle = only(paddles);
         let moment_s = since_start_s.max(0.0);
         match &mut self.kind {
             Kind::Course { course, since_start_s: before_s } => {
@@ -437,11 +448,12 @@ impl TissueResponse for TissuePlant<'_> {
                 self.account.largest_estimate = Some(along.body.error_estimate());
                 Ok(along.body.target_displacement())
             }
-            _ => self.step(depth, paddle),
+            _ => self.step(depth, paddles),
         }
     }
 
-    fn step(&mut self, depth: f64, paddle: Vector2<f64>) -> Result<Vector2<f64>, WorldError> {
+    fn step(&mut self, depth: f64, paddles: &[Vector2<f64>]) -> Result<Vector2<f64>, WorldError> {
+        let paddle = only(paddles);
         self.at = (depth, paddle);
         match &mut self.kind {
             Kind::Full(body) => drive(body, depth, paddle),
@@ -453,7 +465,7 @@ impl TissueResponse for TissuePlant<'_> {
             Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
             Kind::Course { since_start_s, .. } => {
                 let now_s = *since_start_s;
-                self.step_at(now_s, depth, paddle)
+                self.step_at(now_s, depth, paddles)
             }
             Kind::Path(along) => {
                 along.body.displace(paddle);
@@ -479,6 +491,11 @@ impl TissueResponse for TissuePlant<'_> {
             },
         }
     }
+}
+
+/// The paddle of the plane, at rest where there is none.
+fn only(paddles: &[Vector2<f64>]) -> Vector2<f64> {
+    paddles.first().copied().unwrap_or_default()
 }
 
 fn full(model: &TissueModel, paddle: Option<usize>) -> Result<Box<Body<'_>>, WorldError> {
@@ -520,13 +537,13 @@ mod tests {
         let inside = (0.05, Vector2::new(0.001, -0.002));
         let far = (0.05, Vector2::new(0.04, 0.0));
         for (depth, paddle) in [inside, far, inside] {
-            let (r, e) = (reduced.step(depth, paddle).unwrap(), exact.step(depth, paddle).unwrap());
+            let (r, e) = (reduced.step(depth, &[paddle]).unwrap(), exact.step(depth, &[paddle]).unwrap());
             assert!((r - e).norm() < 0.01 * e.norm(), "{r} {e}");
         }
         let account = reduced.account();
         assert_eq!((account.model, account.fallbacks), (PlantModel::Reduced, 1));
         assert!(account.first_fallback.unwrap().contains("outside the trained range"));
-        assert!(account.error_at_end.unwrap() < 0.01 * exact.step(inside.0, inside.1).unwrap().norm());
+        assert!(account.error_at_end.unwrap() < 0.01 * exact.step(inside.0, &[inside.1]).unwrap().norm());
         assert_eq!(reduced.deformed_nodes().len(), model.nodes());
     }
 
@@ -539,10 +556,10 @@ mod tests {
         let mut moved = of(Attachment::moved(Some(2)));
         let mut exact = TissuePlant::new(&model, Some(2), WantedPlant::Full).unwrap();
         for (paddle, fallbacks) in [(Vector2::zeros(), 0), (Vector2::new(1e-4, 0.0), 1)] {
-            let (h, e) = (held.step(0.05, paddle).unwrap(), exact.step(0.05, paddle).unwrap());
+            let (h, e) = (held.step(0.05, &[paddle]).unwrap(), exact.step(0.05, &[paddle]).unwrap());
             assert!((h - e).norm() < 0.01 * e.norm(), "{h} {e}");
             assert_eq!((held.account.fallbacks, moved.account.fallbacks), (fallbacks, 0));
-            moved.step(0.05, paddle).unwrap();
+            moved.step(0.05, &[paddle]).unwrap();
         }
         // Each was trained once, whoever asks again.
         let again = of(Attachment::held(Some(2)));
@@ -572,9 +589,9 @@ mod tests {
     fn the_condensed_model_says_how_far_off_it_is() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
         let mut condensed = TissuePlant::new(&model, Some(2), WantedPlant::Condensed).unwrap();
-        let shallow = condensed.step(1e-4, Vector2::zeros()).unwrap();
+        let shallow = condensed.step(1e-4, &[]).unwrap();
         assert!(condensed.account().error_at_end.unwrap() < 1e-3 * shallow.norm());
-        let deep = condensed.step(0.1, Vector2::zeros()).unwrap();
+        let deep = condensed.step(0.1, &[]).unwrap();
         assert!(condensed.account().error_at_end.unwrap() > 1e-2 * deep.norm());
     }
 
