@@ -109,22 +109,21 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
     if scene.inclusions.is_empty() && args.tissue == Some(TissueVariant::Inclusion) {
         return Err(SimError::NoInclusion { scene: scene.name.clone() });
     }
-    let (whole, paddles) = signals::ends_at_once(|| -> Result<_, SimError> {
+    let (model, paddles) = signals::ends_at_once(|| -> Result<_, SimError> {
         let whole = insertion_model(scene)?;
         let paddles = match args.paddle.is_empty() {
             true => whole.best_to_control()?,
             false => args.paddle.clone(),
         };
-        Ok((whole, paddles))
+        let homogeneous = args.tissue == Some(TissueVariant::Homogeneous);
+        Ok((if homogeneous { whole.without_inclusions()? } else { whole }, paddles))
     })?;
     if !(1..=MAX_PADDLES).contains(&paddles.len()) {
         return Err(TableBuildError::Paddles(paddles.len()).into());
     }
-    let homogeneous = whole.without_inclusions();
-    let model = if args.tissue == Some(TissueVariant::Homogeneous) { &homogeneous } else { &whole };
     let threads = parallel::threads(None);
     let world = signals::ends_at_once(|| -> Result<_, SimError> {
-        let body = PreparedBody::new(model, &paddles, true, threads)?;
+        let body = PreparedBody::new(&model, &paddles, true, threads)?;
         Ok(match args.mode {
             RunMode::Lockstep => body.world(&simulation),
             RunMode::FreeRun => space_in_time(&body, &simulation)?,
@@ -132,7 +131,7 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let expected = Expected {
-        scene_hashes: [&whole, &homogeneous].map(|model| hex(&model.scene().hash())).into(),
+        scene_hashes: [scene, &scene.without_inclusions()].map(|scene| hex(&scene.hash())).into(),
         units: [scene.length_unit.clone(), scene.stress_unit.clone()],
         paddles: Some(paddles.clone()),
     };

@@ -32,6 +32,18 @@ pub trait Implicit: Debug + Send + Sync {
     /// The smooth pieces that the surface is made of; by default the surface is smooth.
     fn sheets(&self) -> Vec<Sheet<'_>>;
 
+    /// How far a point is from what is known of a sheet; 0 beside it, positive where the sheet merely goes on beyond its
+    /// rim; length units.
+    fn away(&self, _x: &Point<3>) -> f64 {
+        0.0
+    }
+
+    /// How far points where several sheets meet may be from one of them, length units: sheets from a file meet as well
+    /// as its digits say.
+    fn precision(&self) -> f64 {
+        0.0
+    }
+
     /// The plane of a flat region, which as a patch catches only what lies in that plane.
     fn carrier(&self) -> Option<Sheet<'_>> {
         None
@@ -103,6 +115,14 @@ impl Sheet<'_> {
                 across(x - from, axis).try_normalize(0.0).unwrap_or_else(|| perpendicular(axis))
             }
             Self::Smooth(body) => body.gradient(x),
+        }
+    }
+
+    /// How far a point is from the sheet's own part of a surface, where it has one that ends; length units.
+    pub fn away(&self, x: &Point<3>) -> f64 {
+        match self {
+            Self::Smooth(body) => body.away(x),
+            Self::Plane { .. } | Self::Tube { .. } => 0.0,
         }
     }
 

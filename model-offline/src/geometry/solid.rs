@@ -84,6 +84,33 @@ impl Solid {
     }
 }
 
+impl Solid {
+    /// The same with sides of boxes moved onto planes of the body that are nearer than `tolerance` (length units): faces
+    /// from files lie where their digits say, and what ends with a face is to end there.
+    #[must_use]
+    pub fn onto(self, body: &dyn Implicit, tolerance: f64) -> Self {
+        let all = |members: Vec<Self>| members.into_iter().map(|m| m.onto(body, tolerance)).collect();
+        match self {
+            Self::Box { min, max } => {
+                let side = |k: usize, from: f64| {
+                    let face = |sheet: Sheet<'_>| match sheet {
+                        Sheet::Plane { normal, offset } if normal[k].abs() == 1.0 => Some(offset * normal[k]),
+                        _ => None,
+                    };
+                    let faces = body.sheets().into_iter().filter_map(face);
+                    let near = faces.map(|at| ((at - from).abs(), at)).filter(|(distance, _)| *distance <= tolerance);
+                    near.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(from, |(_, at)| at)
+                };
+                Self::Box { min: Point::from_fn(|k, _| side(k, min[k])), max: Point::from_fn(|k, _| side(k, max[k])) }
+            }
+            Self::Union(members) => Self::Union(all(members)),
+            Self::Intersection(members) => Self::Intersection(all(members)),
+            Self::Difference(members) => Self::Difference(all(members)),
+            other => other,
+        }
+    }
+}
+
 impl Implicit for Solid {
     fn level(&self, x: &Point<3>) -> f64 {
         match self {

@@ -64,7 +64,8 @@ impl<'a> Fitted<'a> {
                 let x = self.complex.nodes[n as usize];
                 let reach = |m: &u32| (self.complex.nodes[*m as usize] - x).norm();
                 let longest = self.complex.neighbours(n).iter().map(reach).fold(0.0, f64::max);
-                if self.features.owners[owner].level(&x).abs() <= BAND * longest {
+                let farthest = self.features.owners[owner].level(&x).abs().max(self.features.away(sheet, &x));
+                if farthest <= BAND * longest {
                     self.note(n, sheet);
                 }
             }
@@ -94,7 +95,7 @@ impl<'a> Fitted<'a> {
     }
 
     /// Edges that cross a sheet where it matters to the owner.
-    fn crossings(&self, owner: usize, level: &[f64]) -> Vec<Crossing> {
+    fn crossings(&self, owner: usize, sheet: u16, level: &[f64]) -> Vec<Crossing> {
         let at = |n: u32| level[n as usize];
         let mixed = |t: &[u32; 4]| t.iter().any(|n| at(*n) < 0.0) && t.iter().any(|n| at(*n) > 0.0);
         let mut crossings = Vec::new();
@@ -107,7 +108,8 @@ impl<'a> Fitted<'a> {
             let length = (q - p).norm();
             let o = &self.features.owners[owner];
             let x = p + (q - p) * part;
-            if o.level(&x).abs() > BAND * length || self.is_hidden(owner, &x, BAND * length) {
+            let band = BAND * length;
+            if o.level(&x).abs() > band || self.features.away(sheet, &x) > band || self.is_hidden(owner, &x, band) {
                 continue;
             }
             if o.kind == Kind::Patch {
@@ -133,7 +135,7 @@ impl<'a> Fitted<'a> {
 
     /// Moves nodes onto the sheet that it almost meets, the nearest first.
     fn snap(&mut self, owner: usize, sheet: u16, level: &mut [f64]) {
-        let mut near = self.crossings(owner, level);
+        let mut near = self.crossings(owner, sheet, level);
         near.retain(|c| c.part < NEAR);
         near.sort_by(|a, b| a.part.total_cmp(&b.part).then(a.near.cmp(&b.near)).then(a.far.cmp(&b.far)));
         for c in near {
@@ -163,7 +165,7 @@ impl<'a> Fitted<'a> {
     /// Splits edges that cross the sheet, the longest first: of two diagonals of a cut quadrilateral that keeps the
     /// shorter.
     fn cut(&mut self, owner: usize, sheet: u16, level: &mut Vec<f64>) {
-        let mut crossings = self.crossings(owner, level);
+        let mut crossings = self.crossings(owner, sheet, level);
         crossings.sort_by(|a, b| {
             let rounded = |c: &Crossing| (c.length * (1.0 - 1e-9)) as f32;
             rounded(b).total_cmp(&rounded(a)).then(a.near.cmp(&b.near)).then(a.far.cmp(&b.far))
@@ -253,11 +255,12 @@ impl<'a> Fitted<'a> {
             let x = self.complex.nodes[n as usize];
             let surface = on.iter().any(|k| self.features.is_of_body(*k));
             let counts = |k: &u16| {
-                self.features.owners[..=owner].iter().any(|o| {
-                    o.sheets.contains(k)
-                        && (o.kind != Kind::Patch || surface)
-                        && o.level(&x).abs() <= self.features.tolerance
-                })
+                self.features.away(*k, &x) <= self.features.tolerance
+                    && self.features.owners[..=owner].iter().any(|o| {
+                        o.sheets.contains(k)
+                            && (o.kind != Kind::Patch || surface)
+                            && o.level(&x).abs() <= self.features.tolerance
+                    })
             };
             self.on[n as usize] = on.into_iter().filter(counts).collect();
         }

@@ -52,7 +52,9 @@ const STEPS: usize = 30;
 impl<'a> Features<'a> {
     /// `size` is the extent of the body, length units.
     pub(super) fn new(request: &Request<'a>, size: f64) -> Self {
-        let mut features = Self { sheets: Vec::new(), owners: Vec::new(), tolerance: 1e-10 * size };
+        let given = [request.body].into_iter().chain(request.interfaces.iter().copied());
+        let tolerance = given.map(|region| region.precision()).fold(1e-10 * size, f64::max);
+        let mut features = Self { sheets: Vec::new(), owners: Vec::new(), tolerance };
         features.own(Kind::Body, request.body);
         request.interfaces.iter().for_each(|r| features.own(Kind::Interface, *r));
         request.patches.iter().for_each(|r| features.own(Kind::Patch, *r));
@@ -77,6 +79,11 @@ impl<'a> Features<'a> {
     pub(super) fn level(&self, sheet: u16, x: &Point<3>) -> f64 {
         let level = self.sheets[usize::from(sheet)].level(x);
         if level.abs() <= self.tolerance { 0.0 } else { level }
+    }
+
+    /// How far a point is from the part of a surface that a sheet is of, length units.
+    pub(super) fn away(&self, sheet: u16, x: &Point<3>) -> f64 {
+        self.sheets[usize::from(sheet)].away(x)
     }
 
     /// Whether a sheet is one of the body's.

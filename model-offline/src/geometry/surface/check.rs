@@ -1,13 +1,18 @@
 //! From triangles to the surface of a body: what is wrong is said, what is changed is said, too.
 
-use super::distance::{CheckedSurface, Facet, Normals};
+use super::curved::CurvedPiece;
+use super::distance::{CheckedSurface, Piece};
 use super::error::SurfaceError;
+use super::foot::{Facet, Normals};
+use super::pieces::{Pieces, Plane};
 use super::{TriangleSurface, flat::without_flat, meet::meeting_point, orient};
 use crate::geometry::point::{Point, box_of, digits, shown};
 use rstar::RTree;
 
 /// Larger coordinates have normals whose squares are no numbers any more.
 const LARGEST: f64 = 1e12;
+/// Meshes need points on several planes to be this many times closer to them than their tolerance.
+const MARGIN: f64 = 4.0;
 
 impl TriangleSurface {
     /// Checks that the triangles enclose a volume, and turns those that face the wrong way. Every change is noted in
@@ -16,6 +21,23 @@ impl TriangleSurface {
     /// # Errors
     /// [`SurfaceError`] says where, in the coordinates of the file.
     pub fn check(&self) -> Result<CheckedSurface, SurfaceError> {
+        self.checked(&[])
+    }
+
+    /// The same for the surface of a part of a body: flat faces of both that lie in one plane lie in the same one to the
+    /// last bit.
+    ///
+    /// # Errors
+    /// [`SurfaceError`] says where, in the coordinates of the file.
+    pub fn check_within(&self, body: &CheckedSurface) -> Result<CheckedSurface, SurfaceError> {
+        let flat = |piece: &Piece| match piece {
+            Piece::Flat(plane) => Some(*plane),
+            Piece::Curved(_) => None,
+        };
+        self.checked(&body.pieces.iter().filter_map(flat).collect::<Vec<_>>())
+    }
+
+    fn checked(&self, known: &[Plane]) -> Result<CheckedSurface, SurfaceError> {
         for (vertex, x) in self.vertices.iter().enumerate() {
             if let Some(value) = x.iter().find(|c| !c.is_finite() || c.abs() > LARGEST) {
                 return Err(SurfaceError::Coordinate { vertex, value: *value });
@@ -52,11 +74,34 @@ impl TriangleSurface {
             (all, cavities) => format!("the surface has {all} closed parts, {cavities} of them cavities"),
         });
         notes.push(size_told(bounds, volumes.iter().sum()));
-        // What the tree holds depends on corners and not on their order, but the facets have the order.
+        let (pieces, precision) = divided(&mut surface, &parts.across, known, &mut notes);
+        let bounds = box_of(&surface.vertices).unwrap_or(bounds);
+        // Corners have moved, and turned triangles have another order of them.
         let tree = RTree::bulk_load((0..surface.triangles.len()).map(|t| Facet::of(&surface, t)).collect());
         let normals = Normals::of(&surface, &parts.across);
-        Ok(CheckedSurface { surface, tree, normals, notes, volumes, bounds })
+        Ok(CheckedSurface { surface, tree, normals, notes, volumes, bounds, pieces, precision })
     }
+}
+
+/// Pieces between sharp edges, none where there are no edges, and how exactly they meet; flat ones are made flat.
+fn divided(
+    surface: &mut TriangleSurface,
+    across: &[[u32; 3]],
+    known: &[Plane],
+    notes: &mut Vec<String>,
+) -> (Vec<Piece>, f64) {
+    let pieces = Pieces::of(surface, across, known);
+    let counts = pieces.counts();
+    if counts == (0, 1) {
+        notes.push("the surface is taken as smooth: no sharp edges divide it, or too many".to_owned());
+        return (Vec::new(), 0.0);
+    }
+    notes.push(format!("sharp edges divide the surface into {} flat and {} curved pieces", counts.0, counts.1));
+    let all = (0..).zip(&pieces.planes).filter_map(|(number, plane)| match plane {
+        Some(plane) => Some(Piece::Flat(*plane)),
+        None => CurvedPiece::of(surface, across, &pieces.piece_of, number).map(Piece::Curved),
+    });
+    (all.collect(), MARGIN * pieces.precision)
 }
 
 /// How large the body is.

@@ -1,12 +1,15 @@
 //! Surfaces of triangles: what a file holds, and what is known of one that encloses a volume.
 
 mod check;
+mod curved;
 mod distance;
 mod error;
 mod flat;
+mod foot;
 mod gaps;
 mod meet;
 mod orient;
+mod pieces;
 #[cfg(test)]
 pub(crate) mod solids;
 #[cfg(test)]
@@ -61,6 +64,13 @@ impl TriangleSurface {
     pub(crate) fn corners(&self, triangle: usize) -> [Point<3>; 3] {
         self.triangles[triangle].map(|vertex| self.vertices[vertex as usize])
     }
+}
+
+/// Points, equal ones made one, and where each is among them.
+pub(crate) fn welded_points(points: &[Point<3>]) -> (Vec<Point<3>>, Vec<u32>) {
+    let mut welder = Welder::default();
+    let places = points.iter().map(|x| welder.vertex(*x)).collect();
+    (welder.vertices, places)
 }
 
 /// Vertices so far, found by their coordinates.

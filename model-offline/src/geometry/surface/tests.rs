@@ -257,3 +257,27 @@ fn only_equal_vertices_become_one() {
     assert_eq!(of(zero(-0.0, 0.0)), 3, "minus zero is zero");
     assert_eq!(of(zero(1e-15, 0.0)), 4);
 }
+
+#[test]
+fn pieces_between_sharp_edges_are_counted_and_flat_ones_made_flat() {
+    let turn = nalgebra::Rotation3::from_euler_angles(0.3, 1.1, -0.7);
+    let mut turned = cube(-1.0, 1.0);
+    turned.vertices.iter_mut().for_each(|x| *x = (turn * *x).map(|c| f64::from(c as f32)));
+    for (solid, expected) in [(cube(-2.0, 3.5), "6 flat and 0 curved"), (turned, "6 flat and 0 curved")] {
+        let checked = solid.check().unwrap();
+        assert!(has_note(&checked, expected), "{:?}", checked.notes());
+        // Every corner is on three planes, to double precision.
+        for x in &checked.surface().vertices {
+            let on = |sheet: &&crate::geometry::Sheet<'_>| sheet.level(x).abs() < 1e-15 * 8.0;
+            assert_eq!(checked.sheets().iter().filter(on).count(), 3, "{x}");
+        }
+    }
+    assert!(has_note(&sphere(7.0, 2).check().unwrap(), "smooth"));
+}
+
+#[test]
+fn single_precision_stands_for_the_decimal_that_was_written() {
+    let single = |x: f64| f64::from(x as f32);
+    let checked = cuboid([single(0.1), single(-0.3), 0.0], [single(0.7), single(1.1), single(2.3)]).check().unwrap();
+    assert_eq!(checked.extent(), (Point::<3>::new(0.1, -0.3, 0.0), Point::<3>::new(0.7, 1.1, 2.3)));
+}

@@ -1,8 +1,10 @@
 //! The body and its inclusions: solids that the scene describes, or what files of other tools hold.
 
 use super::import::{self, FileError};
+use super::parts::{MeshBody, MeshError, Wanted};
 use super::schema::{DomainSection, InclusionSection, LabelSet, LabelsSection, SolidSection};
 use crate::geometry::labels::{LabelBody, Labels};
+use crate::geometry::surface::CheckedSurface;
 use crate::geometry::{Implicit, Solid};
 use crate::scene::error::{SceneError, Source};
 use crate::scene::schema::Located;
@@ -29,6 +31,7 @@ pub(super) struct Bodies<'a> {
     folder: &'a Path,
     unit: &'a str,
     segmentation: Option<Segmentation>,
+    mesh: Option<MeshBody>,
     pub(super) notes: Vec<String>,
     /// All files that were read.
     pub(super) files: Vec<PathBuf>,
@@ -44,21 +47,23 @@ struct Segmentation {
 impl<'a> Bodies<'a> {
     /// For files relative to `folder`, in a scene whose unit of length is `unit`.
     pub(super) fn new(source: Source<'a>, folder: &'a Path, unit: &'a str) -> Self {
-        Self { source, folder, unit, segmentation: None, notes: Vec::new(), files: Vec::new() }
+        Self { source, folder, unit, segmentation: None, mesh: None, notes: Vec::new(), files: Vec::new() }
     }
 
     /// The scene's body.
     pub(super) fn domain(&mut self, located: &Located<DomainSection>) -> Checked<Body> {
         let (section, span) = (located.get(), located.span());
-        match (&section.cuboid, &section.solid, &section.surface, &section.labels) {
-            (Some(b), None, None, None) => self.solid_body(&SolidSection::Box { min: b.min, max: b.max }, span),
-            (None, Some(solid), None, None) => self.solid_body(solid, span),
-            (None, None, Some(surface), None) => self.surface(surface),
-            (None, None, None, Some(labels)) => self.labelled(labels),
+        match (&section.cuboid, &section.solid, &section.surface, &section.mesh, &section.labels) {
+            (Some(b), None, None, None, None) => self.solid_body(&SolidSection::Box { min: b.min, max: b.max }, span),
+            (None, Some(solid), None, None, None) => self.solid_body(solid, span),
+            (None, None, Some(surface), None, None) => self.surface(surface),
+            (None, None, None, Some(mesh), None) => self.tetrahedra(mesh),
+            (None, None, None, None, Some(labels)) => self.labelled(labels),
             _ => Err(self.source.error(
                 span,
                 "[domain] needs one description of the body",
-                "give one of box = { min, max }, solid = { ... }, surface = \"body.stl\" and labels = { file, body }",
+                "give one of box = { min, max }, solid = { ... }, surface = \"body.stl\", mesh = \"body.msh\" and \
+                 labels = { file, body }",
             )),
         }
     }
@@ -83,14 +88,15 @@ impl<'a> Bodies<'a> {
             section.solid.clone(),
         ];
         let mut forms = forms.into_iter().flatten();
-        match (forms.next(), forms.next(), &section.surface, &section.label) {
-            (Some(form), None, None, None) => Ok(Arc::new(self.solid(&form, span, "inclusion")?)),
-            (None, None, Some(surface), None) => self.surface(surface),
-            (None, None, None, Some(label)) => self.label(label),
+        match (forms.next(), forms.next(), &section.surface, &section.label, &section.name) {
+            (Some(form), None, None, None, None) => Ok(Arc::new(self.solid(&form, span, "inclusion")?)),
+            (None, None, Some(surface), None, None) => self.surface(surface),
+            (None, None, None, Some(label), None) => self.label(*label.get(), label.span()),
+            (None, None, None, None, Some(name)) => self.named_part(name),
             _ => Err(self.source.error(
                 span,
                 "an inclusion needs one shape",
-                "give one of box, sphere, ellipsoid, solid, surface and label",
+                "give one of box, sphere, ellipsoid, solid, surface, label and name",
             )),
         }
     }
@@ -112,10 +118,31 @@ impl<'a> Bodies<'a> {
             self.source.error(name.span(), format!("{}: {wrong}", name.get()), help)
         })?;
         self.note(name.get(), read.notes);
-        self.note(name.get(), checked.notes().to_vec());
-        let (low, high) = checked.extent();
+        Ok(self.enclosed(name, checked))
+    }
+
+    /// What the tetrahedra of a file fill; their groups are kept for the inclusions.
+    fn tetrahedra(&mut self, name: &Located<String>) -> Checked<Body> {
+        self.named(name, "a Gmsh or VTU file")?;
+        let read = import::mesh(&self.folder.join(name.get()));
+        let read =
+            read.map_err(|wrong| self.unreadable(name, &wrong, "a Gmsh (.msh) or VTK (.vtu) file of tetrahedra"))?;
+        let (mesh, notes) = MeshBody::new(read.value).map_err(|wrong: MeshError| {
+            self.source.error(name.span(), format!("{}: {wrong}", name.get()), wrong.help())
+        })?;
+        self.note(name.get(), read.notes);
+        self.note(name.get(), notes);
+        let surface = mesh.surface().clone();
+        self.mesh = Some(mesh);
+        Ok(self.enclosed(name, surface))
+    }
+
+    /// A checked surface as a body; what there is to say of it is kept.
+    fn enclosed(&mut self, name: &Located<String>, surface: CheckedSurface) -> Body {
+        self.note(name.get(), surface.notes().to_vec());
+        let (low, high) = surface.extent();
         self.note(name.get(), size_doubt((high - low).amax(), self.unit));
-        Ok(Arc::new(checked))
+        Arc::new(surface)
     }
 
     /// The body of a segmentation, which is kept for the inclusions.
@@ -152,24 +179,49 @@ impl<'a> Bodies<'a> {
         Ok(region)
     }
 
-    /// The region of one label of the domain's segmentation.
-    fn label(&self, label: &Located<u16>) -> Checked<Body> {
+    /// The region of one label of the domain's segmentation, or of one group of its mesh.
+    fn label(&self, label: u16, span: Range<usize>) -> Checked<Body> {
+        if let Some(mesh) = &self.mesh {
+            return self.part(mesh, Wanted::Label(label.into()), span);
+        }
         let Some(Segmentation { labels, body }) = &self.segmentation else {
             return Err(self.source.error(
-                label.span(),
-                format!("label {} is of no segmentation: the domain has none", label.get()),
-                "describe the body by [domain] labels = { file, body }, or the inclusion by another shape",
+                span,
+                format!("label {label} is of no segmentation: the domain has none, nor a mesh"),
+                "describe the body by [domain] labels = { file, body } or mesh, or the inclusion by another shape",
             ));
         };
-        if !body.contains(label.get()) {
-            let all: Vec<String> = body.iter().chain([label.get()]).map(u16::to_string).collect();
+        if !body.contains(&label) {
+            let all: Vec<String> = body.iter().chain([&label]).map(u16::to_string).collect();
             return Err(self.source.error(
-                label.span(),
-                format!("label {} is no part of the body, which is labels {body:?}", label.get()),
+                span,
+                format!("label {label} is no part of the body, which is labels {body:?}"),
                 format!("name all labels that belong to the body: body = [{}]", all.join(", ")),
             ));
         }
-        self.region_of(labels, &BTreeSet::from([*label.get()]), label.span())
+        self.region_of(labels, &BTreeSet::from([label]), span)
+    }
+
+    /// The region of a group of the domain's mesh, or of a label of its segmentation, by its name.
+    fn named_part(&self, name: &Located<String>) -> Checked<Body> {
+        if let Some(mesh) = &self.mesh {
+            return self.part(mesh, Wanted::Name(name.get()), name.span());
+        }
+        let names = self.segmentation.as_ref().map(|segmentation| &segmentation.labels.names);
+        let label = names.and_then(|names| names.iter().find(|(_, known)| *known == name.get()));
+        if let Some((label, _)) = label {
+            return self.label(*label, name.span());
+        }
+        let help = match names.filter(|names| !names.is_empty()) {
+            None => "describe the body by [domain] mesh, or the inclusion by another shape".to_owned(),
+            Some(names) => format!("it has {}", names.values().cloned().collect::<Vec<_>>().join(", ")),
+        };
+        Err(self.source.error(name.span(), format!("no part of the body is called {:?}", name.get()), help))
+    }
+
+    fn part(&self, mesh: &MeshBody, wanted: Wanted<'_>, span: Range<usize>) -> Checked<Body> {
+        let part = mesh.part(wanted).map_err(|wrong| self.source.error(span, wrong.to_string(), wrong.help()))?;
+        Ok(Arc::new(part))
     }
 
     fn region_of(&self, labels: &Labels, wanted: &BTreeSet<u16>, span: Range<usize>) -> Checked<Body> {

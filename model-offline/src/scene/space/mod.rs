@@ -2,6 +2,7 @@
 
 mod bodies;
 pub mod import;
+mod parts;
 pub mod schema;
 pub mod starter;
 mod validate;
@@ -77,7 +78,7 @@ pub struct SpaceScene {
     pub length_unit: String,
     /// Label of the stress unit.
     pub stress_unit: String,
-    /// The body. One from a file is a single smooth sheet ([`Implicit::sheets`]): the mesh rounds its sharp edges.
+    /// The body.
     pub body: Arc<dyn Implicit>,
     /// What the body is made of.
     pub material: Law,

@@ -166,9 +166,13 @@ pub struct DomainSection {
     pub cuboid: Option<BoxSection>,
     /// A solid made of simple ones.
     pub solid: Option<SolidSection>,
-    /// A closed surface in an STL, OBJ or PLY file, relative to the scene's folder. It is taken as one smooth surface: the
-    /// mesh rounds its sharp edges by about the length of an edge there.
+    /// A closed surface in an STL, OBJ or PLY file, relative to the scene's folder. Where neighbouring triangles meet at
+    /// more than 40° the body has a sharp edge.
     pub surface: Option<Located<String>>,
+    /// A mesh of tetrahedra in a Gmsh (.msh, version 2.2 or 4.1) or VTK (.vtu) file, relative to the scene's folder. The
+    /// body is what they fill; it is meshed anew. Physical volumes (in VTK an array of cells) are parts that inclusions
+    /// name.
+    pub mesh: Option<Located<String>>,
     /// Labels of a segmentation.
     pub labels: Option<Located<LabelsSection>>,
 }
@@ -194,7 +198,7 @@ pub enum LabelSet {
     Several(Vec<u16>),
 }
 
-/// A region of another stiffness or material: one of box, sphere, ellipsoid, solid, surface and label.
+/// A region of another stiffness or material: one of box, sphere, ellipsoid, solid, surface, label and name.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InclusionSection {
@@ -207,10 +211,13 @@ pub struct InclusionSection {
     pub ellipsoid: Option<EllipsoidSection>,
     /// A solid made of simple ones.
     pub solid: Option<SolidSection>,
-    /// A closed surface in an STL, OBJ or PLY file, relative to the scene's folder; taken as one smooth surface.
+    /// A closed surface in an STL, OBJ or PLY file, relative to the scene's folder.
     pub surface: Option<Located<String>>,
-    /// A label of the domain's segmentation, one of those that belong to the body.
+    /// A label of the domain's segmentation, one of those that belong to the body, or the number of a physical volume of
+    /// the domain's mesh.
     pub label: Option<Located<u16>>,
+    /// The name of a physical volume of the domain's mesh, or of a label of its segmentation.
+    pub name: Option<Located<String>>,
     /// Factor on the energy (default 1).
     #[serde(default = "one")]
     pub stiffness: f64,

@@ -19,11 +19,12 @@ pub fn starter(names: &StarterNames) -> String {
 
 /// Everything that has no name.
 const BODY: &str = r#"
-[domain]                            # the body: one of box, solid, surface, labels
+[domain]                            # the body: one of box, solid, surface, mesh, labels
 box = { min = [0.0, 0.0, 0.0], max = [100.0, 80.0, 60.0] }
 # solid = { difference = [{ ellipsoid = { centre = [50, 40, 0], semi_axes = [50, 40, 60] } },
 #                         { half_space = { point = [0, 0, 0], normal = [0, 0, 1] } }] }
 # surface = "body.stl"              # a closed surface: STL, OBJ, PLY
+# mesh = "body.msh"                 # tetrahedra: Gmsh 2.2 and 4.1, VTU; inclusions by label or name of a physical volume
 # labels = { file = "scan.nii.gz", body = [1, 2] }      # a segmentation: NIfTI, NRRD
 
 [material]                          # Young's modulus 2.8, Poisson's ratio 0.4: soft tissue if stress is in kPa
@@ -31,7 +32,7 @@ model = "neo-hookean"               # fung | neo-hookean | saint-venant-kirchhof
 lambda = 4.0                        # E ν / ((1 + ν)(1 − 2ν))
 mu = 1.0                            # E / (2 (1 + ν))
 
-[[inclusion]]                       # a region of another stiffness: box, sphere, ellipsoid, solid, surface or label
+[[inclusion]]                       # a region of another stiffness: box, sphere, ellipsoid, solid, surface, label or name
 sphere = { centre = [66.0, 40.0, 26.0], radius = 8.0 }
 stiffness = 10.0                    # times the body's
 

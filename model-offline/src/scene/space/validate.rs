@@ -22,6 +22,8 @@ type Checked<T> = Result<T, SceneError>;
 /// Bodies are at least this long, and their coordinates at most so large, in units of the scene.
 const SMALLEST: f64 = 1e-12;
 const LARGEST: f64 = 1e12;
+/// Files of bodies have digits for this part of their size: regions closer to a face are meant to be there.
+const DIGITS: f64 = 1e-5;
 
 /// A scene whose files are relative to `folder`.
 pub(super) fn parse(source: Source<'_>, folder: &Path) -> Checked<SpaceScene> {
@@ -65,8 +67,11 @@ impl Validator<'_> {
             )
         })?;
         let size = self.size(low, high)?;
-        let needle = self.needle(size)?;
-        let paddles = self.paddles()?;
+        let onto = |region: Solid| region.onto(body.as_ref(), DIGITS * size);
+        let mut needle = self.needle(size)?;
+        needle.region = onto(needle.region);
+        let mut paddles = self.paddles()?;
+        paddles.iter_mut().for_each(|paddle| paddle.region = onto(paddle.region.clone()));
         let mut inclusions = Vec::with_capacity(file.inclusion.len());
         for located in &file.inclusion {
             let region = bodies.inclusion(located)?;
@@ -82,7 +87,7 @@ impl Validator<'_> {
             notes: bodies.notes,
             content: content(self.source.text, &bodies.files),
             files: bodies.files,
-            immobile: self.immobile()?,
+            immobile: self.immobile()?.into_iter().map(onto).collect(),
             pairs: self.pairs(&paddles)?,
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, high - low)?,

@@ -2,6 +2,7 @@
 
 mod random;
 mod scenes;
+mod surfaces;
 
 use super::*;
 use crate::geometry::{Implicit, Point, Solid};

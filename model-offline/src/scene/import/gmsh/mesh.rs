@@ -2,7 +2,7 @@
 
 use super::super::ImportError;
 use super::input::Input;
-use crate::geometry::Point2;
+use crate::geometry::Point;
 use std::collections::{BTreeMap, HashMap};
 
 /// Numbers of nodes of element types 1 to 31, as Gmsh's manual lists them.
@@ -11,6 +11,7 @@ const NODES: [u8; 31] =
 const LINES: [i64; 5] = [1, 8, 26, 27, 28];
 const TRIANGLES: [i64; 8] = [2, 9, 20, 21, 22, 23, 24, 25];
 const QUADRANGLES: [i64; 3] = [3, 10, 16];
+const TETRAHEDRA: [i64; 5] = [4, 11, 29, 30, 31];
 const POINT: i64 = 15;
 
 fn nodes_of(kind: i64) -> Option<usize> {
@@ -36,17 +37,22 @@ pub(super) type Elements = BTreeMap<Group, Vec<Vec<u64>>>;
 #[derive(Default)]
 pub(super) struct Mesh {
     pub(super) version: f64,
-    pub(super) nodes: HashMap<u64, Point2>,
+    pub(super) nodes: HashMap<u64, Point<3>>,
     /// By dimension: points, lines, surfaces.
     pub(super) elements: [Elements; 3],
     /// Elements that are no part of a plane.
     pub(super) solids: usize,
+    /// Tetrahedra among them: corners, and what tells where they belong to, a physical group in version 2.2 and an entity in
+    /// 4.1.
+    pub(super) tetrahedra: Vec<([u64; 4], i64)>,
+    /// How many of these have nodes between their corners.
+    pub(super) curved: usize,
     /// Lowest and highest z.
     pub(super) z: Option<[f64; 2]>,
     /// Names of physical groups, by dimension and number.
-    names: BTreeMap<(i64, i64), String>,
+    pub(super) names: BTreeMap<(i64, i64), String>,
     /// Physical groups of entities, by dimension and number.
-    physical: BTreeMap<(i64, i64), Vec<i64>>,
+    pub(super) physical: BTreeMap<(i64, i64), Vec<i64>>,
 }
 
 impl Mesh {
@@ -138,7 +144,7 @@ impl Mesh {
 
     fn node(&mut self, tag: u64, input: &mut Input<'_>) -> Result<(), ImportError> {
         let (x, y, z) = (input.number()?, input.number()?, input.number()?);
-        self.nodes.insert(tag, Point2::new(x, y));
+        self.nodes.insert(tag, Point::<3>::new(x, y, z));
         let [low, high] = self.z.unwrap_or([z, z]);
         self.z = Some([low.min(z), high.max(z)]);
         Ok(())
@@ -196,7 +202,8 @@ impl Mesh {
                     group = group.or(Some(tag));
                 }
                 let nodes = Self::corners(kind, input, |input| Ok(input.int()? as u64))?;
-                self.add(kind, |mesh, dimension| mesh.group(dimension, group.unwrap_or(0)), nodes);
+                let group = group.unwrap_or(0);
+                self.add((kind, group), |mesh, dimension| mesh.group(dimension, group), nodes);
             }
             read = read.saturating_add(follow as u64);
         }
@@ -217,7 +224,7 @@ impl Mesh {
                     let named = groups.filter_map(|group| mesh.names.get(&(dimension, *group)));
                     named.into_iter().next().map_or(Group::Tag(entity), |name| Group::Named(name.clone()))
                 };
-                self.add(kind, group, nodes);
+                self.add((kind, entity), group, nodes);
             }
         }
         Ok(())
@@ -248,7 +255,8 @@ impl Mesh {
         Ok(corners)
     }
 
-    fn add(&mut self, kind: i64, group: impl Fn(&Self, i64) -> Group, mut corners: Vec<u64>) {
+    /// Adds an element of a kind that belongs to a group or an entity.
+    fn add(&mut self, (kind, part): (i64, i64), group: impl Fn(&Self, i64) -> Group, mut corners: Vec<u64>) {
         let (dimension, count) = match kind {
             POINT => (0, 1),
             _ if LINES.contains(&kind) => (1, 2),
@@ -256,6 +264,10 @@ impl Mesh {
             _ if QUADRANGLES.contains(&kind) => (2, 4),
             _ => {
                 self.solids += 1;
+                if let Some(corners) = corners.first_chunk::<4>().filter(|_| TETRAHEDRA.contains(&kind)) {
+                    self.tetrahedra.push((*corners, part));
+                    self.curved += usize::from(kind != TETRAHEDRA[0]);
+                }
                 return;
             }
         };

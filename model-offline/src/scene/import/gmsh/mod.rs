@@ -1,4 +1,4 @@
-//! Planar Gmsh meshes: `.msh`, versions 2.2 and 4.1, ASCII and binary.
+//! Gmsh meshes: `.msh`, versions 2.2 and 4.1, ASCII and binary; planar ones here, tetrahedra in `solid`.
 //!
 //! With triangles or quadrangles in the file the body is what they cover. Physical groups whose names say so are
 //! inclusions, materials, the needle, the target, paddles and what is fixed. Without names every surface but the
@@ -8,6 +8,7 @@
 mod chain;
 mod input;
 mod mesh;
+pub(in crate::scene) mod solid;
 
 use super::assemble::assemble;
 use super::role::{Meaning, Role, meaning};
@@ -100,7 +101,7 @@ impl Shapes<'_> {
 
     fn point(&self, node: u64) -> Result<Point2, ImportError> {
         let missing = || ImportError::Syntax { line: 0, what: format!("node {node} is used and not given") };
-        self.mesh.nodes.get(&node).copied().ok_or_else(missing)
+        self.mesh.nodes.get(&node).map(|x| x.xy()).ok_or_else(missing)
     }
 
     fn points(&self, line: &Line) -> Result<Vec<Point2>, ImportError> {

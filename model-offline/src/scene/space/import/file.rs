@@ -1,7 +1,8 @@
 //! Files by their names' endings.
 
 use super::error::{FileError, Noted, ReadError};
-use super::{nifti, nrrd, obj, ply, stl};
+use super::tetrahedra::Tetrahedra;
+use super::{msh, nifti, nrrd, obj, ply, stl, vtu};
 use crate::geometry::labels::Labels;
 use crate::geometry::surface::TriangleSurface;
 use std::path::Path;
@@ -42,6 +43,18 @@ pub fn surface(path: &Path) -> Result<Noted<TriangleSurface>, FileError> {
         "stl" => Some(stl::read),
         "obj" => Some(obj::read),
         "ply" => Some(ply::read),
+        _ => None,
+    })
+}
+
+/// Reads tetrahedra from a `.msh` or `.vtu` file; nothing is checked about how they fit.
+///
+/// # Errors
+/// [`FileError`] names the file, the place in it, and what to do.
+pub fn mesh(path: &Path) -> Result<Noted<Tetrahedra>, FileError> {
+    read(path, "a mesh of tetrahedra", ".msh (Gmsh) or .vtu (VTK)", |name| match name.rsplit('.').next()? {
+        "msh" => Some(msh::read),
+        "vtu" => Some(vtu::read),
         _ => None,
     })
 }

@@ -32,6 +32,13 @@ fn all() -> Vec<(String, Vec<u8>, Reader)> {
     for name in ["labels_u8.nii.gz", "labels_i16_sform.nii", "labels_f32_qform.nii"] {
         all.push((name.to_owned(), made(name), |bytes| nifti::read(bytes).map(|found| found.value.data.len())));
     }
+    for name in super::tetrahedra::FILES {
+        let reader: Reader = match name.rsplit('.').next() {
+            Some("msh") => |bytes| msh::read(bytes).map(|found| found.value.tetrahedra.len()),
+            _ => |bytes| vtu::read(bytes).map(|found| found.value.tetrahedra.len()),
+        };
+        all.push((name.to_owned(), made(name), reader));
+    }
     for name in ["labels_raw.nrrd", "labels_gzip.nrrd", "labels_ascii.nrrd", "labels_ras.nrrd"] {
         all.push((name.to_owned(), made(name), |bytes| nrrd::read(bytes).map(|found| found.value.data.len())));
     }
@@ -46,6 +53,9 @@ fn may_miss(name: &str) -> usize {
         ".obj" => usize::MAX,
         "ascii.ply" => " 0.25\n".len(),
         "labels_ascii.nrrd" => 1,
+        // The tags that close a section, or the whole file, and blanks before them.
+        _ if name.ends_with(".msh") => "\n$EndElements\n".len() + 3,
+        _ if name.ends_with(".vtu") => "\n  </AppendedData>\n</VTKFile>\n".len(),
         _ => 0,
     }
 }
@@ -108,8 +118,17 @@ fn changed_bytes_give_an_error_or_a_value() {
 fn random_bytes_give_an_error() {
     let mut random = SplitMix64(7);
     let readers: Vec<Reader> = all().into_iter().map(|(.., read)| read).collect();
-    let starts: [&[u8]; 7] =
-        [b"", b"solid", b"ply\n", b"v 1 2 3\nf ", b"\x1f\x8b\x08\0", b"\x5c\x01\0\0", b"NRRD0004\ntype: int\n"];
+    let starts: [&[u8]; 9] = [
+        b"",
+        b"solid",
+        b"ply\n",
+        b"v 1 2 3\nf ",
+        b"\x1f\x8b\x08\0",
+        b"\x5c\x01\0\0",
+        b"NRRD0004\ntype: int\n",
+        b"$MeshFormat\n2.2 0 8\n",
+        b"<VTKFile type=\"UnstructuredGrid\">",
+    ];
     for start in starts {
         for length in 0..400 {
             let mut bytes = start.to_vec();
@@ -140,6 +159,25 @@ fn headers_that_promise_billions_are_refused_at_once() {
     assert!(matches!(nifti::read(&nii), Err(ReadError::TooLarge { .. })));
     nii[42..48].copy_from_slice(&[0, 1, 0, 1, 0, 1]);
     assert!(nifti::read(&nii).unwrap_err().to_string().contains("do not fit"));
+    let msh = String::from_utf8(made("tets_gmsh_22.msh")).unwrap();
+    let vtu = String::from_utf8(made("tets_meshio_ascii.vtu")).unwrap();
+    let started = std::time::Instant::now();
+    assert!(msh::read(msh.replace("\n46\n", "\n18446744073709551615\n").as_bytes()).is_err());
+    assert!(msh::read(msh.replace("$Elements\n", "$Elements\n9").as_bytes()).is_err());
+    assert!(vtu::read(vtu.replace("=\"156\"", "=\"4000000000000\"").as_bytes()).is_ok(), "only what is there counts");
+    // Two thousand million blocks, and blocks of nothing but zeros that unpack to more than is read.
+    let array = |header: &[u32], data: &[u8]| {
+        let mut bytes: Vec<u8> = header.iter().flat_map(|n| n.to_le_bytes()).collect();
+        bytes.extend(data);
+        let mut file = b"<VTKFile type=\"UnstructuredGrid\" compressor=\"vtkZLibDataCompressor\"><Piece><Points>\
+            <DataArray type=\"Float64\" format=\"appended\" offset=\"0\"/></Points></Piece><AppendedData encoding=\"raw\">_"
+            .to_vec();
+        file.extend(bytes);
+        file
+    };
+    assert!(vtu::read(&array(&[2_000_000_000, 8, 8], &[0; 64])).is_err());
+    assert!(matches!(vtu::read(&array(&[u32::MAX, 8, 8], &[0; 64])), Err(ReadError::TooLarge { .. })));
+    assert!(started.elapsed().as_secs() < 5);
     let nrrd = String::from_utf8(made("labels_ascii.nrrd")).unwrap().replace("sizes: 6 5 4", "sizes: 4000000000 5 4");
     assert!(matches!(nrrd::read(nrrd.as_bytes()), Err(ReadError::TooLarge { .. })));
 }

@@ -1,0 +1,170 @@
+//! Bodies in space from files: the same results as the solids that the files hold.
+
+use assert_cmd::Command;
+use model_offline::discretization::TetMesh;
+use model_offline::model::space::meshing::{MeshSize, mesh};
+use model_offline::scene::space::{AnyScene, SpaceScene};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::path::Path;
+
+const BOX: &str = "box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }";
+const INCLUSION: &str = "box = { min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4] }";
+
+/// `block` on a coarse mesh, with replacements.
+fn block(changes: &[(&str, &str)]) -> String {
+    let text =
+        include_str!("../scenes/block.toml").replacen("tolerance = 0.05", "level = 0\nintegration = \"fem-t4\"", 1);
+    let text = text.replacen("of = \"all\"", "of = [[1, 2], [3, 6]]", 1);
+    changes.iter().fold(text, |text, (from, to)| {
+        assert!(text.contains(from), "{from}");
+        text.replacen(from, to, 1)
+    })
+}
+
+/// Places on a scene of this text in a folder: exit code, what was said in one line, and what was written.
+fn place(text: &str, folder: &Path) -> (i32, String, Option<Value>) {
+    let (scene, json) = (folder.join("scene.toml"), folder.join("place.json"));
+    let _ = std::fs::remove_file(&json);
+    std::fs::write(&scene, text).unwrap();
+    let mut command = Command::cargo_bin("model-offline").unwrap();
+    let output = command.arg("place").arg(&scene).arg("--json").arg(&json).arg("--quiet").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    let written = std::fs::read_to_string(&json).ok().map(|text| serde_json::from_str(&text).unwrap());
+    (output.status.code().unwrap(), said, written)
+}
+
+/// Measures of all paddles and pairs, and the largest orthogonal displacement with each held still.
+fn study(text: &str, folder: &Path) -> (Vec<f64>, Vec<f64>) {
+    let (code, said, written) = place(text, folder);
+    assert_eq!(code, 0, "{said}");
+    let written = written.unwrap();
+    let all = || written["paddles"].as_array().unwrap().iter().chain(written["pairs"].as_array().unwrap());
+    let measures = all().map(|result| result["controllability_measure"].as_f64().unwrap());
+    let fixtures = all().map(|result| result["static"]["max_orthogonal"].as_f64().unwrap());
+    (measures.collect(), fixtures.collect())
+}
+
+/// The largest relative distance of numbers from what they should be.
+fn worst(found: &[f64], expected: &[f64]) -> f64 {
+    found.iter().zip(expected).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
+}
+
+fn assert_same(what: &str, found: &(Vec<f64>, Vec<f64>), expected: &(Vec<f64>, Vec<f64>)) {
+    let (measures, fixtures) = (worst(&found.0, &expected.0), worst(&found.1, &expected.1));
+    println!("{what}: measures within {:.3} %, fixtures within {:.3} %", 100.0 * measures, 100.0 * fixtures);
+    assert!(measures < 0.01 && fixtures < 0.05, "{what}: {measures} {fixtures}\n{found:?}\n{expected:?}");
+}
+
+/// The cube between two corners as text STL, its faces in so many squares along each side.
+fn cube(n: usize, low: f64, high: f64) -> String {
+    let mut text = "solid cube\n".to_owned();
+    let at = |i: usize| low + (high - low) * i as f64 / n as f64;
+    for axis in 0..3 {
+        for (i, j, top) in (0..n).flat_map(|i| (0..n).flat_map(move |j| [(i, j, false), (i, j, true)])) {
+            let corner = |u: usize, v: usize| {
+                let mut x = [0.0; 3];
+                x[axis] = if top { high } else { low };
+                x[(axis + 1) % 3] = at(i + u);
+                x[(axis + 2) % 3] = at(j + v);
+                format!("vertex {} {} {}\n", x[0] as f32, x[1] as f32, x[2] as f32)
+            };
+            for t in [[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]] {
+                let mut t = t.map(|(u, v)| corner(u, v));
+                if !top {
+                    t.swap(1, 2);
+                }
+                let _ = write!(text, "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n", t.concat());
+            }
+        }
+    }
+    text + "endsolid cube\n"
+}
+
+#[test]
+fn block_from_a_surface_is_block() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = study(&block(&[]), folder.path());
+    for n in [1, 9] {
+        std::fs::write(folder.path().join("cube.stl"), cube(n, 0.0, 1.0)).unwrap();
+        let found = study(&block(&[(BOX, "surface = \"cube.stl\"")]), folder.path());
+        assert_same(&format!("{} triangles", 12 * n * n), &found, &expected);
+    }
+}
+
+/// A mesh as Gmsh's version 2.2, its parts as physical groups 1 and 2.
+fn gmsh(mesh: &TetMesh) -> String {
+    let mut text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n2\n3 1 \"tissue\"\n3 2 \"stiff part\"\n\
+                    $EndPhysicalNames\n$Nodes\n"
+        .to_owned();
+    let _ = writeln!(text, "{}", mesh.nodes.len());
+    for (i, x) in (1..).zip(&mesh.nodes) {
+        let _ = writeln!(text, "{i} {} {} {}", x.x, x.y, x.z);
+    }
+    let _ = writeln!(text, "$EndNodes\n$Elements\n{}", mesh.tetrahedra.len());
+    for (i, (t, part)) in (1..).zip(mesh.tetrahedra.iter().zip(&mesh.part)) {
+        let [a, b, c, d] = t.map(|n| n + 1);
+        let _ = writeln!(text, "{i} 4 2 {} {} {a} {b} {c} {d}", part + 1, part + 1);
+    }
+    text + "$EndElements\n"
+}
+
+fn bundled(name: &str) -> SpaceScene {
+    SpaceScene::bundled(name).unwrap()
+}
+
+#[test]
+fn block_from_a_mesh_with_its_inclusion_as_a_group_is_block() {
+    let folder = tempfile::tempdir().unwrap();
+    let expected = study(&block(&[]), folder.path());
+    let mesh = mesh(&bundled("block"), &MeshSize::level(0)).unwrap();
+    std::fs::write(folder.path().join("block.msh"), gmsh(&mesh)).unwrap();
+    let body = (BOX, "mesh = \"block.msh\"");
+    for part in ["name = \"stiff part\"", "label = 2"] {
+        assert_same(part, &study(&block(&[body, (INCLUSION, part)]), folder.path()), &expected);
+    }
+    for (change, expected) in [
+        ((INCLUSION, "name = \"bone\""), "it has 1 (\"tissue\"), 2 (\"stiff part\")"),
+        ((INCLUSION, "label = 3"), "no group 3"),
+    ] {
+        let (code, said, written) = place(&block(&[body, change]), folder.path());
+        assert!(code == 2 && said.contains(expected) && written.is_none(), "{code} {said}");
+    }
+    // The file is a part of what the scene says.
+    let hash = || match AnyScene::read(&folder.path().join("scene.toml")).unwrap() {
+        AnyScene::Space(scene) => scene.hash(),
+        AnyScene::Planar(_) => panic!(),
+    };
+    std::fs::write(folder.path().join("scene.toml"), block(&[body])).unwrap();
+    let before = hash();
+    std::fs::write(folder.path().join("block.msh"), gmsh(&mesh) + "\n").unwrap();
+    assert_ne!(before, hash());
+}
+
+#[test]
+fn an_angle_from_a_surface_is_the_solid() {
+    // The far quarter of the block's lower side is missing.
+    let solid = "solid = { union = [{ box = { min = [0.0, 0.0, 0.35], max = [1.0, 1.0, 1.0] } }, \
+                 { box = { min = [0.0, 0.0, 0.0], max = [0.55, 1.0, 1.0] } }] }";
+    let folder = tempfile::tempdir().unwrap();
+    let held = ("min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0]", "min = [1.0, 0.0, 0.35], max = [1.0, 1.0, 1.0]");
+    let inclusion = (INCLUSION, "box = { min = [0.6, 0.4, 0.6], max = [0.7, 0.6, 0.7] }");
+    let text = |body: &str| block(&[(BOX, body), held, inclusion]);
+    let expected = study(&text(solid), folder.path());
+    // Corners in the plane of x and z, all along y.
+    let outline = [[0.0, 0.0], [0.55, 0.0], [0.55, 0.35], [1.0, 0.35], [1.0, 1.0], [0.0, 1.0]];
+    let mut obj = String::new();
+    for y in [0, 1] {
+        outline.iter().for_each(|[x, z]| writeln!(obj, "v {x} {y} {z}").unwrap());
+    }
+    for [a, b, c] in [[1, 2, 3], [1, 3, 6], [6, 3, 5], [3, 4, 5]] {
+        let _ = writeln!(obj, "f {a} {b} {c}\nf {} {} {}", a + 6, c + 6, b + 6);
+    }
+    for i in 1..=6 {
+        let next = i % 6 + 1;
+        let _ = writeln!(obj, "f {next} {i} {} {}", i + 6, next + 6);
+    }
+    std::fs::write(folder.path().join("angle.obj"), obj).unwrap();
+    assert_same("angle", &study(&text("surface = \"angle.obj\""), folder.path()), &expected);
+}
