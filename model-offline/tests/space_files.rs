@@ -11,6 +11,8 @@ use std::path::Path;
 const BOX: &str = "box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }";
 const INCLUSION: &str = "box = { min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4] }";
 
+const HELD: &str = "min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0]";
+
 /// `block` on a coarse mesh, with replacements.
 fn block(changes: &[(&str, &str)]) -> String {
     let text =
@@ -57,17 +59,17 @@ fn assert_same(what: &str, found: &(Vec<f64>, Vec<f64>), expected: &(Vec<f64>, V
     assert!(measures < 0.01 && fixtures < 0.05, "{what}: {measures} {fixtures}\n{found:?}\n{expected:?}");
 }
 
-/// The cube between two corners as text STL, its faces in so many squares along each side.
-fn cube(n: usize, low: f64, high: f64) -> String {
-    let mut text = "solid cube\n".to_owned();
-    let at = |i: usize| low + (high - low) * i as f64 / n as f64;
+/// The box between two corners as text STL, its faces in so many rectangles along each side.
+fn cuboid(n: usize, low: [f64; 3], high: [f64; 3]) -> String {
+    let mut text = "solid cuboid\n".to_owned();
+    let at = |axis: usize, i: usize| low[axis] + (high[axis] - low[axis]) * i as f64 / n as f64;
     for axis in 0..3 {
         for (i, j, top) in (0..n).flat_map(|i| (0..n).flat_map(move |j| [(i, j, false), (i, j, true)])) {
             let corner = |u: usize, v: usize| {
                 let mut x = [0.0; 3];
-                x[axis] = if top { high } else { low };
-                x[(axis + 1) % 3] = at(i + u);
-                x[(axis + 2) % 3] = at(j + v);
+                x[axis] = if top { high[axis] } else { low[axis] };
+                x[(axis + 1) % 3] = at((axis + 1) % 3, i + u);
+                x[(axis + 2) % 3] = at((axis + 2) % 3, j + v);
                 format!("vertex {} {} {}\n", x[0] as f32, x[1] as f32, x[2] as f32)
             };
             for t in [[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]] {
@@ -79,16 +81,18 @@ fn cube(n: usize, low: f64, high: f64) -> String {
             }
         }
     }
-    text + "endsolid cube\n"
+    text + "endsolid cuboid\n"
 }
 
 #[test]
 fn block_from_a_surface_is_block() {
     let folder = tempfile::tempdir().unwrap();
-    let expected = study(&block(&[]), folder.path());
+    // Its base is where no lattice that has the paddles has a plane.
+    let held = |body: &str| block(&[(BOX, body), (HELD, "min = [1.0, 0.0, -0.0213], max = [1.0, 1.0, 1.0]")]);
+    let expected = study(&held("box = { min = [0.0, 0.0, -0.0213], max = [1.0, 1.0, 1.0] }"), folder.path());
     for n in [1, 9] {
-        std::fs::write(folder.path().join("cube.stl"), cube(n, 0.0, 1.0)).unwrap();
-        let found = study(&block(&[(BOX, "surface = \"cube.stl\"")]), folder.path());
+        std::fs::write(folder.path().join("cube.stl"), cuboid(n, [0.0, 0.0, -0.0213], [1.0; 3])).unwrap();
+        let found = study(&held("surface = \"cube.stl\""), folder.path());
         assert_same(&format!("{} triangles", 12 * n * n), &found, &expected);
     }
 }
@@ -148,7 +152,7 @@ fn an_angle_from_a_surface_is_the_solid() {
     let solid = "solid = { union = [{ box = { min = [0.0, 0.0, 0.35], max = [1.0, 1.0, 1.0] } }, \
                  { box = { min = [0.0, 0.0, 0.0], max = [0.55, 1.0, 1.0] } }] }";
     let folder = tempfile::tempdir().unwrap();
-    let held = ("min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0]", "min = [1.0, 0.0, 0.35], max = [1.0, 1.0, 1.0]");
+    let held = (HELD, "min = [1.0, 0.0, 0.35], max = [1.0, 1.0, 1.0]");
     let inclusion = (INCLUSION, "box = { min = [0.6, 0.4, 0.6], max = [0.7, 0.6, 0.7] }");
     let text = |body: &str| block(&[(BOX, body), held, inclusion]);
     let expected = study(&text(solid), folder.path());

@@ -120,9 +120,9 @@ fn the_edge_between_a_dome_and_its_base_is_kept() {
 #[test]
 fn smooth_surfaces_have_no_edges() {
     for (semi_axes, divisions) in [([1.0, 1.0, 1.0], 2), ([1.0, 0.6, 0.8], 2), ([1.0, 0.5, 0.5], 4)] {
-        let body = moved(&sphere(1.0, divisions), |x| x.component_mul(&semi_axes.into())).check().unwrap();
+        let body = moved(&sphere(1.0, divisions), |x| x.component_mul(&Point::<3>::from(semi_axes))).check().unwrap();
         assert!(matches!(body.sheets()[..], [crate::geometry::Sheet::Smooth(_)]), "{semi_axes:?}");
-        assert_eq!(feature_points(&body, 0.1), Vec::new());
+        assert!(feature_points(&body, 0.1).is_empty());
     }
 }
 

@@ -63,7 +63,7 @@ fn what_is_wrong_with_a_mesh_is_said() {
     let (msh, vtu) = ("tets_gmsh_22.msh", "tets_meshio_ascii.vtu");
     has(msh, "$Elements", "$Nothing", &["Gmsh", "no tetrahedra", "mesh the volume"]);
     has(msh, "2.2 0 8", "4.0 0 8", &["Gmsh", "4.1"]);
-    has(msh, "\n1 0 0 ", "\n1 0 nan ", &["Gmsh, line", "finite"]);
+    has(msh, "\n1 2 1 2", "\n1 2 nan 2", &["Gmsh, line", "finite"]);
     has(vtu, "UnstructuredGrid", "PolyData", &["VTU", "PolyData", "unstructured grid"]);
     has(vtu, "\"offsets\"", "\"offset\"", &["VTU", "offsets"]);
     has(vtu, "Int32", "Complex", &["VTU", "type"]);
