@@ -38,7 +38,12 @@ impl<'m> PreparedBody<'m> {
     ///
     /// # Errors
     /// [`WorldError::NoPaddle`], [`WorldError::Tabulation`].
-    pub fn new(model: &'m InsertionModel, paddles: &[u32], are_steered: bool, threads: usize) -> Result<Self, WorldError> {
+    pub fn new(
+        model: &'m InsertionModel,
+        paddles: &[u32],
+        are_steered: bool,
+        threads: usize,
+    ) -> Result<Self, WorldError> {
         let place =
             |index: &u32| model.scene().paddle_position(*index).map_err(|_| WorldError::NoPaddle { index: *index });
         let attached = paddles.iter().map(place).collect::<Result<Vec<_>, _>>()?;

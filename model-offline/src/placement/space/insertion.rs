@@ -21,16 +21,16 @@ use nalgebra::DMatrix;
 /// A coarse model that goes deep, with what an accurate one answers at rest.
 #[derive(Debug, Clone)]
 pub struct InsertionModel {
+    scene: SpaceScene,
     coarse: SpaceModel,
     accurate: SpaceModel,
     rest: Vec<SpaceResponse>,
 }
 
 impl InsertionModel {
-    /// Follows insertions on `coarse`; at rest it answers as `accurate`, a model of the same scene, whose responses are `rest`
-    /// ([`rest_responses`]).
-    pub fn new(coarse: SpaceModel, accurate: SpaceModel, rest: Vec<SpaceResponse>) -> Self {
-        Self { coarse, accurate, rest }
+    /// Follows insertions of a scene on `coarse`; at rest it answers as `accurate`, whose responses are `rest` ([`rest_responses`]).
+    pub fn new(scene: &SpaceScene, coarse: SpaceModel, accurate: SpaceModel, rest: Vec<SpaceResponse>) -> Self {
+        Self { scene: scene.clone(), coarse, accurate, rest }
     }
 
     /// Follows insertions on a model that is believed as it is.
@@ -39,7 +39,7 @@ impl InsertionModel {
     /// [`ModelError`] when the body at rest cannot be solved.
     pub fn as_it_is(model: SpaceModel) -> Result<Self, ModelError> {
         let rest = rest_responses(&model)?;
-        Ok(Self { coarse: model.clone(), accurate: model, rest })
+        Ok(Self { scene: model.scene().clone(), coarse: model.clone(), accurate: model, rest })
     }
 
     /// The same without the scene's inclusions.
@@ -48,12 +48,17 @@ impl InsertionModel {
     /// [`ModelError`] when the body at rest cannot be solved.
     pub fn without_inclusions(&self) -> Result<Self, ModelError> {
         let accurate = self.accurate.without_inclusions();
-        Ok(Self { coarse: self.coarse.without_inclusions(), rest: rest_responses(&accurate)?, accurate })
+        Ok(Self {
+            scene: self.scene.without_inclusions(),
+            coarse: self.coarse.without_inclusions(),
+            rest: rest_responses(&accurate)?,
+            accurate,
+        })
     }
 
-    /// The scene.
+    /// The scene, discretised as it says itself.
     pub fn scene(&self) -> &SpaceScene {
-        self.coarse.scene()
+        &self.scene
     }
 
     /// Nodes of the mesh that insertions are followed on.

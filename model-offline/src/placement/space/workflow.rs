@@ -83,7 +83,7 @@ impl SpaceStudy {
         let start = Instant::now();
         let Discretised { model, rest, estimate: error_estimate } = discretise(scene)?;
         begin(steps(&model));
-        let insertions = InsertionModel::new(coarse(model.scene())?, model.clone(), rest);
+        let insertions = InsertionModel::new(scene, coarse(scene)?, model.clone(), rest);
         let placement = place_in_space(&insertions, threads, progress)?;
         Ok(Self { model, placement, error_estimate, wall_s: start.elapsed().as_secs_f64() })
     }
@@ -262,7 +262,7 @@ pub fn insertion_model(scene: &SpaceScene) -> Result<InsertionModel, ModelError>
         wanted.discretization.resolution = Resolution::Tolerance(tolerance.max(AT_REST));
     }
     let Discretised { model, rest, .. } = discretise(&wanted)?;
-    Ok(InsertionModel::new(coarse(scene)?, model, rest))
+    Ok(InsertionModel::new(scene, coarse(scene)?, model, rest))
 }
 
 /// The model that insertions are followed on. Linear tetrahedra on the coarsest mesh that sees every patch: they cost a tenth of any
