@@ -223,12 +223,35 @@ fn a_vtu_in_space_has_the_body_and_all_that_is_known_in_it() {
     }
 }
 
+/// Outside and three sections: in each the cube has its side, and what is attached and cut is there.
+#[test]
+fn a_picture_in_space_has_the_outside_and_three_sections() {
+    let folder = tempfile::tempdir().unwrap();
+    let call = ["solve", "block", "--integration", "fem-t4", "--spacing", "0.2", "--depth", "0.02", "--paddle", "3"];
+    let call = [&call[..], &["--paddle-displacement", "0.01,0,0", "--svg", "a.svg"]].concat();
+    assert_eq!(run(&call, folder.path()).0, 0);
+    let text = std::fs::read_to_string(folder.path().join("a.svg")).unwrap();
+    let picture = roxmltree::Document::parse(&text).unwrap();
+    let all: Vec<String> =
+        picture.descendants().filter_map(|node| node.text()).map(|t| t.replace('\u{a0}', " ")).collect();
+    for name in ["y = 0.5, along the needle", "x = 0.5, along the needle", "z = 0.5, across the needle"] {
+        assert!(all.iter().any(|text| text == name), "{name}: {all:?}");
+    }
+    let of = |class: &str| picture.descendants().filter(|node| node.attribute("class") == Some(class)).count();
+    assert_eq!(of("outside"), 1);
+    assert_eq!(of("field"), 3);
+    // Paddle 3 is at the middle of x = 0: two sections cut it, from the third it is seen as a rim.
+    assert_eq!((of("paddle best"), of("paddle best beside")), (2, 1));
+    // The needle in the two sections along it and from outside; what is held at x = 1 in two.
+    assert_eq!((of("shaft"), of("immobile")), (3, 2));
+    assert!(!text.contains("NaN") && !text.contains("inf"));
+}
+
 #[test]
 fn options_that_do_not_belong_to_space_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (options, expected) in [
         (vec!["solve", "block", "--depth", "0.01", "--dwell", "1"], "--dwell"),
-        (vec!["solve", "block", "--depth", "0.01", "--svg", "a.svg"], "--svg"),
         (vec!["solve", "block", "--depth", "0.01", "--paddle", "9"], "no paddle 9"),
         (vec!["solve", "block", "--depth", "0.01", "--paddle", "3", "--paddle", "3"], "given twice"),
         (

@@ -51,7 +51,7 @@ pub(super) struct SolveArgs {
     /// shows all of it (.py).
     #[arg(long, value_name = "FILE")]
     vtu: Option<PathBuf>,
-    /// Draw the deformed body.
+    /// Draw the deformed body; in space its outside and three sections through the target.
     #[arg(long, value_name = "FILE")]
     svg: Option<PathBuf>,
     #[command(flatten)]
@@ -66,7 +66,8 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     }
     if let Some(scene) = args.scene.read_in_space()? {
         let scene = args.discretization.over_space(scene)?;
-        let outputs = [("--json", args.json.as_deref()), ("--vtu", args.vtu.as_deref())];
+        let [json, vtu, svg] = [&args.json, &args.vtu, &args.svg].map(Option::as_deref);
+        let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg)];
         check_outputs(&args.scene.files(&scene), &outputs)?;
         return in_space(&scene, args);
     }
@@ -117,15 +118,13 @@ fn in_space(scene: &SpaceScene, args: &SolveArgs) -> Result<(), CliError> {
     if args.dwell != 0.0 {
         return Err(CliError::usage("--dwell is planar", "leave --dwell out: tissue does not relax in space"));
     }
-    if args.svg.is_some() {
-        return Err(CliError::usage("--svg draws bodies in the plane", "write --vtu, and look at it in ParaView"));
-    }
     let asked = SpaceArgs {
         paddles: &args.paddle,
         displacements: args.paddle_displacement.as_deref().unwrap_or_default(),
         depth: args.depth,
         json: args.json.as_deref(),
         vtu: args.vtu.as_deref(),
+        svg: args.svg.as_deref(),
         quiet: args.run.quiet,
     };
     solve_space::run(scene, asked)

@@ -6,6 +6,7 @@ use model_offline::model::ModelError;
 use model_offline::model::space::{SpaceBody, SpaceModel};
 use model_offline::number::{in_unit, short};
 use model_offline::output;
+use model_offline::output::space_picture::{self, SpaceGeometry, SpaceState};
 use model_offline::output::vtu;
 use model_offline::placement::space::workflow;
 use model_offline::scene::space::SpaceScene;
@@ -27,6 +28,8 @@ pub(super) struct SpaceArgs<'a> {
     pub(super) json: Option<&'a Path>,
     /// Where the body goes for ParaView.
     pub(super) vtu: Option<&'a Path>,
+    /// Where its picture goes.
+    pub(super) svg: Option<&'a Path>,
     /// No summary.
     pub(super) quiet: bool,
 }
@@ -145,6 +148,10 @@ fn write(
     write_json(args.json, &document)?;
     if let Some(file) = args.vtu {
         output::write_whole(file, vtu::vtu_in_space(model, coefficients).as_bytes())?;
+    }
+    if let Some(file) = args.svg {
+        let (geometry, state) = (SpaceGeometry::new(model), SpaceState::new(body, args.paddles));
+        output::write_whole(file, space_picture::svg(&geometry, &state).as_bytes())?;
     }
     Ok(())
 }

@@ -53,7 +53,8 @@ impl Field {
         }
     }
 
-    fn label(self, [length, stress]: &[String; 2]) -> String {
+    /// What a colour bar calls it, with its unit, of the labels of length and stress.
+    pub fn label(self, [length, stress]: &[String; 2]) -> String {
         match self {
             Self::Size => in_unit("size of the displacement", length),
             Self::Orthogonal => in_unit("displacement orthogonal to the needle, its size", length),
@@ -93,24 +94,39 @@ pub fn svg(body: &ResultBody, field: Field, values: &[f64]) -> String {
     sheet(&title, &[heading(&title, &caption, width), drawn, bar], 1).file()
 }
 
-fn with_unit(value: f64, unit: &str) -> String {
+/// A number with its unit; the label `1` means that there is none.
+pub(super) fn with_unit(value: f64, unit: &str) -> String {
     if unit == "1" { plain(value) } else { format!("{}\u{a0}{unit}", plain(value)) }
 }
 
-/// A triangle cut where its value, linear between its corners, passes from one colour to the next; 1 is where they end.
+/// Draws a triangle in the colours of its values, linear between its corners; 1 is where they end.
 fn in_bands(drawing: &mut Drawing, corners: &[(Px, f64); 3]) {
+    for (band, points) in bands(corners) {
+        drawing.polygon(&format!("f{band}"), &points);
+    }
+}
+
+/// A convex polygon cut where its value, linear in it, passes from one colour to the next: colours, and what has them. 1 is
+/// where they end.
+pub(super) fn bands(corners: &[(Px, f64)]) -> Vec<(usize, Vec<Px>)> {
     let of = |value: f64| ((value * BANDS as f64).max(0.0) as usize).min(BANDS - 1);
-    let values = corners.map(|corner| corner.1);
-    let [first, last] = [f64::min, f64::max].map(|pick| of(values.into_iter().fold(values[0], pick)));
-    for band in first..=last {
-        let at = |edge: usize| edge as f64 / BANDS as f64;
+    let least = corners.iter().map(|corner| corner.1).fold(f64::INFINITY, f64::min);
+    let most = corners.iter().map(|corner| corner.1).fold(f64::NEG_INFINITY, f64::max);
+    let (first, last) = (of(least), of(most));
+    let at = |edge: usize| edge as f64 / BANDS as f64;
+    let part = |band: usize| {
         let above = if band == first { corners.to_vec() } else { cut(corners, at(band), 1.0) };
         let between = if band == last { above } else { cut(&above, at(band + 1), -1.0) };
-        let points: Vec<Px> = between.iter().map(|corner| corner.0).collect();
-        if points.len() > 2 {
-            drawing.polygon(&format!("f{band}"), &points);
-        }
-    }
+        (band, between.into_iter().map(|corner| corner.0).collect::<Vec<Px>>())
+    };
+    (first..=last).map(part).filter(|(_, points)| points.len() > 2).collect()
+}
+
+/// A target that has moved: a ring where it was, a dot where it is.
+pub(super) fn moved_target(drawing: &mut Drawing, rest: Px, now: Px) {
+    drawing.circle("under", rest, 6.0);
+    drawing.circle("target", rest, 6.0);
+    drawing.marker(Marker::Circle, "dot", now);
 }
 
 /// The part of a convex polygon whose value is above a level (`side` 1), or below (−1).
@@ -141,20 +157,11 @@ impl<'a> Picture<'a> {
     fn new(body: &'a ResultBody) -> Self {
         let geometry = &body.geometry;
         let far = |point: &[f64; 2], way: f64| [0, 1].map(|k| point[k] + way * geometry.needle_axis[k]);
-        let bounds = |points: &mut dyn Iterator<Item = [f64; 2]>| {
-            points
-                .filter(|p| p.iter().all(|value| value.is_finite()))
-                .fold(([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]), |(low, high), p| {
-                    ([0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k])))
-                })
-        };
-        let (low, high) = bounds(&mut geometry.outline.iter().copied());
+        let [low, high] = Plane::around(geometry.outline.iter().copied(), 0.0, WIDTH).corners();
         let extent = (high[0] - low[0]).max(high[1] - low[1]);
         let needle = far(&middle(&geometry.needle_contact), -OUTSIDE * extent);
         let all = geometry.outline.iter().chain(&body.nodes).copied().chain([needle]);
-        let (low, high) = bounds(&mut all.collect::<Vec<_>>().into_iter());
-        let margin = MARGIN * extent;
-        let plane = Plane::new(low.map(|low| low - margin), high.map(|high| high + margin), WIDTH);
+        let plane = Plane::around(all, MARGIN * extent, WIDTH);
         let triangles = triangles(&geometry.nodes, &geometry.outline);
         Self { body, triangles, plane, extent }
     }
@@ -201,10 +208,7 @@ impl<'a> Picture<'a> {
             let [x, y] = middle(&segment);
             drawing.text("title halo", [x, y + 4.5], Anchor::Middle, &paddle.index.to_string());
         }
-        let [rest, now] = [plane.at(geometry.target), moved(&[geometry.target])[0]];
-        drawing.circle("under", rest, 6.0);
-        drawing.circle("target", rest, 6.0);
-        drawing.marker(Marker::Circle, "dot", now);
+        moved_target(drawing, plane.at(geometry.target), moved(&[geometry.target])[0]);
     }
 
     fn needle(&self, drawing: &mut Drawing) {

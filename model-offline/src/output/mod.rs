@@ -9,6 +9,7 @@ mod picture_file;
 mod preflight;
 pub mod result_file;
 pub mod scene_picture;
+pub mod space_picture;
 pub mod space_table_text;
 mod state;
 pub mod surface;

@@ -4,6 +4,7 @@ pub mod meshing;
 mod middles;
 mod patches;
 mod seen;
+pub mod surfaces;
 pub mod survey;
 
 use self::middles::Middles;

@@ -175,6 +175,18 @@ impl Drawing {
         self.shape(points, format_args!(r#"<polygon class="{class}" points="{text}"/>"#));
     }
 
+    /// A shape with holes: what lies inside of an odd number of these loops; left out when any corner is not finite.
+    pub fn region(&mut self, class: &str, loops: &[Vec<Px>]) {
+        let mut text = String::new();
+        for points in loops.iter().filter(|points| points.len() > 2) {
+            let _ = write!(text, "M{}Z", joined(points));
+        }
+        let all: Vec<Px> = loops.iter().flatten().copied().collect();
+        if !text.is_empty() {
+            self.shape(&all, format_args!(r#"<path class="{class}" fill-rule="evenodd" d="{text}"/>"#));
+        }
+    }
+
     /// A rectangle by its upper left corner; a negative size is none.
     pub fn rectangle(&mut self, class: &str, corner: Px, size: Px) {
         let [x, y, width, height] = [corner[0], corner[1], size[0].max(0.0), size[1].max(0.0)].map(px);

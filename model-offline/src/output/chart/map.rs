@@ -6,13 +6,18 @@ use super::drawing::{Anchor, Drawing, TEXT, text_width};
 use super::plane::Plane;
 use super::plot_area::PlotArea;
 
-/// Coordinates with their unit below and on the left of what is drawn on a plane; `draw` draws it, between the lines across
-/// and the axes.
+/// Coordinates `x` and `y` with their unit below and on the left of what is drawn on a plane; `draw` draws it, between the
+/// lines across and the axes.
 pub fn map(plane: &Plane, unit: &str, draw: impl FnOnce(&mut Drawing)) -> Drawing {
+    map_of(plane, ["x", "y"], unit, draw)
+}
+
+/// The same of coordinates with other names.
+pub fn map_of(plane: &Plane, names: [&str; 2], unit: &str, draw: impl FnOnce(&mut Drawing)) -> Drawing {
     let [low, high] = plane.corners();
-    let [x, y] = [("x", 0), ("y", 1)].map(|(name, k)| {
+    let [x, y] = [0, 1].map(|k| {
         // Without any value: the ends are given.
-        Axis::linear(name, unit).range(low[k], high[k]).settle(std::iter::empty())
+        Axis::linear(names[k], unit).range(low[k], high[k]).settle(std::iter::empty())
     });
     let widest = |ticks: &[(f64, String)]| ticks.iter().map(|tick| text_width(&tick.1, TEXT)).fold(0.0, f64::max);
     let (left, right) = (widest(&y.ticks) + TICK + 2.0, RIGHT.max(0.5 * widest(&x.ticks)));

@@ -55,7 +55,7 @@ pub use axis::{Axis, Scale};
 pub use drawing::{Anchor, Drawing, Marker, Px, escape, sheet};
 pub use figure::{Figure, heading};
 pub use legend::{Key, Legend};
-pub use map::map;
+pub use map::{map, map_of};
 pub use notes::Names;
 pub use panel::{Bars, Dash, Note, Panel, Place, ReferenceLine, Series, Strip};
 pub use plane::Plane;

@@ -20,6 +20,16 @@ impl Plane {
         Self { scale, low, size: size.map(|side| side * scale) }
     }
 
+    /// The same of a rectangle that has so much room around these points, length; what is not finite is left out.
+    pub fn around(points: impl IntoIterator<Item = [f64; 2]>, room: f64, width: f64) -> Self {
+        let none = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let finite = points.into_iter().filter(|point| point.iter().all(|value| value.is_finite()));
+        let (low, high) = finite.fold(none, |(low, high), point| {
+            ([0, 1].map(|k| low[k].min(point[k])), [0, 1].map(|k| high[k].max(point[k])))
+        });
+        Self::new(low.map(|low| low - room), high.map(|high| high + room), width)
+    }
+
     /// Lower left and upper right corner of the rectangle.
     pub fn corners(&self) -> [[f64; 2]; 2] {
         [self.low, [0, 1].map(|k| self.low[k] + self.size[k] / self.scale)]
@@ -52,5 +62,7 @@ mod tests {
         assert_eq!(plane.path(&[[1.0, 2.0], [3.0, 3.0]]), [[0.0, 50.0], [100.0, 0.0]]);
         let high = Plane::new([0.0, 0.0], [1.0, 10.0], 100.0);
         assert_eq!((high.size, high.length(1.0)), ([15.0, 150.0], 15.0));
+        let around = Plane::around([[1.0, 2.0], [f64::NAN, 9.0], [3.0, 3.0]], 1.0, 100.0);
+        assert_eq!(around.corners(), [[0.0, 1.0], [4.0, 4.0]]);
     }
 }
