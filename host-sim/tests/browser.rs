@@ -1,6 +1,7 @@
 //! Report and live view in a real browser. Says "skipped" where none is installed. With `STILLPOINT_SCREENSHOTS=DIR` the
 //! pictures are kept, to be looked at.
 
+mod scenes;
 mod webdriver;
 
 use std::io::{BufRead as _, BufReader};
@@ -67,6 +68,69 @@ fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works()
         json!(0)
     );
     assert_eq!(browser.complaints(), Vec::<String>::new());
+}
+
+/// The view in space is turned, cut and coloured by its controls and by keys; pictures stand in its place on paper and without
+/// WebGL.
+#[test]
+fn a_body_in_space_can_be_turned_and_cut() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scenes::with_pairs(folder.path(), "[[5, 6]]");
+    let report = folder.path().join("report");
+    let arguments = ["run", "--quiet", "--insertion-time", "0.5", "--tissue", "inclusion", "--scene"];
+    succeeds(Command::new(PROGRAM).args(arguments).arg(&scene).arg("--out").arg(&report));
+    browser.look(1280, 1000, "light");
+    browser.open(&format!("file://{}/report.html", report.display()));
+    // What the canvas shows: a sum over its pixels, read in the frame in which it was drawn.
+    let drawn = || {
+        browser.run(
+            "return new Promise((done) => { const c = document.querySelector('#view canvas'); \
+             c.dispatchEvent(new KeyboardEvent('keydown', { key: 'none' })); \
+             document.querySelector('#view-times').dispatchEvent(new Event('input')); requestAnimationFrame(() => { \
+             const copy = document.createElement('canvas'); [copy.width, copy.height] = [200, 100]; \
+             const g = copy.getContext('2d'); g.drawImage(c, 0, 0, 200, 100); \
+             done([...g.getImageData(0, 0, 200, 100).data].reduce((sum, part, i) => (31 * sum + part * (i % 251)) % 1000003, 7)); }); })",
+        )
+    };
+    let has_webgl = browser.run("return !document.querySelector('#view').hidden") == json!(true);
+    let stands = || browser.run("return getComputedStyle(document.querySelector('.stand-in')).display !== 'none'");
+    assert_eq!(stands(), json!(!has_webgl), "the picture stands where the view is not");
+    if has_webgl {
+        let mut seen = vec![drawn()];
+        let choose = |name: &str, value: &str| {
+            browser.run(&format!(
+                "const s = document.querySelector('#view-{name}'); s.value = '{value}'; \
+                 for (const kind of ['input', 'change']) s.dispatchEvent(new Event(kind))"
+            ))
+        };
+        for (name, value) in [("cut", "all"), ("strategy", "0"), ("field", "size"), ("times", "3"), ("cut", "none")] {
+            choose(name, value);
+            let now = drawn();
+            assert!(!seen.contains(&now), "{name} {value} changes nothing");
+            seen.push(now);
+        }
+        for key in ["ArrowLeft", "ArrowUp", "+"] {
+            browser.run(&format!(
+                "document.querySelector('#view canvas').dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}' }}))"
+            ));
+            let now = drawn();
+            assert!(!seen.contains(&now), "{key} changes nothing");
+            seen.push(now);
+        }
+        let told = browser.run("return document.querySelector('#view-reading').textContent");
+        assert!(told.as_str().unwrap().contains("No paddle"), "{told}");
+    }
+    for (width, scheme) in [(1280, "light"), (1280, "dark"), (390, "light")] {
+        browser.look(width, 1000, scheme);
+        let wide = browser.run("return document.documentElement.scrollWidth - document.documentElement.clientWidth");
+        assert!(wide.as_i64().unwrap() <= 1, "{width} px: {wide} px too wide");
+        browser.picture(&format!("space-{width}-{scheme}.png"));
+    }
+    let fetched = "return performance.getEntriesByType('resource').filter((e) => !e.name.startsWith('data:')).length";
+    assert_eq!(browser.run(fetched), json!(0));
+    let told = browser.complaints();
+    assert!(told.iter().all(|line| line.contains("WebGL")), "{told:?}");
 }
 
 /// A machine that others use may be too slow for free-run for a while, which is rightly refused.

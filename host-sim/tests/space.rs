@@ -1,5 +1,7 @@
 //! The closed loop on a body in space, through the command.
 
+mod scenes;
+
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -12,6 +14,7 @@ use model_offline::placement::space::workflow::insertion_model;
 use model_offline::scene::SensorPreset;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use nalgebra::Vector3;
+use scenes::with_pairs;
 use serde_json::Value;
 
 fn run(directory: &Path, arguments: &[&str]) -> std::process::Output {
@@ -63,17 +66,81 @@ fn a_controlled_pair_is_ten_times_better_than_the_best_fixture() {
         assert!(case["dynamic"]["faults"].as_str().is_some());
     }
     let page = std::fs::read_to_string(directory.path().join("report/report.html")).unwrap();
-    assert!(page.contains("best fixture") && !page.contains("http"), "the page loads nothing");
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    the_page_loads_nothing(&page);
+    // Three sections of each strategy of each case, and what stands in the view's place.
+    assert_eq!(page.matches("aria-label=\"Section ").count(), 27);
+    assert_eq!(page.matches("class=\"stand-in\"").count(), 1);
+    bodies_are_where_needle_and_paddles_are(&page, &result);
 }
 
-/// The scene with these pairs alone, whose study is short.
-fn with_pairs(directory: &Path, pairs: &str) -> std::path::PathBuf {
-    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../model-offline/scenes");
-    std::fs::copy(scenes.join("scan.nii.gz"), directory.join("scan.nii.gz")).unwrap();
-    let text = std::fs::read_to_string(scenes.join("scan.toml")).unwrap();
-    let scene = directory.join("pairs.toml");
-    std::fs::write(&scene, text.replace("of = \"all\"", &format!("of = {pairs}"))).unwrap();
-    scene
+/// Every address in the markup is in the page itself, and the browser is told to load nothing.
+fn the_page_loads_nothing(page: &str) {
+    assert!(page.contains("http-equiv=\"Content-Security-Policy\" content=\"default-src 'none';"));
+    let mut addresses = 0;
+    // Scripts are text to the browser: only what stands in tags is loaded.
+    for tag in page.split("<script").flat_map(|part| part.split("</script>").skip(1)).flat_map(|text| text.split('<')) {
+        let tag = tag.split('>').next().unwrap();
+        for attribute in [" src=\"", " href=\"", " srcset=\"", " data=\"", " action=\""] {
+            for value in tag.split(attribute).skip(1) {
+                assert!(value.starts_with('#') || value.starts_with("data:"), "{tag}");
+                addresses += 1;
+            }
+        }
+    }
+    let head = page.split("</head>").next().unwrap();
+    assert!(head.contains("href=\"data:,\"") && !head.contains("http:") && !head.contains("https:"), "{addresses}");
+    assert!(!head.contains("url(") && !head.contains("@import"));
+    assert!(!page.contains("<script src") && !page.contains("import("));
+}
+
+/// In the data of the view nodes of patches have moved as needle and paddles have, which the result tells.
+fn bodies_are_where_needle_and_paddles_are(page: &str, result: &Value) {
+    use base64::Engine as _;
+    let text = page.split("id=\"space-data\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let data: Value = serde_json::from_str(text).unwrap();
+    let bytes = |text: &Value| base64::engine::general_purpose::STANDARD.decode(text.as_str().unwrap()).unwrap();
+    assert_eq!(data["index"], 2);
+    let nodes_of = |patch: &Value| -> Vec<usize> {
+        bytes(patch).chunks(2).map(|pair| usize::from(u16::from_le_bytes([pair[0], pair[1]]))).collect()
+    };
+    let count = bytes(&data["nodes"]).len() / 12;
+    for (case, shown) in result["cases"].as_array().unwrap().iter().zip(data["cases"].as_array().unwrap()) {
+        for (strategy, place) in [("none", 0), ("static", 1), ("dynamic", 2)] {
+            let (told, body) =
+                (case[strategy]["series"].as_array().unwrap().last().unwrap(), &shown["strategies"][place]);
+            let step = body["step"].as_f64().unwrap();
+            let numbers = bytes(&body["displacements"]);
+            assert_eq!(numbers.len(), 6 * count);
+            let moved = |node: usize, k: usize| {
+                let at = 6 * node + 2 * k;
+                step * f64::from(i16::from_le_bytes([numbers[at], numbers[at + 1]]))
+            };
+            let depth = told["depth"].as_f64().unwrap();
+            let mut held: Vec<(Vec<usize>, [f64; 3])> =
+                vec![(nodes_of(&data["needle"]), [0, 1, 2].map(|k| depth * data["axis"][k].as_f64().unwrap()))];
+            held.push((nodes_of(&data["immobile"]), [0.0; 3]));
+            for (i, index) in case[strategy]["paddles"].as_array().unwrap().iter().enumerate() {
+                let patch = data["paddles"].as_array().unwrap().iter().find(|patch| patch["index"] == *index).unwrap();
+                held.push((nodes_of(&patch["triangles"]), [0, 1, 2].map(|k| told["paddles"][i][k].as_f64().unwrap())));
+            }
+            for (nodes, by) in held {
+                assert!(!nodes.is_empty());
+                for node in nodes {
+                    assert!((0..3).all(|k| (moved(node, k) - by[k]).abs() <= 0.51 * step), "{strategy}: node {node}");
+                }
+            }
+            let off = told["orthogonal_error"].as_f64().unwrap();
+            let [axis, target] = ["axis", "target"].map(|what| {
+                let of = if what == "axis" { &data["axis"] } else { &body["target"] };
+                [0, 1, 2].map(|k| of[k].as_f64().unwrap())
+            });
+            let along: f64 = (0..3).map(|k| axis[k] * target[k]).sum();
+            let found = (0..3).map(|k| (target[k] - along * axis[k]).powi(2)).sum::<f64>().sqrt();
+            // The table of states and the model that it was made of.
+            assert!((found - off).abs() < 0.02 * off.max(0.5), "{strategy}: {found} {off}");
+        }
+    }
 }
 
 /// The same seed gives the same insertion, bit by bit; another one another.

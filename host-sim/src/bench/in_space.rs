@@ -7,6 +7,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use firmware::{Faults, Mode};
+use model_offline::model::space::SpaceModel;
+use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
 use model_offline::placement::space::insertion::InsertionModel;
 use model_offline::placement::space::study::{SpaceOptimum, place_in_space};
@@ -23,6 +25,7 @@ use super::error::SimError;
 use super::insertion::Label;
 use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
 use super::result::RecordingResult;
+use super::space_bodies::{self, CaseBodies, SpaceBodies};
 use super::strategy::Strategy;
 use crate::record::export::{csv, mcap};
 use crate::record::files::Artifact;
@@ -77,6 +80,9 @@ pub struct SpaceRun {
     pub cases: Vec<SpaceCase>,
     /// Duration of the whole, s.
     pub wall_s: f64,
+    /// The bodies at the end, for pictures.
+    #[serde(skip)]
+    pub bodies: SpaceBodies,
 }
 
 /// Strategies on one tissue with one table.
@@ -247,13 +253,17 @@ pub fn compare(
         ],
     };
     let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
+    let geometry = SpaceGeometry::new(inclusion.as_ref().unwrap_or(&homogeneous).model.coarse());
+    let mut bodies = SpaceBodies { geometry, cases: Vec::new() };
     let of = |variant| match (variant, &inclusion) {
         (TissueVariant::Inclusion, Some(tissue)) => tissue,
         _ => &homogeneous,
     };
     let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
     for (tissue, believed) in wanted {
-        cases.push(case((tissue, of(tissue)), (believed, of(believed)), simulation, options, &mut artifacts)?);
+        let compared = case((tissue, of(tissue)), (believed, of(believed)), simulation, options, &mut artifacts)?;
+        bodies.cases.push(signals::ends_at_once(|| bodies_of(of(tissue).model.coarse(), &compared)));
+        cases.push(compared);
     }
     let settings = simulation.loop_settings;
     let result = SpaceRun {
@@ -272,6 +282,7 @@ pub fn compare(
         nodes: homogeneous.model.nodes(),
         cases,
         wall_s: start.elapsed().as_secs_f64(),
+        bodies,
     };
     Ok((result, artifacts))
 }
@@ -286,6 +297,14 @@ fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>
     let homogeneous = study(with.without_inclusions()?)?;
     let inclusion = if scene.inclusions.is_empty() { None } else { Some(study(with)?) };
     Ok((homogeneous, inclusion))
+}
+
+/// The bodies at the end of a case's insertions.
+fn bodies_of(model: &SpaceModel, case: &SpaceCase) -> CaseBodies {
+    [&case.none, &case.fixture, &case.dynamic].map(|result| {
+        let way: Vec<_> = result.series.iter().map(|point| (point.depth, point.paddles.as_slice())).collect();
+        space_bodies::at_end(model, &result.paddles, &way)
+    })
 }
 
 fn case(

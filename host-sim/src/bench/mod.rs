@@ -14,6 +14,7 @@ pub mod loop_stability;
 pub mod paper_table;
 pub mod result;
 pub mod rounds;
+pub mod space_bodies;
 pub mod strategy;
 pub mod study_failure;
 pub mod table_tissue;

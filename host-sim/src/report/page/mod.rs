@@ -13,6 +13,7 @@ mod scene;
 mod settings;
 mod slider;
 pub(super) mod space;
+mod space_view;
 mod style;
 mod timing;
 mod view;
@@ -26,14 +27,12 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model_offline::output::chart::number::{in_unit, number, plain};
 use model_offline::output::chart::{Drawing, Figure, Panel, heading, sheet};
 
-use self::embed::{charts, inline, panels};
+use self::embed::{charts, head_of, inline, panels};
 use self::insertion::{CaseCharts, case_charts, case_name, cause_panel, error_panels, needle_panels};
 use super::paper::is_paper;
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 
 const SCRIPT: &str = concat!(include_str!("common.js"), include_str!("page.js"), include_str!("charts.js"));
-/// Whatever a string in the result says, the page loads nothing.
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:";
 
 /// Identifiers and titles of the parts.
 const PARTS: [(&str, &str); 7] = [
@@ -207,14 +206,7 @@ pub fn render_with(run: &RunResult, attachments: &Attachments) -> String {
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                link rel="icon" href="data:,";
-                title { "Stillpoint: " (run.scene) }
-                style { (PreEscaped(style::page())) }
-            }
+            (head_of(&run.scene))
             body {
                 main {
                     (head(run))

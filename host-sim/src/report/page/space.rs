@@ -5,10 +5,13 @@ use model_offline::number::length;
 use model_offline::output::chart::number::number;
 use model_offline::output::chart::{Axis, Colour, Dash, Panel, Place, ReferenceLine, Series};
 
-use super::embed::panels;
-use super::style;
+use super::embed::{head_of, panels};
+use super::space_view::{self, STRATEGIES};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::runtime::time::mode::RunMode;
+
+/// Numbers under the pointer, pictures to keep.
+const SCRIPT: &str = concat!(include_str!("common.js"), include_str!("charts.js"));
 
 /// The whole page; it needs nothing else.
 pub(in crate::report) fn render(run: &SpaceRun) -> String {
@@ -16,12 +19,7 @@ pub(in crate::report) fn render(run: &SpaceRun) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { "Stillpoint: " (run.scene) }
-                style { (PreEscaped(style::page())) }
-            }
+            (head_of(&run.scene))
             body {
                 main {
                     h1 { "Stillpoint: " (run.scene) ", in space" }
@@ -35,17 +33,21 @@ pub(in crate::report) fn render(run: &SpaceRun) -> String {
                             RunMode::FreeRun => "the machine's clock drives time.",
                         }
                     }
-                    @for case in &run.cases { (of_case(run, case)) }
+                    (space_view::section(run))
+                    @for (place, case) in run.cases.iter().enumerate() { (of_case(run, place, case)) }
                 }
+                div #tip.on-screen hidden {}
+                script { (PreEscaped(SCRIPT)) }
+                (space_view::scripts(run))
             }
         }
     }
     .into_string()
 }
 
-fn of_case(run: &SpaceRun, case: &SpaceCase) -> Markup {
+fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
     let unit = &run.units[0];
-    let rows = [("no paddle", &case.none), ("best fixture", &case.fixture), ("controlled", &case.dynamic)];
+    let rows = STRATEGIES.into_iter().zip([&case.none, &case.fixture, &case.dynamic]);
     html! {
         section {
             h2 { "Tissue " (case.tissue.name()) ", table of tissue " (case.table_tissue.name()) }
@@ -53,7 +55,7 @@ fn of_case(run: &SpaceRun, case: &SpaceCase) -> Markup {
                 "Controlled paddles leave " (number(case.improvement, 2)) " times less than the best fixture, and "
                 (number(case.improvement_over_none, 2)) " times less than no paddle."
             }
-            table {
+            div.scroll { table {
                 thead {
                     tr { th { "" } th { "paddles" } th { "largest error, " (unit) } th { "RMS, " (unit) } th { "travel, " (unit) } th { "state" } }
                 }
@@ -69,8 +71,9 @@ fn of_case(run: &SpaceRun, case: &SpaceCase) -> Markup {
                         }
                     }
                 }
-            }
+            } }
             (panels(&[error_panel(run, case), enlarged_panel(run, case), paddle_panel(run, case)]))
+            (space_view::case_sections(run, place))
         }
     }
 }

@@ -1,0 +1,294 @@
+//! The bodies of a run in space, to be turned and cut in the page, and as pictures that need no script.
+//!
+//! The script draws with three.js, which the page holds. Where scripts or WebGL are missing, and on paper, pictures stand in
+//! its place.
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use maud::{Markup, PreEscaped, html};
+use model_offline::number::length;
+use model_offline::output::chart::colour_bar;
+use model_offline::output::field_picture::Field;
+use model_offline::output::space_picture::{
+    CutPlane, Shown, SpaceGeometry, SpaceState, orthogonal, outside, planes, sections, seen_from,
+};
+use model_offline::scene::TissueVariant;
+use serde::Serialize;
+
+use super::embed::{CHART_WIDTH, charts, inline};
+use crate::bench::in_space::{SpaceCase, SpaceRun};
+
+const THREE: &str = include_str!("three/three.min.js");
+const THREE_LICENCE: &str = include_str!("three/LICENSE");
+const SCRIPT: &str = include_str!("space_view.js");
+
+/// Names of a case's strategies, in the order of its bodies.
+pub(super) const STRATEGIES: [&str; 3] = ["no paddle", "best fixture", "controlled"];
+/// The field of the pictures without script, which the view begins with as well.
+const FIELD: Field = Field::Orthogonal;
+/// Steps of a displacement in the page, over the largest one.
+const STEPS: f64 = 32_767.0;
+
+/// The same scale for all strategies of a case: the largest value at a node.
+fn scale(run: &SpaceRun, place: usize) -> f64 {
+    let states = run.bodies.cases[place].iter().flatten();
+    let all = states.flat_map(|state| orthogonal(&run.bodies.geometry, state));
+    all.fold(0.0, f64::max)
+}
+
+/// The body of a case at rest: homogeneous tissue has no inclusions.
+fn geometry(run: &SpaceRun, case: &SpaceCase) -> SpaceGeometry {
+    match case.tissue {
+        TissueVariant::Inclusion => run.bodies.geometry.clone(),
+        TissueVariant::Homogeneous => run.bodies.geometry.without_inclusions(),
+    }
+}
+
+/// Draws a case's body under a strategy, if it is there.
+fn drawn<T>(run: &SpaceRun, place: usize, strategy: usize, draw: impl FnOnce(&Shown<'_>) -> T) -> Result<T, &str> {
+    let state = run.bodies.cases[place][strategy].as_ref().map_err(String::as_str)?;
+    let geometry = geometry(run, &run.cases[place]);
+    let values = orthogonal(&geometry, state);
+    let shown =
+        Shown { geometry: &geometry, state, values: &values, scale: scale(run, place), held_still: strategy == 1 };
+    Ok(draw(&shown))
+}
+
+/// The case that the view begins with: one with inclusions, if there is one.
+fn shown_first(run: &SpaceRun) -> usize {
+    run.cases.iter().position(|case| case.tissue == TissueVariant::Inclusion).unwrap_or(0)
+}
+
+/// What the page begins with: the view, and what stands in its place.
+pub(super) fn section(run: &SpaceRun) -> Markup {
+    let unit = &run.units[0];
+    let place = shown_first(run);
+    html! {
+        section #body {
+            h2 { "The body at the end of the insertion" }
+            @if let Ok(drawing) = drawn(run, place, 2, |shown| outside(shown, CHART_WIDTH)) {
+                figure.stand-in {
+                    (inline(&drawing))
+                    figcaption { "Controlled, tissue " (run.cases[place].tissue.name()) ", displacements as they are. Blue: paddles; \
+                        grey: needle and its contact; dark: immobile." }
+                }
+            }
+            div #view.on-screen hidden {
+                canvas tabindex="0" role="img" aria-label="The deformed body, to be turned" {}
+                p.quiet { "Drag or arrow keys turn, two fingers or the right button move, + and − or, once the picture is chosen, the \
+                    wheel come nearer, 0 goes back." }
+                (controls(run))
+                p #view-reading aria-live="polite" {}
+                ul.keys {
+                    li.k-led { "controlled paddle" } li.k-held { "paddle held still" } li.k-needle { "needle, its contact and line" }
+                    li.k-immobile { "immobile" } li.k-inclusion { "inclusion" } li.k-target { "target: ring at rest, ball now" }
+                }
+            }
+            figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place)))) }
+            p.quiet { "Bodies are solved for once more at the end of each insertion, to " (length(run.depth)) " " (unit) "." }
+        }
+    }
+}
+
+/// Indices of the paddles that any strategy attaches.
+fn attached(run: &SpaceRun) -> Vec<u32> {
+    run.bodies.cases.iter().flatten().flatten().flat_map(|state| state.paddles.iter().copied()).collect()
+}
+
+/// What the view shows: case, strategy, field, cuts, exaggeration.
+fn controls(run: &SpaceRun) -> Markup {
+    let planes = planes(&run.bodies.geometry);
+    let [view, _] = seen_from(&run.bodies.geometry, &attached(run));
+    // Along the needle, and more aside than through the paddles that are looked at.
+    let turned = |plane: &CutPlane| plane.normal.dot(&view).abs();
+    let first = usize::from(turned(&planes[1]) < turned(&planes[0]));
+    html! {
+        fieldset {
+            legend { "What is shown" }
+            div.choices {
+                label { "tissue " select #view-case { @for (i, case) in run.cases.iter().enumerate() {
+                    option value=(i) selected[i == shown_first(run)] { (case.tissue.name()) ", table of " (case.table_tissue.name()) }
+                } } }
+                label { "paddles " select #view-strategy { @for (i, name) in STRATEGIES.iter().enumerate() {
+                    option value=(i) selected[i == 2] { (name) }
+                } } }
+                label { "colour " select #view-field {
+                    option value="orthogonal" { "orthogonal to the needle" } option value="size" { "whole displacement" }
+                } }
+                label { "cut " select #view-cut {
+                    option value="none" { "none" }
+                    @for (i, plane) in planes.iter().enumerate() {
+                        option value=(i) selected[i == first] { (plane.name(&run.units[0])) }
+                    }
+                    option value="all" { "all three: a corner taken out" }
+                } }
+            }
+            div.slide {
+                label for="view-times" { "displacements drawn" }
+                input #view-times type="range" min="1" max="20" step="1" value="1";
+                output #view-times-reading for="view-times" {}
+            }
+            div.choices {
+                label { input #view-through type="checkbox"; " see through the outside" }
+                label { input #view-rest type="checkbox"; " body at rest" }
+            }
+        }
+    }
+}
+
+/// Sections of a case under each strategy.
+pub(super) fn case_sections(run: &SpaceRun, place: usize) -> Markup {
+    html! {
+        h3 { "Sections through the target at the end of the insertion" }
+        p.quiet { "The planes are those through the target at rest. Dashed: at rest, and inclusions; ring: target at rest, dot: now; thick: \
+            paddle, or dotted its rim where the section passes it by." }
+        @for (strategy, name) in STRATEGIES.iter().enumerate() {
+            h4 { (name) }
+            @match drawn(run, place, strategy, |shown| sections(shown, 0.8 * CHART_WIDTH)) {
+                Ok(drawings) => (charts(&drawings)),
+                Err(why) => p { "No picture: the model did not get there (" (why) ")." },
+            }
+        }
+        figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place)))) }
+    }
+}
+
+#[derive(Serialize)]
+struct Data<'a> {
+    /// Labels of length and of the fields.
+    unit: &'a str,
+    labels: [String; 2],
+    /// Bytes of an index.
+    index: usize,
+    /// Positions of nodes, three numbers of 32 bits each; like all that follow little-endian in base 64.
+    nodes: String,
+    tetrahedra: String,
+    /// One byte each.
+    parts: String,
+    outside: String,
+    immobile: String,
+    needle: String,
+    paddles: Vec<Patch>,
+    inclusions: Vec<String>,
+    axis: [f64; 3],
+    target: [f64; 3],
+    contact: [f64; 3],
+    extent: f64,
+    /// Where the view is from at first, and upwards.
+    view: [[f64; 3]; 2],
+    planes: Vec<([f64; 3], f64)>,
+    cases: Vec<Case>,
+}
+
+#[derive(Serialize)]
+struct Patch {
+    index: u32,
+    triangles: String,
+}
+
+#[derive(Serialize)]
+struct Case {
+    has_inclusions: bool,
+    strategies: Vec<Option<Body>>,
+}
+
+#[derive(Serialize)]
+struct Body {
+    depth: f64,
+    paddles: Vec<u32>,
+    moved: Vec<f64>,
+    target: [f64; 3],
+    /// Displacements of nodes, three numbers of 16 bits each, in steps of this length.
+    step: f64,
+    displacements: String,
+}
+
+fn body(state: &SpaceState) -> Body {
+    let largest = state.displacements.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
+    let step = if largest > 0.0 { largest / STEPS } else { 1.0 };
+    let steps = state.displacements.iter().flatten().flat_map(|part| ((part / step).round() as i16).to_le_bytes());
+    let length = |u: &[f64; 3]| u.iter().map(|part| part * part).sum::<f64>().sqrt();
+    Body {
+        depth: state.depth,
+        paddles: state.paddles.clone(),
+        moved: state.paddle_displacements.iter().map(length).collect(),
+        target: state.target,
+        step,
+        displacements: STANDARD.encode(steps.collect::<Vec<u8>>()),
+    }
+}
+
+/// JSON that is safe inside of a script element.
+fn data(run: &SpaceRun) -> String {
+    let geometry = &run.bodies.geometry;
+    // Two bytes number the nodes of most meshes.
+    let index = if geometry.nodes.len() <= usize::from(u16::MAX) { 2 } else { 4 };
+    let encode = |numbers: &mut dyn Iterator<Item = u32>| {
+        STANDARD.encode(numbers.flat_map(|number| number.to_le_bytes().into_iter().take(index)).collect::<Vec<u8>>())
+    };
+    let triangles = |patch: &[[u32; 3]]| encode(&mut patch.iter().flatten().copied());
+    let nodes = geometry.nodes.iter().flatten().flat_map(|part| (*part as f32).to_le_bytes());
+    let attached = attached(run);
+    let cases = run.cases.iter().zip(&run.bodies.cases).map(|(case, bodies)| Case {
+        has_inclusions: case.tissue == TissueVariant::Inclusion,
+        strategies: bodies.iter().map(|state| state.as_ref().ok().map(body)).collect(),
+    });
+    let data = Data {
+        unit: &run.units[0],
+        labels: [Field::Orthogonal, Field::Size].map(|field| field.label(&run.units)),
+        index,
+        nodes: STANDARD.encode(nodes.collect::<Vec<u8>>()),
+        tetrahedra: encode(&mut geometry.tetrahedra.iter().flatten().copied()),
+        parts: STANDARD
+            .encode(geometry.parts.iter().map(|part| u8::try_from(*part).unwrap_or(u8::MAX)).collect::<Vec<u8>>()),
+        outside: triangles(&geometry.outside),
+        immobile: triangles(&geometry.immobile),
+        needle: triangles(&geometry.needle),
+        paddles: geometry
+            .paddles
+            .iter()
+            .filter(|patch| attached.contains(&patch.index))
+            .map(|patch| Patch { index: patch.index, triangles: triangles(&patch.triangles) })
+            .collect(),
+        inclusions: geometry.inclusions.iter().map(|surface| triangles(surface)).collect(),
+        axis: geometry.axis,
+        target: geometry.target,
+        contact: geometry.middle(&geometry.needle).into(),
+        extent: geometry.extent(),
+        view: seen_from(geometry, &attached).map(Into::into),
+        planes: planes(geometry).map(|plane| (plane.normal.into(), plane.offset)).to_vec(),
+        cases: cases.collect(),
+    };
+    // Numbers that are not finite become null; the view then stays away.
+    serde_json::to_string(&data).unwrap_or_else(|_| "null".to_owned()).replace('<', "\\u003c")
+}
+
+/// The view's data and scripts.
+pub(super) fn scripts(run: &SpaceRun) -> Markup {
+    html! {
+        script type="application/json" #space-data { (PreEscaped(data(run))) }
+        script { (PreEscaped(format!("/* three.js\n{THREE_LICENCE}*/\n{THREE}"))) }
+        script { (PreEscaped(SCRIPT)) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_offline::output::table_text::hex;
+    use sha2::{Digest as _, Sha256};
+
+    /// The vendored file is the one that its README says how to make, and its licence is with it.
+    #[test]
+    fn the_vendored_file_has_the_hash_and_the_version_that_are_told() {
+        let told = include_str!("three/README.md");
+        let line = |name: &str| told.lines().find_map(|line| line.strip_prefix(name)).unwrap().trim().to_owned();
+        assert_eq!(hex(&Sha256::digest(THREE)), line("SHA-256:"));
+        let revision = line("Version:").split('.').nth(1).unwrap().to_owned();
+        assert!(THREE.contains(&format!("=\"{revision}\"")), "three.js tells its revision");
+        assert!(told.contains(&format!("npm install three@{}", line("Version:"))));
+        assert!(THREE_LICENCE.starts_with("The MIT License"));
+        // It stands in a script element and in a comment of it.
+        assert!(!THREE.contains("</script") && !THREE.contains("<!--") && !THREE_LICENCE.contains("*/"));
+    }
+}

@@ -1,0 +1,7 @@
+// What the view in space uses of three.js; README.md says how it is bundled.
+export {
+  AmbientLight, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DataTexture, DirectionalLight,
+  DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, MeshLambertMaterial, NearestFilter,
+  PerspectiveCamera, Plane, Scene, SphereGeometry, Spherical, SRGBColorSpace, TorusGeometry, Vector3, WebGLRenderer,
+} from "three";
+export { OrbitControls } from "three/addons/controls/OrbitControls.js";
