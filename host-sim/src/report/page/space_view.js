@@ -262,7 +262,7 @@
     for (let i = 0; i < rest.length; i += 3) { const x = vector(rest.subarray(i, i + 3)); low.min(x); high.max(x); }
     controls.target.copy(low.add(high).multiplyScalar(0.5));
     const narrow = Math.min(1, canvas.clientWidth / Math.max(1, canvas.clientHeight));
-    camera.position.copy(controls.target).addScaledVector(vector(data.view[0]), 2.15 * size / narrow);
+    camera.position.copy(controls.target).addScaledVector(vector(data.view[0]), 1.8 * size / narrow);
     controls.update();
   };
   const turn = (aside, upwards, nearer) => {

@@ -4,6 +4,7 @@ use super::SpaceModel;
 use super::patches::Surface;
 use crate::discretization::TetMesh;
 use crate::geometry::{Implicit, Point};
+use std::collections::BTreeMap;
 
 /// Triangles of the model's mesh, as numbers of its nodes.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,16 +24,23 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    /// Those of a model. Which inclusion a tetrahedron is in is what the scene says of its middle.
+    /// Those of a model. Of nodal rules, which inclusion a tetrahedron is in is what the scene says of its middle.
     pub fn new(model: &SpaceModel) -> Self {
         let (scene, spatial) = (model.scene(), model.spatial());
         let (nodes, tetrahedra) = (spatial.positions(), spatial.tetrahedra());
-        let part = |corners: &[u32; 4]| {
+        let holds = |corners: &[u32; 4]| {
             let middle = corners.iter().map(|&node| nodes[node as usize]).sum::<Point<3>>() / 4.0;
             let holds = scene.inclusions.iter().rposition(|inclusion| inclusion.region.level(&middle) < 0.0);
             holds.map_or(0, |place| 1 + place as u32)
         };
-        let parts: Vec<u32> = tetrahedra.iter().map(part).collect();
+        let parts: Vec<u32> = if spatial.method().integration.is_nodal() {
+            tetrahedra.iter().map(holds).collect()
+        } else {
+            // Parts that the scene has no inclusion for are the body's.
+            let known = |shares: &BTreeMap<u32, f64>| shares.keys().next().copied().unwrap_or(0);
+            let last = scene.inclusions.len() as u32;
+            spatial.shares().iter().map(known).map(|part| if part > last { 0 } else { part }).collect()
+        };
         let mesh = TetMesh { nodes: nodes.to_vec(), tetrahedra: tetrahedra.to_vec(), part: parts.clone() };
         let surface = Surface::new(&mesh, scene.size());
         let immobile: Vec<&dyn Implicit> = scene.immobile.iter().map(|region| region as _).collect();
@@ -59,7 +67,6 @@ mod tests {
     use super::*;
     use crate::placement::space::workflow::insertion_model;
     use crate::scene::space::SpaceScene;
-    use std::collections::BTreeMap;
 
     /// Volume inside of outward triangles, by the divergence theorem; and whether every edge is run once each way.
     fn enclosed(nodes: &[Point<3>], triangles: &[[u32; 3]]) -> (f64, bool) {
@@ -87,9 +94,6 @@ mod tests {
             surfaces.parts.iter().zip(model.spatial().volumes()).filter(|(part, _)| **part == 1).map(|(_, v)| v).sum();
         assert!(closed && (volume - of_elements).abs() < 1e-9 && volume > 0.0, "{volume} {of_elements}");
         assert!((volume - 0.1 * 0.2 * 0.1).abs() < 1e-9, "a box of 0.1 × 0.2 × 0.1: {volume}");
-        // What the model itself mixes of every cell's parts.
-        let shares = model.spatial().shares();
-        assert!(surfaces.parts.iter().zip(shares).all(|(part, shares)| shares.contains_key(part)));
     }
 
     /// Patches are of the outside, and lie where the scene says.

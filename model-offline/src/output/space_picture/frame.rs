@@ -3,6 +3,7 @@
 use super::SpaceGeometry;
 use crate::geometry::Point;
 use crate::number::short;
+use crate::output::chart::number::minus;
 use nalgebra::Vector3;
 
 /// A direction is that of a coordinate from here on.
@@ -40,7 +41,7 @@ impl CutPlane {
     pub fn name(&self, unit: &str) -> String {
         let unit = if unit == "1" { String::new() } else { format!("\u{a0}{unit}") };
         let side = if self.across_needle { "across" } else { "along" };
-        format!("{}\u{a0}=\u{a0}{}{unit}, {side} the needle", direction_name(&self.normal), short(self.offset))
+        format!("{}\u{a0}=\u{a0}{}{unit}, {side} the needle", direction_name(&self.normal), minus(short(self.offset)))
     }
 
     /// Names of its two coordinates.
@@ -53,7 +54,11 @@ impl CutPlane {
 fn direction_name(direction: &Point<3>) -> String {
     match ["x", "y", "z"].iter().zip(direction.iter()).find(|(_, part)| **part > ALIGNED) {
         Some((name, _)) => (*name).to_owned(),
-        None => format!("({:.2},\u{a0}{:.2},\u{a0}{:.2})·X", direction.x, direction.y, direction.z),
+        None => {
+            // A part that rounds to nothing has no sign.
+            let parts = direction.map(|part| minus(format!("{:.2}", (part * 100.0).round() / 100.0 + 0.0)));
+            format!("({},\u{a0}{},\u{a0}{})·X", parts[0], parts[1], parts[2])
+        }
     }
 }
 

@@ -99,8 +99,8 @@ mod tests {
         }
         assert_eq!(offsets.len(), 9);
         // An oblique one: the regular hexagon halfway along the diagonal.
-        let normal = Point::repeat(1.0 / 3f64.sqrt());
-        let right = Point::from([1.0, -1.0, 0.0]).normalize();
+        let normal: Point<3> = Point::repeat(1.0 / 3f64.sqrt());
+        let right: Point<3> = Point::from([1.0, -1.0, 0.0]).normalize();
         let directions = [right, normal.cross(&right)];
         let plane = CutPlane { normal, offset: 0.5 * 3f64.sqrt(), directions, across_needle: false };
         let whole: f64 = cut(&nodes, &geometry.tetrahedra, &values, &plane).iter().map(area).sum();
