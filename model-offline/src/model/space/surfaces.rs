@@ -65,7 +65,7 @@ fn boundary_of(mesh: &TetMesh, part: u32) -> Vec<[u32; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::placement::space::workflow::insertion_model;
+    use crate::placement::space::workflow::coarse;
     use crate::scene::space::SpaceScene;
 
     /// Volume inside of outward triangles, by the divergence theorem; and whether every edge is run once each way.
@@ -85,7 +85,7 @@ mod tests {
     /// The unit cube of `block` with its box: closed, outward, and as large as they are said to be.
     #[test]
     fn the_outside_is_closed_and_outward_and_so_are_inclusions() {
-        let model = insertion_model(&SpaceScene::bundled("block").unwrap()).unwrap();
+        let model = coarse(&SpaceScene::bundled("block").unwrap()).unwrap();
         let (surfaces, nodes) = (Surfaces::new(&model), model.spatial().positions());
         let (volume, closed) = enclosed(nodes, &surfaces.outside);
         assert!(closed && (volume - 1.0).abs() < 1e-9, "{volume}");
@@ -99,7 +99,7 @@ mod tests {
     /// Patches are of the outside, and lie where the scene says.
     #[test]
     fn patches_are_parts_of_the_outside() {
-        let model = insertion_model(&SpaceScene::bundled("scan").unwrap()).unwrap();
+        let model = coarse(&SpaceScene::bundled("scan").unwrap()).unwrap();
         let (surfaces, scene) = (Surfaces::new(&model), model.scene());
         let all = surfaces.paddles.iter().chain([&surfaces.needle, &surfaces.immobile]);
         for patch in all {

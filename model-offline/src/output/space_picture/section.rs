@@ -58,7 +58,7 @@ pub(super) fn cut_triangles(nodes: &[Point<3>], triangles: &[[u32; 3]], plane: &
 mod tests {
     use super::*;
     use crate::output::space_picture::{SpaceGeometry, planes};
-    use crate::placement::space::workflow::insertion_model;
+    use crate::placement::space::workflow::coarse;
     use crate::scene::space::{AnyScene, SpaceScene};
 
     fn area(cut: &Cut) -> f64 {
@@ -78,7 +78,7 @@ mod tests {
     /// field that is linear is itself in them.
     #[test]
     fn sections_of_a_cube_have_its_area_and_a_linear_field_is_itself() {
-        let model = insertion_model(&SpaceScene::bundled("block").unwrap()).unwrap();
+        let model = coarse(&SpaceScene::bundled("block").unwrap()).unwrap();
         let geometry = SpaceGeometry::new(&model);
         let nodes: Vec<Point<3>> = geometry.nodes.iter().map(|x| Point::from(*x)).collect();
         let of = |x: &Point<3>| 1.0 + 2.0 * x.x - 3.0 * x.y + 0.5 * x.z;
@@ -118,7 +118,7 @@ mod tests {
             [target]\nposition = [5.0, 0.0, 2.0]\n\
             [[paddle]]\nindex = 7\nregion = { sphere = { centre = [25.0, 0.0, -3.0], radius = 6.0 } }\n\
             [discretization]\nspacing = 4.0\n";
-        let model = insertion_model(&scene(text)).unwrap();
+        let model = coarse(&scene(text)).unwrap();
         let geometry = SpaceGeometry::new(&model);
         let nodes: Vec<Point<3>> = geometry.nodes.iter().map(|x| Point::from(*x)).collect();
         let values = vec![0.0; nodes.len()];
