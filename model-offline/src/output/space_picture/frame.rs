@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 const ALIGNED: f64 = 1.0 - 1e-9;
 /// How far the view is turned from the paddles towards the needle's entry, upwards and aside.
 const TOWARDS_ENTRY: f64 = 0.55;
-const UPWARDS: f64 = 0.35;
+const UPWARDS: f64 = 0.6;
 const ASIDE: f64 = 0.8;
 
 /// A plane with coordinates in it.
