@@ -97,7 +97,8 @@ fn the_page_loads_nothing(page: &str) {
 /// In the data of the view nodes of patches have moved as needle and paddles have, which the result tells.
 fn bodies_are_where_needle_and_paddles_are(page: &str, result: &Value) {
     use base64::Engine as _;
-    let text = page.split("id=\"space-data\">").nth(1).unwrap().split("</script>").next().unwrap();
+    let text =
+        page.split("id=\"space-data\" type=\"application/json\">").nth(1).unwrap().split("</script>").next().unwrap();
     let data: Value = serde_json::from_str(text).unwrap();
     let bytes = |text: &Value| base64::engine::general_purpose::STANDARD.decode(text.as_str().unwrap()).unwrap();
     assert_eq!(data["index"], 2);
