@@ -29,16 +29,19 @@ pub(super) struct ParetoArgs {
 pub(super) fn run(args: &ParetoArgs) -> Result<(), CliError> {
     if let Some(scene) = args.scene.read_in_space()? {
         args.varied.none_in_space()?;
-        let compared = shown(args, &|progress| Ok(compare_in_space(&scene, Extent::of_flag(args.quick), progress)?));
+        let compared = shown(args, |progress| Ok(compare_in_space(&scene, Extent::of_flag(args.quick), progress)?));
         return written(args, &compared?, &scene.name, scene.tissue());
     }
     let scene = args.varied.over(args.scene.read()?)?;
-    let compared = shown(args, &|progress| Ok(pareto::compare(&scene, Extent::of_flag(args.quick), progress)?));
+    let compared = shown(args, |progress| Ok(pareto::compare(&scene, Extent::of_flag(args.quick), progress)?));
     written(args, &compared?, &scene.name, scene.tissue())
 }
 
 /// Compares behind a progress bar.
-fn shown(args: &ParetoArgs, compare: &dyn Fn(&dyn Fn(f64)) -> Result<Pareto, CliError>) -> Result<Pareto, CliError> {
+fn shown(
+    args: &ParetoArgs,
+    compare: impl FnOnce(&dyn Fn(f64)) -> Result<Pareto, CliError>,
+) -> Result<Pareto, CliError> {
     output::make_folder(&args.out)?;
     let bar = args.run.progress(1000);
     let comparison = compare(&|share| bar.set_position((1000.0 * share) as u64))?;

@@ -99,7 +99,7 @@ fn divided(
     notes.push(format!("sharp edges divide the surface into {} flat and {} curved pieces", counts.0, counts.1));
     let all = (0..).zip(&pieces.planes).filter_map(|(number, plane)| match plane {
         Some(plane) => Some(Piece::Flat(*plane)),
-        None => CurvedPiece::of(surface, across, &pieces.piece_of, number).map(Piece::Curved),
+        None => CurvedPiece::of(surface, across, &pieces.piece_of, number).map(|piece| Piece::Curved(Box::new(piece))),
     });
     (all.collect(), MARGIN * pieces.precision)
 }

@@ -27,7 +27,7 @@ pub struct CheckedSurface {
 #[derive(Debug, Clone)]
 pub(super) enum Piece {
     Flat(Plane),
-    Curved(CurvedPiece),
+    Curved(Box<CurvedPiece>),
 }
 
 impl CheckedSurface {
@@ -65,7 +65,7 @@ impl Implicit for CheckedSurface {
         }
         let sheets = self.pieces.iter().map(|piece| match piece {
             Piece::Flat(plane) => plane.sheet(),
-            Piece::Curved(piece) => Sheet::Smooth(piece),
+            Piece::Curved(piece) => Sheet::Smooth(piece.as_ref()),
         });
         sheets.collect()
     }
