@@ -9,7 +9,6 @@ pub mod survey;
 
 use self::middles::Middles;
 use self::patches::{Surface, loose, nodes_of, overlap};
-use super::driven::DrivenBody as _;
 use super::error::{BoundaryPart, ModelError};
 use super::tissue::{Mixing, Phase, mixture};
 use crate::discretization::{Spatial, Stencil, TetMesh};
@@ -19,7 +18,7 @@ use crate::mechanics::{ConstrainedRows, Constraints, Tissue};
 use crate::scene::space::SpaceScene;
 use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
-use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
+use nalgebra::{DMatrix, Matrix3xX, Vector3};
 use std::collections::BTreeMap;
 use std::sync::{Arc, OnceLock};
 
@@ -404,7 +403,9 @@ impl SpaceBody<'_> {
     /// Target displacement.
     pub fn target_displacement(&self) -> Vector3<f64> {
         let nodal = self.model.target.interpolate(self.equilibrium.coefficients());
-        self.beside.as_ref().map_or(nodal, |beside| nodal + beside * DVector::from_vec(self.controls()))
+        let Some(beside) = &self.beside else { return nodal };
+        let by_paddles = self.paddles.iter().enumerate().map(|(p, moved)| beside.fixed_columns::<3>(1 + 3 * p) * moved);
+        nodal + beside.column(0) * self.depth + by_paddles.sum::<Vector3<f64>>()
     }
 
     /// Actuation Jacobian d(target displacement)/d(paddle displacements) with the needle still, by exact linearisation: 3
