@@ -155,6 +155,7 @@ fn tables_are_of_one_paddle_or_two_that_there_are() {
     assert!(refused(&[]).contains("one or, in space, two"));
     assert!(refused(&[1, 2, 3]).contains("3 paddles"));
     assert!(refused(&[1, 99]).contains("99"));
+    assert!(refused(&[3, 3]).contains("paddle 3 is named twice"));
 }
 
 /// What tells scenes apart does, and what does not matter to numbers does not.

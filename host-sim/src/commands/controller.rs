@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use firmware::contract::Header;
 use host_sim::SimError;
 use host_sim::exchange::Space;
 use host_sim::record::error::FileError;
@@ -20,6 +21,7 @@ use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::loop_settings::{LoopArgs, LoopSettings};
 use model_offline::output::table_text::hex;
 use model_offline::scene::{Motion, SensorPreset};
+use model_offline::table::TableBuildError;
 
 use super::world_args::PATIENCE;
 use model_offline::output::check_outputs;
@@ -84,6 +86,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
         Hardware::Qemu if args.mode == RunMode::FreeRun => return Err(SimError::QemuIsLockstepOnly),
         Hardware::Qemu => on_emulated_board(&bytes, &settings, timeout)?,
     };
+    let dimension = Header::read(&bytes).map_err(TableBuildError::Invalid)?.dimension;
     let header = RecordingHeader { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
     let mut control_loop = ControlLoop::new(executor, args.capacity as usize).rearmed_by(signals::install_rearming());
     if let Some(path) = &args.record {
@@ -94,7 +97,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     }
     let parent = args.parent.and_then(rustix::process::Pid::from_raw);
     let (scene_hash, units, paddles) = (hex(&table.scene_hash()), table.units(), table.paddles());
-    let introduction = Introduction { scene_hash, units, paddles };
+    let introduction = Introduction { dimension, scene_hash, units, paddles };
     let service = Service { mode: args.mode, loop_settings, timeout, parent, introduction };
     let served = serve(control_loop, &Space::new(&args.link)?, &service)?;
     hand_in(args, served)

@@ -89,6 +89,8 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let expected = Expected {
+        dimension: 2,
+        any_scene: args.allow_other_scene,
         scene_hashes: [&whole, &whole.without_a_past()]
             .into_iter()
             .flat_map(|scene| TissueVariant::ALL.iter().map(|tissue| hex(&tissue.of(scene).hash())))
@@ -131,6 +133,8 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
     })?;
     let mut plant = PlantLoop::new(world, &simulation);
     let expected = Expected {
+        dimension: 3,
+        any_scene: args.allow_other_scene,
         scene_hashes: [scene, &scene.without_inclusions()].map(|scene| hex(&scene.hash())).into(),
         units: [scene.length_unit.clone(), scene.stress_unit.clone()],
         paddles: Some(paddles.clone()),
@@ -154,7 +158,7 @@ fn visit(args: &PlantArgs, simulation: &Simulation, expected: Expected) -> Visit
         loop_settings: simulation.loop_settings,
         timeout: Duration::from_secs_f64(args.patience),
         on_death: if args.keep { OnDeath::AwaitNext } else { OnDeath::Stop },
-        expected: (!args.allow_other_scene).then_some(expected),
+        expected: Some(expected),
     }
 }
 

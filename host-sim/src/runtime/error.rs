@@ -82,6 +82,15 @@ pub enum RuntimeError {
         "give the controller a table of this scene, with the same [discretization], or insist with --allow-other-scene"
     ))]
     OtherScene,
+    /// The controller's table is for a space of another dimension.
+    #[error("the controller's table is for {found} dimensions, the scene has {expected}")]
+    #[diagnostic(help("give the controller a table of this scene"))]
+    OtherSpace {
+        /// Dimension of the table.
+        found: u8,
+        /// That of the scene.
+        expected: u8,
+    },
     /// The controller's table is in other units.
     #[error("the controller's table is in {}, the scene in {}", found.join(" and "), expected.join(" and "))]
     #[diagnostic(help("give the controller a table of this scene"))]

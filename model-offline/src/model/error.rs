@@ -79,6 +79,12 @@ pub enum ModelError {
     /// None of the scene's paddles can move the target orthogonally to the needle.
     #[error("no paddle of this scene can control the target: move a paddle, turn the needle, or use one static")]
     NoPaddleControls,
+    /// One paddle cannot be attached twice.
+    #[error("paddle {index} is named twice: name another beside it, or it alone")]
+    SamePaddle {
+        /// Paddle index.
+        index: u32,
+    },
     /// A model of more nodes than are tried.
     #[error("{nodes} nodes are needed, at most {limit} are tried")]
     TooManyNodes {

@@ -1,7 +1,7 @@
 //! The page of a run in space.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use model_offline::number::length;
+use model_offline::number::{in_unit, length};
 use model_offline::output::chart::number::number;
 use model_offline::output::chart::{Axis, Colour, Dash, Panel, Place, ReferenceLine, Series};
 
@@ -24,9 +24,9 @@ pub(in crate::report) fn render(run: &SpaceRun) -> String {
                 main {
                     h1 { "Stillpoint: " (run.scene) ", in space" }
                     p {
-                        "Insertion to " (length(run.depth)) " " (unit) " in " (run.insertion_s) " s. Loop " (run.rate_hz)
+                        "Insertion to " (in_unit(run.depth, unit)) " in " (run.insertion_s) " s. Loop " (run.rate_hz)
                         " Hz; target seen at " (run.target_rate_hz) " Hz, " (run.target_latency_ms) " ms late, noise "
-                        (length(run.noise)) " " (unit) " per component; seed " (run.seed) ". Tissue: linear tetrahedra, "
+                        (in_unit(run.noise, unit)) " per component; seed " (run.seed) ". Tissue: linear tetrahedra, "
                         (run.nodes) " nodes, tabulated along each insertion. Plant and controller are two processes; "
                         @match run.mode {
                             RunMode::Lockstep => "time is simulated.",

@@ -6,21 +6,21 @@ use std::path::Path;
 use super::summary::{FreeRun, write_free_runs, write_ledgers};
 use crate::bench::in_space::{SpaceRun, SpaceStrategyResult};
 use crate::runtime::time::mode::RunMode;
-use model_offline::number::length;
+use model_offline::number::{in_unit, length};
 
 /// Everything that a person wants to know first.
 pub fn summary(run: &SpaceRun, directory: &Path) -> String {
     let unit = &run.units[0];
     let mut out = format!(
-        "{} · in space · {} nodes · insertion to {} {unit} in {} s · loop {} Hz, target seen at {} Hz, {} ms late, noise {} {unit}\n",
+        "{} · in space · {} nodes · insertion to {} in {} s · loop {} Hz, target seen at {} Hz, {} ms late, noise {}\n",
         run.scene,
         run.nodes,
-        length(run.depth),
+        in_unit(run.depth, unit),
         run.insertion_s,
         run.rate_hz,
         run.target_rate_hz,
         run.target_latency_ms,
-        length(run.noise),
+        in_unit(run.noise, unit),
     );
     for case in &run.cases {
         let _ = writeln!(

@@ -21,6 +21,8 @@ const BETWEEN_LOOKS: Duration = Duration::from_millis(5);
 /// What a controller's table was computed from.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Introduction {
+    /// Dimension of space.
+    pub dimension: u8,
     /// SHA-256 of the scene, as hexadecimal digits.
     pub scene_hash: String,
     /// Units of length and stress.
@@ -65,9 +67,15 @@ impl Introduction {
     /// Compares with what the plant simulates.
     ///
     /// # Errors
-    /// [`RuntimeError::OtherScene`], [`RuntimeError::OtherUnits`], [`RuntimeError::OtherPaddles`].
+    /// [`RuntimeError::OtherSpace`], [`RuntimeError::OtherScene`], [`RuntimeError::OtherUnits`], [`RuntimeError::OtherPaddles`].
     pub fn check(&self, expected: &Expected) -> Result<(), RuntimeError> {
-        let Expected { scene_hashes, units, paddles } = expected;
+        let Expected { dimension, any_scene, scene_hashes, units, paddles } = expected;
+        if self.dimension != *dimension {
+            return Err(RuntimeError::OtherSpace { found: self.dimension, expected: *dimension });
+        }
+        if *any_scene {
+            return Ok(());
+        }
         if self.units != *units {
             return Err(RuntimeError::OtherUnits { found: self.units.clone(), expected: units.clone() });
         }
@@ -86,6 +94,10 @@ impl Introduction {
 /// What a controller's table must have been computed from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Expected {
+    /// Dimension of space, whatever else will do.
+    pub dimension: u8,
+    /// Whether any scene of that dimension will do.
+    pub any_scene: bool,
     /// SHA-256 of the scenes that will do, as hexadecimal digits.
     pub scene_hashes: Vec<String>,
     /// Units of length and stress.
@@ -105,12 +117,13 @@ mod tests {
     fn another_scene_and_other_units_are_refused() {
         let space = Space::unique().unwrap();
         let units = ["mm", "kPa"].map(str::to_owned);
-        let introduction = Introduction { scene_hash: "ab".repeat(32), units: units.clone(), paddles: vec![5, 6] };
+        let introduction =
+            Introduction { dimension: 3, scene_hash: "ab".repeat(32), units: units.clone(), paddles: vec![5, 6] };
         introduction.tell(&space).unwrap();
         let heard = Introduction::hear(&space).unwrap();
         assert_eq!(heard, introduction);
         let both = vec!["cd".repeat(32), "ab".repeat(32)];
-        let expected = Expected { scene_hashes: both, units, paddles: None };
+        let expected = Expected { dimension: 3, any_scene: false, scene_hashes: both, units, paddles: None };
         assert!(heard.check(&expected).is_ok());
         let paddles = |paddles: &[u32]| heard.check(&Expected { paddles: Some(paddles.to_vec()), ..expected.clone() });
         assert!(paddles(&[5, 6]).is_ok());
@@ -119,6 +132,9 @@ mod tests {
         }
         let other = Expected { scene_hashes: vec!["cd".repeat(32)], ..expected.clone() };
         assert!(matches!(heard.check(&other), Err(RuntimeError::OtherScene)));
+        assert!(heard.check(&Expected { any_scene: true, ..other }).is_ok());
+        let plane = Expected { dimension: 2, any_scene: true, ..expected.clone() };
+        assert!(matches!(heard.check(&plane), Err(RuntimeError::OtherSpace { found: 3, expected: 2 })));
         let metres = Expected { units: ["m", "kPa"].map(str::to_owned), ..expected };
         assert!(matches!(heard.check(&metres), Err(RuntimeError::OtherUnits { .. })));
         space.leave::<local::Service>(Departure::First);

@@ -89,8 +89,13 @@ impl InsertionModel {
     /// A body at rest with some paddles attached, by their places in the scene's list.
     ///
     /// # Errors
-    /// [`ModelError`] when the tangent at rest is singular.
+    /// [`ModelError`] when the tangent at rest is singular, or a paddle attached twice.
     pub fn body(&self, attached: &[usize], settings: NewtonSettings) -> Result<SpaceBody<'_>, ModelError> {
+        if let [one, other] = *attached
+            && one == other
+        {
+            return Err(ModelError::SamePaddle { index: self.scene.paddles[one].index });
+        }
         let body = self.coarse.body(attached, settings)?;
         Ok(body.answering_at_rest(&self.rest_of(attached)?)?)
     }
