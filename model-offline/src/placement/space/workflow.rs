@@ -251,7 +251,7 @@ fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError>
 }
 
 /// The model of a scene's insertions. At rest it answers as the scene's own discretization does; where that is given by a tolerance
-/// alone, as quadratic tetrahedra within it or within [`AT_REST`], whose estimate is far above what is left.
+/// alone, as quadratic tetrahedra within it or within an estimated 15 %, which is far above what is left.
 ///
 /// # Errors
 /// [`ModelError`], as of [`discretise`].
