@@ -7,7 +7,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use firmware::{Faults, Mode};
-use model_offline::model::space::SpaceModel;
 use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
 use model_offline::placement::space::insertion::InsertionModel;
@@ -262,7 +261,7 @@ pub fn compare(
     let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
     for (tissue, believed) in wanted {
         let compared = case((tissue, of(tissue)), (believed, of(believed)), simulation, options, &mut artifacts)?;
-        bodies.cases.push(signals::ends_at_once(|| bodies_of(of(tissue).model.coarse(), &compared)));
+        bodies.cases.push(signals::ends_at_once(|| bodies_of(&of(tissue).model, &compared)));
         cases.push(compared);
     }
     let settings = simulation.loop_settings;
@@ -300,7 +299,7 @@ fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>
 }
 
 /// The bodies at the end of a case's insertions.
-fn bodies_of(model: &SpaceModel, case: &SpaceCase) -> CaseBodies {
+fn bodies_of(model: &InsertionModel, case: &SpaceCase) -> CaseBodies {
     [&case.none, &case.fixture, &case.dynamic].map(|result| {
         let way: Vec<_> = result.series.iter().map(|point| (point.depth, point.paddles.as_slice())).collect();
         space_bodies::at_end(model, &result.paddles, &way)

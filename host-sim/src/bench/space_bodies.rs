@@ -1,7 +1,7 @@
 //! The deformed body at the end of every insertion in space, for pictures: solved once more, in full.
 
-use model_offline::model::space::SpaceModel;
 use model_offline::output::space_picture::{SpaceGeometry, SpaceState};
+use model_offline::placement::space::InsertionModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector3;
 
@@ -22,7 +22,11 @@ pub type CaseBodies = [Result<SpaceState, String>; 3];
 
 /// The body at the end of an insertion with these paddles (indices in the scene): needle depths and the paddles'
 /// displacements on the way, length.
-pub(super) fn at_end(model: &SpaceModel, paddles: &[u32], way: &[(f64, &[[f64; 3]])]) -> Result<SpaceState, String> {
+pub(super) fn at_end(
+    model: &InsertionModel,
+    paddles: &[u32],
+    way: &[(f64, &[[f64; 3]])],
+) -> Result<SpaceState, String> {
     let places = paddles.iter().map(|&index| model.scene().paddle_position(index));
     let attached = places.collect::<Result<Vec<usize>, _>>().map_err(|error| error.to_string())?;
     let mut body = model.body(&attached, NewtonSettings::default()).map_err(|failure| failure.to_string())?;

@@ -11,7 +11,7 @@ use crate::world::needle::RecordedNeedleError;
 #[non_exhaustive]
 pub enum UsageError {
     /// What no simulation of a body in space has yet.
-    #[error("{option} is for scenes in the plane; leave it out for a body in space")]
+    #[error("{option} is not there in space: leave it out")]
     NotInSpace {
         /// The option.
         option: String,
