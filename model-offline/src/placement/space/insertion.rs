@@ -33,15 +33,6 @@ impl InsertionModel {
         Self { scene: scene.clone(), coarse, accurate, rest }
     }
 
-    /// Follows insertions on a model that is believed as it is.
-    ///
-    /// # Errors
-    /// [`ModelError`] when the body at rest cannot be solved.
-    pub fn as_it_is(model: SpaceModel) -> Result<Self, ModelError> {
-        let rest = rest_responses(&model)?;
-        Ok(Self { scene: model.scene().clone(), coarse: model.clone(), accurate: model, rest })
-    }
-
     /// The same without the scene's inclusions.
     ///
     /// # Errors
