@@ -35,6 +35,11 @@ impl ConstrainedRows {
         self.len() == 0
     }
 
+    /// Whether every row is one unknown to rounding, and no sum of several.
+    pub(crate) fn are_unknowns(&self) -> bool {
+        (0..self.len()).all(|b| self.row(b).1.iter().filter(|value| value.abs() > 1e-12).count() == 1)
+    }
+
     pub(crate) fn row(&self, b: usize) -> (&[u32], &[f64]) {
         let range = self.offsets[b] as usize..self.offsets[b + 1] as usize;
         (&self.nodes[range.clone()], &self.values[range])

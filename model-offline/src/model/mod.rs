@@ -23,6 +23,7 @@ use crate::scene::{Needle, Scene};
 use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
+use std::collections::BTreeSet;
 use std::sync::{Arc, OnceLock};
 
 /// The discrete model of a scene: everything that all paddles share.
@@ -47,6 +48,8 @@ pub struct TissueModel {
     target: Stencil<2>,
     /// Made when the first body needs it, and shared with all models on the same nodes.
     analysis: Arc<OnceLock<Analysis>>,
+    /// The same with the nodes eliminated last that paddles and target take.
+    condensing: Arc<OnceLock<(Analysis, Vec<u32>)>>,
 }
 
 /// Where essential boundary conditions are imposed: on nodes, or at boundary points by Nitsche's method.
@@ -197,6 +200,7 @@ impl TissueModel {
             target: planar.value_stencil(&scene.target)?,
             planar,
             analysis: Arc::default(),
+            condensing: Arc::default(),
         })
     }
 
@@ -354,17 +358,48 @@ impl TissueModel {
     pub(crate) fn analysis(&self) -> &Analysis {
         self.analysis.get_or_init(|| {
             let (rule, positions) = (self.rule(), self.positions());
-            match &self.essential {
-                EssentialBoundary::Nodes(groups) => {
-                    let constrained = groups.all().chain([&self.target]).map(|stencil| stencil.nodes.as_slice());
-                    Analysis::new(rule, positions, constrained)
+            match (&self.essential, self.condensing.get()) {
+                (_, Some((condensing, _))) => condensing.retaining_none(positions),
+                (EssentialBoundary::Nodes(groups), None) => {
+                    Analysis::new(rule, positions, self.constrained_lists(groups))
                 }
-                EssentialBoundary::Points(groups) => {
+                (EssentialBoundary::Points(groups), None) => {
                     let constrained = Nitsche::new(&self.planar, &self.tissue, groups.all().cloned());
                     Analysis::new(rule, positions, constrained.node_lists().into_iter())
                 }
             }
         })
+    }
+
+    /// Node lists of everything that may be constrained on nodes.
+    fn constrained_lists<'s>(&'s self, groups: &'s Groups<Stencil<2>>) -> impl Iterator<Item = &'s [u32]> + Clone {
+        groups.all().chain([&self.target]).map(|stencil| stencil.nodes.as_slice())
+    }
+
+    /// The rows of every paddle's nodes, where each paddle can be attached to a body that holds without it: none where
+    /// Nitsche's method imposes the values, or where a node of a paddle is one of the immobile part or of the needle too.
+    pub(crate) fn attachable_rows(&self) -> Option<&[Vec<Stencil<2>>]> {
+        let EssentialBoundary::Nodes(groups) = &self.essential else { return None };
+        let same = |a: &Stencil<2>, b: &Stencil<2>| a.nodes == b.nodes && a.values == b.values;
+        let apart = |row: &Stencil<2>| !groups.with_paddle(None).any(|held| same(held, row));
+        groups.paddles.iter().flatten().all(apart).then_some(&groups.paddles)
+    }
+
+    /// The same analysis with the nodes that paddles and target take eliminated last; and those nodes, ascending. None
+    /// where Nitsche's method imposes the values.
+    pub(crate) fn condensing_analysis(&self) -> Option<&(Analysis, Vec<u32>)> {
+        let EssentialBoundary::Nodes(groups) = &self.essential else { return None };
+        Some(self.condensing.get_or_init(|| {
+            let rows = groups.paddles.iter().flatten().chain([&self.target]);
+            let retained: BTreeSet<u32> = rows.flat_map(|row| row.nodes.iter().copied()).collect();
+            let retained: Vec<u32> = retained.into_iter().collect();
+            let (rule, positions) = (self.rule(), self.positions());
+            let analysis = match self.analysis.get() {
+                Some(analysis) => analysis.retaining_also(positions, &retained),
+                None => Analysis::retaining(rule, positions, self.constrained_lists(groups), &retained),
+            };
+            (analysis, retained)
+        }))
     }
 
     /// Rule, tissue and nodes, for a solver.

@@ -5,8 +5,8 @@
 //! With `w = 2μ |∂²u| |∂²z|` the most accurate spacing for a number of nodes is `h = s w^(−1/4)`, and then the error goes as
 //! `s² ∫ √w`. The second derivatives are those of quadratic triangles.
 
+use super::fields::Fields;
 use super::goal_oriented::{Certified, corner_gradients, pairs};
-use super::rest::Fields;
 use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::nodes::sizing::Sizing;
 use crate::geometry::{Point2, cross};

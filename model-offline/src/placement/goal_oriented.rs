@@ -11,7 +11,8 @@
 //! inclusions. So the limit lies between 0.07 and 1.35 differences beyond the fine answer, which is shifted to the middle of
 //! that; a whole difference is left open, half again as much as the range, because coarse meshes need not obey.
 
-use super::rest::{Fields, Loads, RestResponse, for_each_paddle, response_of};
+use super::fields::{Fields, Loads};
+use super::rest::{RestResponse, for_each_paddle, response_of};
 use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::{Integration, Method, Planar};
 use crate::geometry::{Point2, cross};

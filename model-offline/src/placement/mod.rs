@@ -3,9 +3,12 @@
 
 pub mod accuracy;
 pub mod adaptive;
+mod attaching;
+mod condensed;
 pub mod controllability;
 pub mod cross_check;
 mod curvature;
+mod fields;
 mod goal_oriented;
 pub mod hindrance;
 pub mod reference;

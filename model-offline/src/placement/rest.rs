@@ -1,13 +1,14 @@
-//! Actuation Jacobians at rest for all paddles at once: one assembly and one symbolic analysis serve them all, since
-//! they differ only in which nodal values are constrained.
+//! Actuation Jacobians at rest for all paddles at once: one assembly and one factor serve them all, since they differ only in
+//! which nodal values are constrained.
 
+use super::attaching::Attaching;
+use super::condensed::{singular, tangent_at_rest};
 use super::controllability::best_direction;
+use super::fields::{Fields, Loads, RATES};
 use crate::mechanics::ConstrainedRows;
-use crate::mechanics::assembly::{AssemblyState, Medium, internal_force, tangent};
-use crate::mechanics::history::Prestress;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::{ConstrainedSolver, Unknowns};
-use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
+use crate::solver::equilibrium::NewtonSettings;
 use nalgebra::{Matrix2, Vector2};
 
 /// How the target answers to one paddle and to the needle, at rest.
@@ -23,52 +24,33 @@ pub struct RestResponse {
     pub target_per_depth: Vector2<f64>,
 }
 
-/// Displacements of one body to unit rates, as nodal coefficients one after the other: paddle along x, paddle along y,
-/// needle along its axis, and, where they were asked for, to unit loads on the target along x and y.
-#[derive(Debug, Clone)]
-pub(super) struct Fields {
-    coefficients: Vec<f64>,
-    unknowns: usize,
-}
-
-impl Fields {
-    /// Field f in the order above.
-    pub(super) fn field(&self, f: usize) -> &[f64] {
-        &self.coefficients[f * self.unknowns..(f + 1) * self.unknowns]
-    }
-}
-
-/// Rates that are prescribed: paddle along x, along y, needle along its axis.
-const RATES: usize = 3;
-
 /// Responses of all paddles of the model's scene, in its order.
 ///
 /// # Errors
 /// [`ModelError`] when the tangent at rest is singular. A paddle that cannot control the target is a result.
 pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelError> {
     let count = model.scene().paddles.len();
-    if (0..count).any(|p| model.constrained_rows(Some(p)).is_none()) {
+    if model.is_held_weakly() {
         return (0..count).map(|paddle| rest_response_weakly_imposed(model, paddle)).collect();
     }
+    let normal = model.scene().needle.orthogonal();
+    if let Some(body) = Attaching::new(model, Loads::None) {
+        let response = |paddle| {
+            let [x, y, per_depth] = body.target(paddle)?;
+            Ok(RestResponse::new(Matrix2::from_columns(&[x, y]), per_depth, normal))
+        };
+        return (0..count).map(response).collect();
+    }
     let mut responses = Vec::with_capacity(count);
-    for_each_paddle(model, Loads::None, |_, fields| {
+    for_each_paddle_by_itself(model, Loads::None, |_, fields| {
         responses.push(response_of(model, fields));
         Ok(())
     })?;
     Ok(responses)
 }
 
-/// Which loads are looked at besides the rates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Loads {
-    /// None.
-    None,
-    /// Unit loads on the target: the adjoint of asking for its displacement.
-    OnTarget,
-}
-
-/// Solves for every paddle in turn and hands its fields to `visit`: one assembly and one analysis, a factor each. All
-/// right-hand sides pass through a factor together.
+/// Solves for every paddle in turn and hands its fields to `visit`: one assembly and one factor for all where the body holds
+/// without a paddle.
 ///
 /// # Errors
 /// [`ModelError`] when the tangent at rest is singular, the nodal values are not imposed exactly, or from `visit`.
@@ -77,35 +59,35 @@ pub(super) fn for_each_paddle(
     loads: Loads,
     mut visit: impl FnMut(usize, &Fields) -> Result<(), ModelError>,
 ) -> Result<(), ModelError> {
-    let rule = model.rule();
-    let unknowns = 2 * model.nodes();
+    let Some(mut body) = Attaching::new(model, loads) else { return for_each_paddle_by_itself(model, loads, visit) };
+    let mut fields = Fields::new(model, loads);
+    for paddle in 0..model.scene().paddles.len() {
+        body.fields(paddle, &mut fields)?;
+        visit(paddle, &fields)?;
+    }
+    Ok(())
+}
+
+/// The same with a factor for each paddle. All right-hand sides pass through it together.
+fn for_each_paddle_by_itself(
+    model: &TissueModel,
+    loads: Loads,
+    mut visit: impl FnMut(usize, &Fields) -> Result<(), ModelError>,
+) -> Result<(), ModelError> {
     let all: Vec<ConstrainedRows> = (0..model.scene().paddles.len())
         .map(|p| model.constrained_rows(Some(p)))
         .collect::<Option<_>>()
         .ok_or(ModelError::ImposedWeakly)?;
-    let analysis = model.analysis();
-    let stabilisation = analysis.stabilisation(rule, model.tissue());
-    let prestress = Prestress::default();
-    let medium = Medium { rule, stabilisation: &stabilisation, tissue: model.tissue(), prestress: &prestress };
-    let (mut state, mut force) = (AssemblyState::default(), vec![0.0; unknowns]);
-    internal_force(medium, &vec![0.0; unknowns], &mut state, &mut force).map_err(|_| singular("at rest"))?;
-    let mut at_rest = vec![0.0; analysis.pattern().entries()];
-    tangent(medium, &state, analysis.blocks(), &mut at_rest);
-
-    let mut solver = ConstrainedSolver::<2>::new(analysis, ConstrainedRows::default());
-    let columns = RATES + if loads == Loads::OnTarget { 2 } else { 0 };
-    let mut forces = vec![0.0; columns * unknowns];
-    for (column, axis) in (RATES..columns).zip(0..2) {
-        for (&i, value) in model.target_row().nodes.iter().zip(&model.target_row().values) {
-            forces[column * unknowns + 2 * i as usize + axis] += value;
-        }
-    }
-    let mut fields = Fields { coefficients: vec![0.0; columns * unknowns], unknowns };
+    let at_rest = tangent_at_rest(model.rule(), model.tissue(), model.analysis())?;
+    let mut solver = ConstrainedSolver::<2>::new(model.analysis(), ConstrainedRows::default());
+    let mut forces = vec![0.0; RATES * model.dofs()];
+    forces.extend(loads.forces(model));
+    let mut fields = Fields::new(model, loads);
     for (paddle, rows) in all.into_iter().enumerate() {
-        let mut multipliers = vec![0.0; columns * 2 * rows.len()];
+        let mut multipliers = vec![0.0; forces.len() / model.dofs() * 2 * rows.len()];
         solver.constrain(rows);
         solver.load(&at_rest);
-        solver.factorise().map_err(|_| singular("the tangent at rest is not positive definite"))?;
+        solver.factorise().map_err(|error| singular(&error.to_string()))?;
         let mut rates = [
             model.prescribed_values(Some(paddle), 0.0, Vector2::x()),
             model.prescribed_values(Some(paddle), 0.0, Vector2::y()),
@@ -113,7 +95,7 @@ pub(super) fn for_each_paddle(
         ]
         .concat();
         rates.resize(multipliers.len(), 0.0);
-        let unknowns = Unknowns { x: &mut fields.coefficients, multipliers: &mut multipliers };
+        let unknowns = Unknowns { x: fields.all_mut(), multipliers: &mut multipliers };
         solver.solve(&forces, &rates, 1e-12, unknowns);
         visit(paddle, &fields)?;
     }
@@ -154,6 +136,55 @@ impl RestResponse {
     }
 }
 
-fn singular(detail: &str) -> Failure {
-    Failure { reason: FailureReason::SingularTangent, reached: 0.0, detail: detail.to_owned() }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretization::{Integration, Method, Resolution};
+    use crate::scene::Scene;
+
+    fn quadratic(mut scene: Scene, spacing: f64) -> TissueModel {
+        scene.discretization.method = Method::new(Integration::FemT6);
+        scene.discretization.resolution = Resolution::Spacing(spacing);
+        TissueModel::new(&scene).unwrap()
+    }
+
+    #[test]
+    fn paddles_attached_to_one_factor_answer_as_with_a_factor_each() {
+        for (name, spacing) in [("paper", 0.1), ("paper-hull", 0.1), ("breast", 8.0)] {
+            let model = quadratic(Scene::bundled(name).unwrap(), spacing);
+            let mut own = Vec::new();
+            for_each_paddle_by_itself(&model, Loads::OnTarget, |_, fields| {
+                own.push(fields.clone());
+                Ok(())
+            })
+            .unwrap();
+            let mut body = Attaching::new(&model, Loads::OnTarget).expect("single unknowns, paddles apart");
+            let mut fields = Fields::new(&model, Loads::OnTarget);
+            for (paddle, own) in own.iter().enumerate() {
+                body.fields(paddle, &mut fields).unwrap();
+                for f in 0..RATES + 2 {
+                    let largest = own.field(f).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+                    for (here, there) in fields.field(f).iter().zip(own.field(f)) {
+                        assert!((here - there).abs() < 1e-9 * largest, "{name} {paddle} {f}: {here} {there}");
+                    }
+                }
+                let expected = response_of(&model, own);
+                let [x, y, per_depth] = body.target(paddle).unwrap();
+                let off = (Matrix2::from_columns(&[x, y]) - expected.jacobian).norm() / expected.jacobian.norm();
+                let moved = (per_depth - expected.target_per_depth).norm();
+                assert!(off < 1e-7 && moved < 1e-7, "{name} {paddle}: {off} {moved}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_paddle_that_shares_a_node_with_the_needle_has_a_factor_of_its_own() {
+        let mut scene = Scene::bundled("paper").unwrap();
+        let end = *scene.needle.contact.last().unwrap();
+        scene.paddles[0].segment[0] = end;
+        let model = quadratic(scene, 0.1);
+        assert!(Attaching::new(&model, Loads::None).is_none());
+        let responses = rest_responses(&model).unwrap();
+        assert!(responses.iter().all(|r| r.jacobian.iter().all(|x| x.is_finite())));
+    }
 }

@@ -49,6 +49,18 @@ impl Analysis {
         }
     }
 
+    /// The same sparsity, eliminated in whichever order fills least.
+    #[must_use]
+    pub fn retaining_none<const D: usize>(&self, positions: &[Point<D>]) -> Self {
+        Self { symbolic: SymbolicFactor::new(&self.pattern, positions), ..self.clone() }
+    }
+
+    /// The same sparsity with some nodes (ascending) eliminated last.
+    #[must_use]
+    pub fn retaining_also<const D: usize>(&self, positions: &[Point<D>], retained: &[u32]) -> Self {
+        Self { symbolic: SymbolicFactor::retaining(&self.pattern, positions, retained), ..self.clone() }
+    }
+
     /// The sparsity of the tangent.
     pub fn pattern(&self) -> &Pattern {
         &self.pattern

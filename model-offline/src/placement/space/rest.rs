@@ -7,11 +7,9 @@
 //! of their translations, which does not change the limit of the Jacobian: forces there do no work on it.
 
 use super::controllability::Controllability;
-use crate::mechanics::assembly::{AssemblyState, Medium, internal_force, tangent};
-use crate::mechanics::history::Prestress;
 use crate::model::ModelError;
 use crate::model::space::{Holder, SpaceModel};
-use crate::solver::constrained::{ConstrainedSolver, Unknowns};
+use crate::placement::condensed::CondensedBody;
 use crate::solver::equilibrium::{Failure, FailureReason};
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
@@ -44,8 +42,8 @@ pub struct CondensedRest<'m> {
     model: &'m SpaceModel,
     /// Place of a paddle node among all of them.
     place: BTreeMap<u32, usize>,
-    /// Products of the half-solved rows: three per paddle node, then three of the target.
-    gram: Mat<f64>,
+    /// Compliance between the rows of the paddle nodes, three each, and of the target, which come last.
+    compliance: Mat<f64>,
     /// What the needle does per depth to the paddle nodes, and to the target.
     per_depth: Vec<Vector3<f64>>,
     target_per_depth: Vector3<f64>,
@@ -57,21 +55,11 @@ impl<'m> CondensedRest<'m> {
     /// # Errors
     /// [`ModelError`] when the tangent at rest is singular.
     pub fn new(model: &'m SpaceModel) -> Result<Self, ModelError> {
-        let singular = |detail: String| Failure { reason: FailureReason::SingularTangent, reached: 0.0, detail };
         let (analysis, retained) = model.condensing_analysis();
-        let (rule, unknowns) = (model.spatial().rule(), model.dofs());
-        let stabilisation = analysis.stabilisation(rule, model.tissue());
-        let prestress = Prestress::default();
-        let medium = Medium { rule, stabilisation: &stabilisation, tissue: model.tissue(), prestress: &prestress };
-        let (mut state, mut force) = (AssemblyState::default(), vec![0.0; unknowns]);
-        internal_force(medium, &vec![0.0; unknowns], &mut state, &mut force).map_err(|at| singular(at.to_string()))?;
         let held = model.held_rows(&[]);
-        let mut solver = ConstrainedSolver::<3>::new(&analysis, held.rows.clone()).held_tight();
-        solver.assemble(|_, values| tangent(medium, &state, analysis.blocks(), values));
-        solver.factorise().map_err(|error| singular(error.to_string()))?;
-        let rate = held.values(model.scene().needle.axis, &[]);
-        let (mut field, mut multipliers) = (vec![0.0; unknowns], vec![0.0; rate.len()]);
-        solver.solve(&vec![0.0; unknowns], &rate, 1e-14, Unknowns { x: &mut field, multipliers: &mut multipliers });
+        let sampled = (&**model.spatial().rule(), model.tissue());
+        let mut body = CondensedBody::<3>::new(sampled, &analysis, retained.len(), held.rows.clone())?;
+        let field = body.fields(&vec![0.0; model.dofs()], &held.values(model.scene().needle.axis, &[]), 1e-14);
         let mut place = BTreeMap::new();
         for paddle in 0..model.scene().paddles.len() {
             for &node in model.paddle_nodes(paddle) {
@@ -81,18 +69,10 @@ impl<'m> CondensedRest<'m> {
         }
         let mut nodes = vec![0; place.len()];
         place.iter().for_each(|(&node, &at)| nodes[at] = node);
-        let rows: Vec<_> = nodes.iter().map(|&node| model.row(node)).chain([model.target_row()]).collect();
-        let functionals: Vec<Vec<(u32, f64)>> = rows
-            .iter()
-            .flat_map(|row| {
-                (0..3).map(|k| row.nodes.iter().zip(&row.values).map(|(&i, &value)| (3 * i + k, value)).collect())
-            })
-            .collect();
-        let half = solver.condensed(retained.len()).half_solved(&functionals);
         Ok(Self {
             per_depth: nodes.iter().map(|&node| model.row(node).interpolate(&field)).collect(),
             target_per_depth: model.target_row().interpolate(&field),
-            gram: half.transpose() * &half,
+            compliance: body.compliance(nodes.iter().map(|&node| model.row(node)).chain([model.target_row()])),
             model,
             place,
         })
@@ -118,7 +98,7 @@ impl<'m> CondensedRest<'m> {
             on.into_iter().map(|(node, slots)| (self.place[&node], Holder::Paddles(slots))).collect();
         let row = |r: usize| 3 * holders[r / 3].0 + r % 3;
         let (count, rates) = (3 * holders.len(), 3 * attached.len());
-        let compliance = Mat::from_fn(count, count, |r, c| self.gram[(row(r), row(c))]);
+        let attached_compliance = Mat::from_fn(count, count, |r, c| self.compliance[(row(r), row(c))]);
         // A column per translation of a paddle, and what the needle does.
         let mut sides = Mat::from_fn(count, rates + 1, |r, c| match &holders[r / 3] {
             (_, Holder::Paddles(slots)) if c < rates => {
@@ -127,15 +107,15 @@ impl<'m> CondensedRest<'m> {
             }
             (place, _) => self.per_depth[*place][r % 3],
         });
-        let factor = compliance.llt(Side::Lower).map_err(|_| Failure {
+        let factor = attached_compliance.llt(Side::Lower).map_err(|_| Failure {
             reason: FailureReason::SingularTangent,
             reached: 0.0,
             detail: "the compliance of the paddles is not positive definite".into(),
         })?;
         factor.solve_in_place(sides.as_mut());
-        let target = self.gram.nrows() - 3;
+        let target = self.compliance.nrows() - 3;
         let answer =
-            |t: usize, c: usize| (0..count).map(|r| self.gram[(row(r), target + t)] * sides[(r, c)]).sum::<f64>();
+            |t: usize, c: usize| (0..count).map(|r| self.compliance[(row(r), target + t)] * sides[(r, c)]).sum::<f64>();
         let jacobian = DMatrix::from_fn(3, rates, &answer);
         Ok(SpaceResponse {
             target_per_depth: self.target_per_depth - Vector3::from_fn(|t, _| answer(t, rates)),

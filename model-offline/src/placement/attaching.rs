@@ -1,0 +1,144 @@
+//! Paddles attached one after the other to a body in the plane that is factorised once, without any.
+//!
+//! The body holds without a paddle, so that attaching one is dense work on its own rows Λ: forces λ on them with
+//! `C λ = g − Λ u°` give them the displacements g, where C = Λ K⁻¹ Λᵀ and u° is what the body does without the paddle. The
+//! fields are then `u° + K⁻¹ Λᵀ λ`, all of a paddle through the factor together.
+
+use super::condensed::CondensedBody;
+use super::fields::{Fields, Loads, RATES};
+use crate::discretization::Stencil;
+use crate::mechanics::ConstrainedRows;
+use crate::model::{ModelError, TissueModel};
+use crate::solver::equilibrium::{Failure, FailureReason};
+use faer::linalg::solvers::{Llt, Solve as _};
+use faer::{Mat, Side};
+use nalgebra::Vector2;
+use std::ops::Range;
+
+/// What the paddles' nodes may be off their places per unit rate, before the forces on them are corrected.
+const ENOUGH: f64 = 1e-11;
+/// Corrections of the forces at most; each gains the digits that the factor holds.
+const MAX_CORRECTIONS: usize = 4;
+
+/// A body at rest to which paddles are attached.
+#[derive(Debug)]
+pub(super) struct Attaching<'m> {
+    model: &'m TissueModel,
+    body: CondensedBody<2>,
+    paddles: &'m [Vec<Stencil<2>>],
+    /// Compliance between the rows of all paddles, paddle after paddle, and of the target, which come last; two each.
+    compliance: Mat<f64>,
+    /// Fields without a paddle: the needle's rate, then the loads.
+    unattached: Vec<f64>,
+}
+
+impl<'m> Attaching<'m> {
+    /// Factorises the body without paddles; none where they are not attached to nodes of their own, where what is held are no
+    /// single unknowns (their penalty would cost the compliance seven digits), or where it does not hold without paddles.
+    pub(super) fn new(model: &'m TissueModel, loads: Loads) -> Option<Self> {
+        let held = model.constrained_rows(None).filter(ConstrainedRows::are_unknowns)?;
+        let (paddles, (analysis, retained)) = (model.attachable_rows()?, model.condensing_analysis()?);
+        let sampled = (&**model.rule(), model.tissue());
+        let mut body = CondensedBody::new(sampled, analysis, retained.len(), held).ok()?;
+        let mut forces = vec![0.0; model.dofs()];
+        forces.extend(loads.forces(model));
+        let mut values = model.prescribed_values(None, 1.0, Vector2::zeros());
+        values.resize(values.len() * forces.len() / model.dofs(), 0.0);
+        let unattached = body.fields(&forces, &values, 1e-12);
+        let compliance = body.compliance(paddles.iter().flatten().chain([model.target_row()]));
+        Some(Self { model, body, paddles, compliance, unattached })
+    }
+
+    /// Rows of a paddle in the compliance.
+    fn rows(&self, paddle: usize) -> Range<usize> {
+        let before = 2 * self.paddles[..paddle].iter().map(Vec::len).sum::<usize>();
+        before..before + 2 * self.paddles[paddle].len()
+    }
+
+    fn columns(&self) -> usize {
+        2 + self.unattached.len() / self.model.dofs()
+    }
+
+    /// Field `c` without the paddle: nothing for its own rates.
+    fn before(&self, c: usize) -> Option<&[f64]> {
+        let unknowns = self.model.dofs();
+        c.checked_sub(2).map(|f| &self.unattached[f * unknowns..(f + 1) * unknowns])
+    }
+
+    /// Cholesky factor of a paddle's compliance.
+    fn factor(&self, rows: &Range<usize>) -> Result<Llt<f64>, ModelError> {
+        let own = self.compliance.submatrix(rows.start, rows.start, rows.len(), rows.len());
+        let refused = |_| Failure {
+            reason: FailureReason::SingularTangent,
+            reached: 0.0,
+            detail: "the compliance of the paddle is not positive definite".into(),
+        };
+        Ok(own.llt(Side::Lower).map_err(refused)?)
+    }
+
+    /// What the paddle's nodes have to move beyond `fields`, if anything: a column per field.
+    fn missing<'f>(&self, paddle: usize, field: impl Fn(usize) -> Option<&'f [f64]>) -> Mat<f64> {
+        let rows = &self.paddles[paddle];
+        let mut missing = Mat::zeros(2 * rows.len(), self.columns());
+        for c in 0..self.columns() {
+            for (r, row) in rows.iter().enumerate() {
+                let at = field(c).map_or(Vector2::zeros(), |field| row.interpolate(field));
+                for axis in 0..2 {
+                    missing[(2 * r + axis, c)] = f64::from(u8::from(c == axis)) - at[axis];
+                }
+            }
+        }
+        missing
+    }
+
+    /// What the target does per unit of every rate with a paddle attached.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the paddle's compliance is singular.
+    pub(super) fn target(&self, paddle: usize) -> Result<[Vector2<f64>; RATES], ModelError> {
+        let rows = self.rows(paddle);
+        let mut forces = self.missing(paddle, |c| self.before(c));
+        self.factor(&rows)?.solve_in_place(forces.as_mut());
+        let target = self.compliance.nrows() - 2;
+        Ok(std::array::from_fn(|c| {
+            let moved = |axis: usize| -> f64 {
+                rows.clone().map(|r| self.compliance[(r, target + axis)] * forces[(r - rows.start, c)]).sum()
+            };
+            let before = self.before(c).map_or(Vector2::zeros(), |field| self.model.target_row().interpolate(field));
+            before + Vector2::new(moved(0), moved(1))
+        }))
+    }
+
+    /// The fields with a paddle attached.
+    ///
+    /// # Errors
+    /// [`ModelError`] when the paddle's compliance is singular.
+    pub(super) fn fields(&mut self, paddle: usize, fields: &mut Fields) -> Result<(), ModelError> {
+        let unknowns = self.model.dofs();
+        let factor = self.factor(&self.rows(paddle))?;
+        let rows = ConstrainedRows::new(self.paddles[paddle].iter());
+        let still = vec![0.0; self.model.prescribed_values(None, 0.0, Vector2::zeros()).len() * self.columns()];
+        for c in 0..self.columns() {
+            match self.before(c) {
+                Some(before) => fields.field_mut(c).copy_from_slice(before),
+                None => fields.field_mut(c).fill(0.0),
+            }
+        }
+        for _ in 0..MAX_CORRECTIONS {
+            let mut forces = self.missing(paddle, |c| Some(fields.field(c)));
+            if forces.norm_max() <= ENOUGH {
+                break;
+            }
+            factor.solve_in_place(forces.as_mut());
+            let mut right = vec![0.0; self.columns() * unknowns];
+            for (c, right) in right.chunks_exact_mut(unknowns).enumerate() {
+                let column: Vec<f64> = (0..forces.nrows()).map(|r| forces[(r, c)]).collect();
+                rows.add_transpose::<2>(&column, right);
+            }
+            for (c, more) in self.body.fields(&right, &still, 1e-12).chunks_exact(unknowns).enumerate() {
+                fields.field_mut(c).iter_mut().zip(more).for_each(|(x, d)| *x += d);
+            }
+        }
+        Ok(())
+    }
+}
