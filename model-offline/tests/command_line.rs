@@ -184,6 +184,29 @@ fn usage_errors_exit_2() {
 
 /// Questions need somebody who answers.
 #[test]
+fn paddles_are_lists_and_displacements_are_of_the_bodys_size() {
+    // (arguments, exit code, what is said). Errors are wrapped: what is looked for stands in one line.
+    let two = ["solve", "block", "--tolerance", "0.5", "--paddle", "3, 6", "--depth", "0.001"];
+    model_offline().args(two).assert().success();
+    let cases: [(&[&str], &str); 3] = [
+        (&["solve", "paper", "--depth", "0.01", "--paddle", "3,4"], "--paddle names 2 paddles"),
+        (
+            &["solve", "paper", "--depth", "0.01", "--paddle", "3", "--paddle-displacement", "1e300,0"],
+            "--paddle-displacement has 1e300,",
+        ),
+        (
+            &["solve", "block", "--depth", "0.01", "--paddle", "3", "--paddle-displacement", "0,0,-1e9"],
+            "--paddle-displacement has -1000000000,",
+        ),
+    ];
+    for (args, said) in cases {
+        let refused = model_offline().args(args).assert().code(2);
+        let text = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(text.contains(said), "{args:?}: {text}");
+    }
+}
+
+#[test]
 fn without_a_terminal_nothing_is_asked() {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("mine.toml");

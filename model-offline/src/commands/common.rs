@@ -5,6 +5,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use model_offline::discretization::{Basis, Essential, Integration, Resolution};
 use model_offline::model::ModelError;
+use model_offline::number::short;
 use model_offline::output::terminal;
 use model_offline::parallel;
 use model_offline::scene::space::{AnyScene, SpaceScene};
@@ -195,4 +196,26 @@ pub(super) fn warned(warnings: &[String]) -> String {
         let _ = writeln!(out, "warning: {warning}");
         out
     })
+}
+
+/// A paddle's index, with spaces around it as lists of them have.
+pub(super) fn paddle_index(text: &str) -> Result<u32, std::num::ParseIntError> {
+    text.trim().parse()
+}
+
+/// Paddles farther from rest than this many sizes of the body are none.
+const FARTHEST: f64 = 10.0;
+
+/// Refuses displacements of paddles, length units, that no body of this size can be meant to bear.
+///
+/// # Errors
+/// [`CliError::usage`] with the largest of them that is accepted.
+pub(super) fn check_displacements(displacements: &[f64], size: f64) -> Result<(), CliError> {
+    match displacements.iter().find(|d| d.abs() > FARTHEST * size) {
+        None => Ok(()),
+        Some(far) => Err(CliError::usage(
+            format!("--paddle-displacement has {}, and the body is {} across", short(*far), short(size)),
+            format!("give length units of the scene, at most {} here", short(FARTHEST * size)),
+        )),
+    }
 }

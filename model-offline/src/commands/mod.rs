@@ -52,7 +52,7 @@ enum Command {
         after_help = "Example:\n  model-offline solve paper --paddle 3 --depth 0.1 --vtu body.vtu --svg body.svg"
     )]
     Solve(solve::SolveArgs),
-    /// Controller table of one paddle.
+    /// Controller table of one paddle, in space of one or two.
     #[command(after_help = "Example:\n  model-offline table paper --paddle 3 -o paddle3.table")]
     Table(table::TableArgs),
     /// Where each method stops working, and why: depth reached against every parameter.

@@ -1,6 +1,6 @@
 //! `model-offline solve`: one equilibrium.
 
-use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
+use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use super::json::write_json;
 use super::solve_space::{self, SpaceArgs};
@@ -25,8 +25,8 @@ const ROUNDING: f64 = 1e-6;
 pub(super) struct SolveArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Index of the paddle that is attached [default: none]; in space once more for a second one
-    #[arg(long)]
+    /// Index of the paddle that is attached [default: none]; in space also several, as in `3,8`
+    #[arg(long, value_delimiter = ',', num_args = 1, value_parser = common::paddle_index)]
     paddle: Vec<u32>,
     /// Needle depth, length units.
     #[arg(long)]
@@ -76,8 +76,8 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
         [] => None,
         [index] => Some(index),
         _ => {
-            let help = "give --paddle once: in the plane one paddle is attached at a time";
-            return Err(CliError::usage("--paddle is given more than once", help));
+            let help = "give one: in the plane one paddle is attached at a time";
+            return Err(CliError::usage(format!("--paddle names {} paddles", args.paddle.len()), help));
         }
     };
     let displacement = match args.paddle_displacement.as_deref() {
@@ -90,6 +90,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
             ));
         }
     };
+    common::check_displacements(displacement.as_slice(), scene.outline.size())?;
     if !args.dwell.is_finite() || args.dwell < 0.0 {
         return Err(CliError::usage(format!("--dwell is {}", args.dwell), "give seconds, 0 or more"));
     }

@@ -1,5 +1,6 @@
 //! `model-offline solve` of a scene in space: one equilibrium, with as many paddles as are named.
 
+use super::common::check_displacements;
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::model::ModelError;
@@ -54,6 +55,7 @@ fn displaced(scene: &SpaceScene, args: SpaceArgs<'_>) -> Result<Vec<Displaced>, 
             "e.g. --paddle 1 --paddle-displacement 0.01,0,-0.002 --paddle 4 --paddle-displacement 0,0,0",
         ));
     }
+    check_displacements(numbers, scene.size())?;
     let mut found: Vec<Displaced> = Vec::new();
     for (i, index) in args.paddles.iter().enumerate() {
         let place = scene.paddle_position(*index).map_err(ModelError::from)?;

@@ -1,6 +1,6 @@
-//! `model-offline table`: the controller table of one paddle.
+//! `model-offline table`: the controller table of one paddle, in space of one or two.
 
-use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
+use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use model_offline::output::check_outputs;
 use model_offline::output::{self, space_table_text, table_text};
@@ -17,7 +17,7 @@ pub(super) struct TableArgs {
     #[command(flatten)]
     scene: SceneArgs,
     /// Paddle index; of a scene in space one or two, as in `3,8` (default: the best to control with, in space the best pair).
-    #[arg(long, value_delimiter = ',', num_args = 1)]
+    #[arg(long, value_delimiter = ',', num_args = 1, value_parser = common::paddle_index)]
     paddle: Vec<u32>,
     /// Where to write the table.
     #[arg(short, long, value_name = "FILE")]

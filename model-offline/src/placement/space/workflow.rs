@@ -206,6 +206,16 @@ impl Reference {
     }
 }
 
+/// What a reference that fails its share of a tolerance says of the whole: what was asked for, and what could have been kept.
+fn of_the_whole(error: ModelError, tolerance: f64) -> ModelError {
+    match error {
+        ModelError::ToleranceNotReached { reached, .. } => {
+            ModelError::ToleranceNotReached { tolerance, reached: reached / REFERENCE_SHARE }
+        }
+        other => other,
+    }
+}
+
 fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
     let method = scene.discretization.method;
     if method.integration == Integration::FemT10 {
@@ -220,7 +230,8 @@ fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError>
         };
         return Ok(Discretised { model, rest, estimate: Some(estimate) });
     }
-    let reference = Reference::within(scene, REFERENCE_SHARE * tolerance)?;
+    let reference =
+        Reference::within(scene, REFERENCE_SHARE * tolerance).map_err(|error| of_the_whole(error, tolerance))?;
     let mut reached = f64::INFINITY;
     let mut level = *LEVELS.start();
     while level <= *LEVELS.end() {
@@ -280,4 +291,17 @@ pub fn coarse(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
         }
     }
     outcome
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_reference_that_fails_its_half_is_told_as_the_tolerance_that_was_asked_for() {
+        let of_half = ModelError::ToleranceNotReached { tolerance: 0.002, reached: 0.0057 };
+        let told = of_the_whole(of_half, 0.004);
+        let ModelError::ToleranceNotReached { tolerance, reached } = told else { panic!("{told}") };
+        assert!(tolerance == 0.004 && (reached - 0.0114).abs() < 1e-12, "{tolerance} {reached}");
+    }
 }
