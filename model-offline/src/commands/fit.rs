@@ -1,7 +1,8 @@
-//! `model-offline fit`: the smallest model that keeps a tolerance, and the fewest of the scene's effects.
+//! `model-offline fit`: the smallest model that keeps a tolerance, and the fewest of the scene's effects or dimensions.
 
 use super::common::SceneArgs;
 use super::error::CliError;
+use super::fit_space;
 use super::json::write_json;
 use model_offline::discretization::Resolution;
 use model_offline::output;
@@ -15,26 +16,42 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub(super) struct FitArgs {
     #[command(flatten)]
-    scene: SceneArgs,
+    pub(super) scene: SceneArgs,
     /// Relative error of controllability and target displacement to keep. Of a needle that slips, tissue that creeps and a
     /// patient that moves, what changes less than 0.15 of it is left out.
     #[arg(long, value_name = "T")]
-    tolerance: f64,
+    pub(super) tolerance: f64,
     /// Write the scene with the choice in it.
     #[arg(short, long, value_name = "FILE")]
-    output: Option<PathBuf>,
+    pub(super) output: Option<PathBuf>,
     /// Write the choice and what was rejected as JSON.
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub(super) json: Option<PathBuf>,
+    /// Of a scene in space: draw every paddle's measure in body and slice.
+    #[arg(long, value_name = "FILE")]
+    pub(super) svg: Option<PathBuf>,
+    /// Of a scene in space: write the slice through needle and target, a planar scene.
+    #[arg(long, value_name = "FILE")]
+    pub(super) write_slice: Option<PathBuf>,
     /// Threads to use for training (default: all). Times are those of one thread.
     #[arg(long)]
-    threads: Option<usize>,
+    pub(super) threads: Option<usize>,
     /// No summary.
     #[arg(long)]
-    quiet: bool,
+    pub(super) quiet: bool,
 }
 
 pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
+    if let Some(scene) = args.scene.read_in_space()? {
+        return fit_space::run(&scene, args);
+    }
+    let given = [("--svg", &args.svg), ("--write-slice", &args.write_slice)];
+    if let Some((option, _)) = given.into_iter().find(|(_, file)| file.is_some()) {
+        return Err(CliError::usage(
+            format!("{option} is for scenes in space, whose slice is planar"),
+            "leave it out: this scene is planar",
+        ));
+    }
     let mut scene = args.scene.read_any()?;
     scene.discretization.resolution = match scene.discretization.resolution {
         Resolution::Spacing(h) => Resolution::Spacing(h),

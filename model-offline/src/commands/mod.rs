@@ -8,6 +8,7 @@ mod completions;
 mod draw;
 mod error;
 mod fit;
+mod fit_space;
 mod inspect;
 mod json;
 mod man;
@@ -71,9 +72,9 @@ enum Command {
     #[command(after_help = "Example:\n  model-offline sweep paper --without-inclusion --out charts")]
     Sweep(sweep::SweepArgs),
     /// The smallest model that keeps a tolerance, chosen from the cheapest up, and the fewest of the scene's effects (shaft,
-    /// creep, breathing); what was rejected, and by which number.
+    /// creep, breathing), or in space of its dimensions and paddles; what was rejected, and by which number.
     #[command(
-        after_help = "Examples:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json\n  model-offline fit breast-world --tolerance 0.02 -o fitted.toml"
+        after_help = "Examples:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json\n  model-offline fit breast-world --tolerance 0.02 -o fitted.toml\n  model-offline fit block --tolerance 0.15 --svg both.svg"
     )]
     Fit(fit::FitArgs),
     /// The planar scene that a plane through needle and target cuts of a scene in space.

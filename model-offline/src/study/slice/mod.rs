@@ -19,7 +19,7 @@ use self::outline::{Nested, in_plane, loops, nested, onto_surface};
 use self::plane::Planes;
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::rim_points;
-use crate::geometry::{Implicit, Point, Point2, signed_area, simplified_loop};
+use crate::geometry::{Implicit, Point, Point2, bounds, signed_area, simplified_loop};
 use crate::model::ModelError;
 use crate::model::space::meshing::{MeshSize, mesh};
 use crate::model::space::survey::Survey;
@@ -37,6 +37,9 @@ const ON_BOTH_SIDES: f64 = 0.02;
 const RIM: f64 = 5e-3;
 /// Inclusions whose cut is smaller than this part of the body's size squared are not cut.
 const SMALLEST: f64 = 1e-6;
+/// Points along each side of a grid on which gaps are looked for, and how far outside of the body they are, over its size.
+const GRID: i32 = 60;
+const GAP: f64 = 0.01;
 /// Details of inclusions below this part of the body's size are left out.
 const DETAIL: f64 = 1e-3;
 
@@ -136,8 +139,8 @@ pub enum SliceError {
     },
     /// The target's piece of the cut has holes.
     #[error(
-        "the slice ({plane}) has {holes} holes, and planar bodies have none: lay the plane through another paddle, or stay with \
-         the body"
+        "the slice ({plane}) has {holes} holes or clefts, and planar bodies have none: lay the plane through another paddle, or \
+         stay with the body"
     )]
     Holes {
         /// The plane.
@@ -272,10 +275,12 @@ impl Body<'_> {
         let misses = |what| SliceError::Misses { plane: self.name(&plane), what };
         let found = nested(loops(&self.mesh.nodes, &self.triangles, &plane, size), &plane, &scene.target);
         let Nested { outline, holes, others } = found.ok_or_else(|| misses("target"))?;
-        if holes > 0 {
-            return Err(SliceError::Holes { plane: self.name(&plane), holes });
-        }
         let outline = onto_surface(&outline, &|x| scene.body.level(x), &plane, size);
+        // What the mesh is too coarse to see is seen by the body.
+        let unseen = usize::from(has_gap(&in_plane(&outline, &plane), scene.body.as_ref(), &plane, size));
+        if holes.max(unseen) > 0 {
+            return Err(SliceError::Holes { plane: self.name(&plane), holes: holes.max(unseen) });
+        }
         let boundary = Boundary::new(outline, &plane, size);
         let regions: Vec<&dyn Implicit> = scene.immobile.iter().map(|region| region as _).collect();
         let immobile = boundary.runs(&regions);
@@ -378,4 +383,16 @@ impl Body<'_> {
         }
         all
     }
+}
+
+/// Whether a loop holds points that lie outside of the body, clearly.
+fn has_gap(outline: &[Point2], body: &dyn Implicit, plane: &CutPlane, size: f64) -> bool {
+    let (low, high) = bounds(outline);
+    let steps = || (0..GRID).map(|i| (f64::from(i) + 0.5) / f64::from(GRID));
+    let origin = plane.normal * plane.offset;
+    let mut all = steps().flat_map(|u| steps().map(move |v| low + (high - low).component_mul(&Point2::new(u, v))));
+    all.any(|at| {
+        let x = origin + plane.directions[0] * at.x + plane.directions[1] * at.y;
+        body.level(&x) > GAP * size && outline::holds(outline, at)
+    })
 }

@@ -148,7 +148,7 @@ pub(super) fn in_plane(points: &[Point<3>], plane: &CutPlane) -> Vec<Point2> {
 }
 
 /// Whether a closed loop holds a point, by the angle that it goes round it.
-fn holds(cut: &[Point2], point: Point2) -> bool {
+pub(super) fn holds(cut: &[Point2], point: Point2) -> bool {
     let ends = |i: usize| [cut[i] - point, cut[(i + 1) % cut.len()] - point];
     let turned: f64 = (0..cut.len()).map(ends).map(|[a, b]| cross(a, b).atan2(a.dot(&b))).sum();
     turned.abs() > std::f64::consts::PI
