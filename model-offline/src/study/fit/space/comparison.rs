@@ -55,15 +55,13 @@ pub struct Feedback {
     pub gain_mismatch: f64,
     /// How far it moves across the plane, for the same unit.
     pub across: f64,
-    /// The insertion with the slice's table alone.
+    /// The insertion with the slice's table alone, estimated by what Jacobians at rest say.
     pub table_alone: Left,
-    /// The insertion with feedback, which takes away all that is in the plane.
+    /// The insertion with feedback, which takes away all that is in the plane, estimated likewise.
     pub with_feedback: Left,
-    /// The insertion without a paddle, for comparison.
-    pub without_help: f64,
 }
 
-/// What is left of the target's displacement at full depth, orthogonal to the needle. Length units.
+/// What is left of the target's displacement, orthogonal to the needle. Length units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Left {
     /// In the plane.
@@ -80,23 +78,29 @@ impl Left {
 }
 
 /// Directions of a slice in the body.
-struct Frame<'a> {
-    slice: &'a Slice,
+pub(super) struct Frame<'a> {
+    pub(super) slice: &'a Slice,
     /// In the plane, orthogonal to the needle.
-    normal: Vector3<f64>,
+    pub(super) normal: Vector3<f64>,
     /// Across the plane.
     across: Vector3<f64>,
 }
 
 impl<'a> Frame<'a> {
-    fn new(slice: &'a Slice) -> Self {
+    pub(super) fn new(slice: &'a Slice) -> Self {
         let mut frame = Self { slice, normal: Vector3::zeros(), across: slice.plane.normal };
         frame.normal = frame.in_space(slice.scene.needle.orthogonal());
         frame
     }
 
-    fn in_space(&self, v: Vector2<f64>) -> Vector3<f64> {
+    pub(super) fn in_space(&self, v: Vector2<f64>) -> Vector3<f64> {
         self.slice.plane.directions[0] * v.x + self.slice.plane.directions[1] * v.y
+    }
+
+    /// What is left of a displacement orthogonal to the needle.
+    pub(super) fn left(&self, displacement: &Vector3<f64>) -> Left {
+        let across_plane = unless_rounding(displacement.dot(&self.across), displacement.norm());
+        Left { in_plane: displacement.dot(&self.normal), across_plane }
     }
 }
 
@@ -162,7 +166,7 @@ pub(super) fn paddles(study: &SpaceStudy, planar: Option<(&Slice, &PlacementStud
             body_in_plane: Some(in_plane),
             slice: measure,
             ratio: measure.map(|measure| in_plane / measure),
-            feedback: found.and_then(|paddle| feedback(&frame, study, &result.answer, paddle)),
+            feedback: found.and_then(|paddle| feedback(&frame, &result.answer, paddle)),
         }
     };
     study.placement.paddles.iter().map(one).collect()
@@ -173,7 +177,7 @@ fn jacobian(answer: &SpaceAnswer) -> Matrix3<f64> {
 }
 
 /// What a correction J⁻¹n of the slice does in the body; none where the slice's paddle controls nothing.
-fn feedback(frame: &Frame<'_>, study: &SpaceStudy, body: &SpaceAnswer, slice: &PaddleResult) -> Option<Feedback> {
+fn feedback(frame: &Frame<'_>, body: &SpaceAnswer, slice: &PaddleResult) -> Option<Feedback> {
     let correction = frame.in_space(slice.best_direction?.into());
     let moved = jacobian(body) * correction;
     let gain = moved.dot(&frame.normal);
@@ -181,17 +185,13 @@ fn feedback(frame: &Frame<'_>, study: &SpaceStudy, body: &SpaceAnswer, slice: &P
     let needle = &frame.slice.scene.needle;
     let displaced = (&body.static_study, body.target_per_depth);
     let (_, in_body, in_slice) = at_common_depth(displaced, &slice.static_study, needle.depth);
-    let in_plane = in_body.dot(&frame.normal);
-    let across_plane = unless_rounding(in_body.dot(&frame.across), in_body.norm());
+    let Left { in_plane, across_plane } = frame.left(&in_body);
     let told = in_slice.dot(&needle.orthogonal());
-    let none = &study.placement.no_paddle;
-    let alone = none.static_study.orthogonal.get(body.static_study.depth.len().saturating_sub(1)).copied();
     Some(Feedback {
         gain,
         gain_mismatch: (1.0 - gain).abs(),
         across,
         table_alone: Left { in_plane: in_plane - gain * told, across_plane: across_plane - across * told },
         with_feedback: Left { in_plane: 0.0, across_plane: across_plane - across / gain * in_plane },
-        without_help: alone.unwrap_or(none.static_study.max_orthogonal),
     })
 }

@@ -13,11 +13,13 @@
 //! No decision looks at a clock.
 
 mod chart;
+mod closed_loop;
 mod comparison;
 mod paddles;
 mod verdict;
 mod written;
 
+pub use closed_loop::ClosedLoop;
 pub use comparison::{Feedback, Left, PaddleInBoth, WithoutHelp};
 pub use paddles::PaddleSet;
 pub use verdict::{RejectedInSpace, SpaceAlternative, SpaceVerdict};
@@ -79,6 +81,9 @@ pub struct SliceInBody {
     pub optimum: BestPaddles,
     /// The target without help, in both.
     pub without_help: WithoutHelp,
+    /// The insertion into the body with the body's best paddle (where the slice has it, else the slice's own) by the slice's table; none
+    /// where it cannot be followed.
+    pub closed_loop: Option<ClosedLoop>,
 }
 
 /// What a scene in space needs.
@@ -145,19 +150,7 @@ pub fn fit_in_space(
     let sliced = sliced(&wanted, text, &from_the_best(&study), threads);
     let planar = sliced.as_ref().ok();
     let paddles = comparison::paddles(&study, planar.map(|(slice, planar)| (slice, planar)));
-    let beside = planar.map(|(slice, planar)| SliceInBody {
-        plane: slice.plane.name(&scene.length_unit).replace('\u{a0}', " "),
-        normal: slice.plane.normal.into(),
-        offset: slice.plane.offset,
-        through: slice.through,
-        left_out: slice.left_out.clone(),
-        model: model_in_plane(planar),
-        optimum: BestPaddles {
-            dynamic: planar.placement.optimum.dynamic_paddle,
-            fixture: Some(planar.placement.optimum.static_paddle),
-        },
-        without_help: comparison::without_help(&study, slice, planar),
-    });
+    let beside = planar.map(|(slice, planar)| beside(&study, slice, planar, optimum.dynamic)).transpose()?;
     let mut fit = SpaceFit {
         scene: scene.name.clone(),
         dimension: 3,
@@ -178,6 +171,30 @@ pub fn fit_in_space(
     fit.verdict = verdict::verdict(&fit);
     fit.fit_wall_s = start.elapsed().as_secs_f64();
     Ok(fit)
+}
+
+/// A slice held against the body, whose best paddle is `best`.
+fn beside(
+    study: &SpaceStudy,
+    slice: &Slice,
+    planar: &PlacementStudy,
+    best: Option<u32>,
+) -> Result<SliceInBody, FitError> {
+    let (plane, own) = (&slice.plane, planar.placement.optimum);
+    let has = |index: &u32| slice.scene.paddles.iter().any(|paddle| paddle.index == *index);
+    let followed = best.filter(has).or(own.dynamic_paddle);
+    let closed_loop = followed.map(|paddle| closed_loop::follow(study, slice, planar, paddle)).transpose()?;
+    Ok(SliceInBody {
+        plane: plane.name(&study.model.scene().length_unit).replace('\u{a0}', " "),
+        normal: plane.normal.into(),
+        offset: plane.offset,
+        through: slice.through,
+        left_out: slice.left_out.clone(),
+        model: model_in_plane(planar),
+        optimum: BestPaddles { dynamic: own.dynamic_paddle, fixture: Some(own.static_paddle) },
+        without_help: comparison::without_help(study, slice, planar),
+        closed_loop: closed_loop.flatten(),
+    })
 }
 
 /// The slice through the best paddle and its study, or why there is none. Where that plane makes no slice, the first that has the

@@ -117,17 +117,21 @@ impl SpaceFit {
             length(way.slice_in_plane),
             length(way.slice_axial)
         );
-        let best = self.paddles.iter().find(|paddle| Some(paddle.index) == self.optimum.dynamic);
-        if let Some((index, feedback)) = best.and_then(|paddle| Some((paddle.index, paddle.feedback?))) {
-            let stable = if feedback.gain > 0.0 && feedback.gain < 2.0 { "converges" } else { "does not converge" };
+        if let Some(followed) = &slice.closed_loop {
+            let corrected = match followed.converges {
+                true => {
+                    format!("{} with corrections of what is seen in the plane", length(followed.with_feedback.whole()))
+                }
+                false => "corrections of what is seen in the plane do not converge".to_owned(),
+            };
             let _ = writeln!(
                 out,
-                "paddle {index} in the body by the slice's table: {} are left without feedback, {} with it (across the plane), of {}; \
-                 |1 − λ| = {:.3}: a loop that corrects the whole error {stable}",
-                length(feedback.table_alone.whole()),
-                length(feedback.with_feedback.whole()),
-                length(feedback.without_help),
-                feedback.gain_mismatch
+                "paddle {} into the body by the slice's table, to depth {}: {} are left without corrections, {corrected}; {} without a \
+                 paddle",
+                followed.paddle,
+                length(followed.depth),
+                length(followed.table_alone.whole()),
+                length(followed.without_help),
             );
         }
         out
