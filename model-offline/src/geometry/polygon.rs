@@ -168,7 +168,8 @@ pub fn distance_to_polyline(p: Point2, polyline: &[Point2]) -> f64 {
     polyline.windows(2).map(|s| distance_to_segment(p, s[0], s[1])).fold(f64::INFINITY, f64::min)
 }
 
-/// A closed loop without vertices that lie within `tolerance` (length) of the line between others (Ramer, Douglas and Peucker).
+/// A closed loop without vertices that lie within `tolerance` (length) of the line between others (Ramer, Douglas and
+/// Peucker).
 pub fn simplified_loop(points: &[Point2], tolerance: f64) -> Vec<Point2> {
     let mut open: Vec<Point2> = points.to_vec();
     while open.len() > 1 && (open[0] - open[open.len() - 1]).norm() <= 1e-9 * tolerance.max(f64::MIN_POSITIVE) {
@@ -188,8 +189,8 @@ pub fn simplified_loop(points: &[Point2], tolerance: f64) -> Vec<Point2> {
     kept
 }
 
-/// The points of an open line that matter, ends included: the others lie within `tolerance` (length) of it (Ramer, Douglas and
-/// Peucker).
+/// The points of an open line that matter, ends included: the others lie within `tolerance` (length) of it (Ramer,
+/// Douglas and Peucker).
 pub fn simplified_line(line: &[Point2], tolerance: f64) -> Vec<Point2> {
     let Some(end) = line.len().checked_sub(1) else {
         return Vec::new();

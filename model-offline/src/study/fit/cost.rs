@@ -50,8 +50,8 @@ const PER_TETRAHEDRON_NODE: f64 = 12e-6;
 const POINTS_IN_SPACE: f64 = 24.0;
 const BASIS_IN_SPACE: f64 = 2.0;
 
-/// The same in space: one factorisation, from which all paddles and pairs are condensed. Within a factor of 1.6 of the time on five
-/// bodies of 1,413 to 25,331 nodes of quadratic tetrahedra.
+/// The same in space: one factorisation, from which all paddles and pairs are condensed. Within a factor of 1.6 of the
+/// time on five bodies of 1,413 to 25,331 nodes of quadratic tetrahedra.
 pub(super) fn cost_in_space(model: &SpaceModel) -> f64 {
     let (analysis, _) = model.condensing_analysis();
     let factor = analysis.symbolic();

@@ -14,8 +14,8 @@ const DETAIL: f64 = 1e-3;
 /// A piece of boundary whose middle is farther from its chord than this part of it turns a corner.
 const BENT: f64 = 0.15;
 
-/// A piece of the boundary between two arc lengths; `to` is above `from`, and beyond the whole length where the piece goes over
-/// the boundary's first point.
+/// A piece of the boundary between two arc lengths; `to` is above `from`, and beyond the whole length where the piece
+/// goes over the boundary's first point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Run {
     pub(super) from: f64,
@@ -151,7 +151,8 @@ impl<'a> Boundary<'a> {
         Point2::from(self.plane.coordinates(&self.point(s)))
     }
 
-    /// The boundary as a polygon with vertices at the ends of all pieces, those of the pieces to be straightened straight.
+    /// The boundary as a polygon with vertices at the ends of all pieces, those of the pieces to be straightened
+    /// straight.
     pub(super) fn polygon(&self, kept: &[Run], straightened: &[Run]) -> Outline {
         let length = self.length();
         let is_within = |s: f64, run: &Run| {

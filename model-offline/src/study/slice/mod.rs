@@ -1,11 +1,12 @@
 //! The planar scene that a plane through needle and target cuts of a scene in space: what plane strain makes of it.
 //!
-//! The plane holds the needle's direction and the target. Where the target is beside the needle's line that is one plane. Where it
-//! is on it, as it usually is, the plane is free to turn about the line, and is laid through a paddle: the one that is asked for, else
-//! the one whose plane meets the most paddles (where several meet as many, the most of their width). The surface of a mesh is
-//! cut, whose edges follow the body's sharp edges; what is curved is then moved onto the surface itself. Patches are what of the
-//! cut's boundary lies in their regions: of a paddle the chord of that, since planar paddles are straight. Inclusions are cut
-//! likewise. Paddles that the plane misses are left out by name.
+//! The plane holds the needle's direction and the target. Where the target is beside the needle's line that is one
+//! plane. Where it is on it, as it usually is, the plane is free to turn about the line, and is laid through a paddle:
+//! the one that is asked for, else the one whose plane meets the most paddles (where several meet as many, the most of
+//! their width). The surface of a mesh is cut, whose edges follow the body's sharp edges; what is curved is then moved
+//! onto the surface itself. Patches are what of the cut's boundary lies in their regions: of a paddle the chord of
+//! that, since planar paddles are straight. Inclusions are cut likewise. Paddles that the plane misses are left out by
+//! name.
 
 mod boundary;
 mod file;
@@ -37,7 +38,8 @@ const ON_BOTH_SIDES: f64 = 0.02;
 const RIM: f64 = 5e-3;
 /// Inclusions whose cut is smaller than this part of the body's size squared are not cut.
 const SMALLEST: f64 = 1e-6;
-/// Points along each side of a grid on which gaps are looked for, and how far outside of the body they are, over its size.
+/// Points along each side of a grid on which gaps are looked for, and how far outside of the body they are, over its
+/// size.
 const GRID: i32 = 60;
 const GAP: f64 = 0.01;
 /// Details of inclusions below this part of the body's size are left out.
@@ -79,7 +81,8 @@ pub enum LeftOutReason {
     InPieces,
     /// What the plane cuts of it turns a corner, and planar paddles are straight.
     Bent,
-    /// What the plane cuts of it meets the needle's contact, the immobile part or, where the boundary is curved, another paddle.
+    /// What the plane cuts of it meets the needle's contact, the immobile part or, where the boundary is curved,
+    /// another paddle.
     Meets,
 }
 

@@ -20,14 +20,14 @@ const FLATTEST: f64 = 0.1;
 /// A closed loop of points in space, all in the plane.
 pub(super) type Loop = Vec<Point<3>>;
 
-/// Cuts a closed surface of triangles, outward by the right-hand rule. What lies in the plane counts as beyond it, so that the
-/// loops close whatever nodes the plane hits.
+/// Cuts a closed surface of triangles, outward by the right-hand rule. What lies in the plane counts as beyond it, so
+/// that the loops close whatever nodes the plane hits.
 pub(super) fn loops(nodes: &[Point<3>], triangles: &[[u32; 3]], plane: &CutPlane, size: f64) -> Vec<Loop> {
     let distances: Vec<f64> = nodes.iter().map(|x| plane.distance(x)).collect();
     let is_beyond = |node: u32| distances[node as usize] >= 0.0;
     let key = |a: u32, b: u32| (a.min(b), a.max(b));
-    // From the edge where a triangle's boundary comes through the plane to the one where it goes back: the neighbour across
-    // that one begins there.
+    // From the edge where a triangle's boundary comes through the plane to the one where it goes back: the neighbour
+    // across that one begins there.
     let mut next: BTreeMap<(u32, u32), Vec<(u32, u32)>> = BTreeMap::new();
     for triangle in triangles {
         let edges = [0, 1, 2].map(|k| (triangle[k], triangle[(k + 1) % 3]));
@@ -63,8 +63,8 @@ pub(super) fn loops(nodes: &[Point<3>], triangles: &[[u32; 3]], plane: &CutPlane
     found
 }
 
-/// Moves a loop's points onto the surface within the plane, and adds points where its chords are off it. `level` is negative
-/// inside, about a distance.
+/// Moves a loop's points onto the surface within the plane, and adds points where its chords are off it. `level` is
+/// negative inside, about a distance.
 pub(super) fn onto_surface(cut: &[Point<3>], level: &dyn Fn(&Point<3>) -> f64, plane: &CutPlane, size: f64) -> Loop {
     let moved: Loop = cut.iter().map(|x| foot(x, level, plane, size)).collect();
     let mut all = Vec::new();

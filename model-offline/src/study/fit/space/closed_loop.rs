@@ -19,8 +19,8 @@ const MOST_CORRECTIONS: u32 = 30;
 /// Error in the plane that is none, over the target's displacement without help.
 const ENOUGH: f64 = 1e-3;
 
-/// An insertion into the body by the slice's table: the paddle's way by what the slice knows of depth and Jacobians, without and with
-/// corrections of what is seen in the plane. Length units.
+/// An insertion into the body by the slice's table: the paddle's way by what the slice knows of depth and Jacobians,
+/// without and with corrections of what is seen in the plane. Length units.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ClosedLoop {
     /// The paddle.

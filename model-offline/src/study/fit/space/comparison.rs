@@ -45,11 +45,12 @@ pub struct PaddleInBoth {
     pub feedback: Option<Feedback>,
 }
 
-/// What corrections from a slice's Jacobian do in the body. Displacements of the target orthogonal to the needle, length units.
+/// What corrections from a slice's Jacobian do in the body. Displacements of the target orthogonal to the needle,
+/// length units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Feedback {
-    /// λ: how far the target moves in the plane, for a unit that the slice's Jacobian asks for; 1 would be right. A loop that
-    /// corrects the whole error at each step converges for 0 < λ < 2.
+    /// λ: how far the target moves in the plane, for a unit that the slice's Jacobian asks for; 1 would be right. A
+    /// loop that corrects the whole error at each step converges for 0 < λ < 2.
     pub gain: f64,
     /// |1 − λ|.
     pub gain_mismatch: f64,
@@ -104,7 +105,8 @@ impl<'a> Frame<'a> {
     }
 }
 
-/// Displacements at the deepest increment of both; at the needle's depth by what they are at small ones, where there is none.
+/// Displacements at the deepest increment of both; at the needle's depth by what they are at small ones, where there is
+/// none.
 fn at_common_depth(
     body: (&SpaceStatic, [f64; 3]),
     slice: &StaticStudy,

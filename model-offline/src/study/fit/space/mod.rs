@@ -1,14 +1,14 @@
-//! The fewest dimensions and paddles that a scene in space needs: the plane-strain slice through needle and target against the
-//! body, and one paddle against two.
+//! The fewest dimensions and paddles that a scene in space needs: the plane-strain slice through needle and target
+//! against the body, and one paddle against two.
 //!
 //! 1. **Body**: quadratic tetrahedra within the tolerance (or the scene's own spacing or level), every paddle and pair.
-//! 2. **Slice**: the plane through needle, target and the best single paddle of the body, or the next best that makes a slice
-//!    with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within the same tolerance.
-//! 3. **Dimension**: the slice will do where all that it says of the best paddle is within the tolerance of the body: how far a
-//!    correction from its Jacobian moves the target (λ, which should be 1), what that moves across the plane, what the insertion
-//!    moves across the plane, and which paddle is the best.
-//! 4. **Paddles**: one will do where, within its limits, it leaves no more than the tolerance of what the target moves by without
-//!    help, and a table that knows of no inclusions still leads to the right side.
+//! 2. **Slice**: the plane through needle, target and the best single paddle of the body, or the next best that makes a
+//!    slice with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within the same tolerance.
+//! 3. **Dimension**: the slice will do where all that it says of the best paddle is within the tolerance of the body:
+//!    how far a correction from its Jacobian moves the target (λ, which should be 1), what that moves across the plane,
+//!    what the insertion moves across the plane, and which paddle is the best.
+//! 4. **Paddles**: one will do where, within its limits, it leaves no more than the tolerance of what the target moves
+//!    by without help, and a table that knows of no inclusions still leads to the right side.
 //!
 //! No decision looks at a clock.
 
@@ -81,8 +81,8 @@ pub struct SliceInBody {
     pub optimum: BestPaddles,
     /// The target without help, in both.
     pub without_help: WithoutHelp,
-    /// The insertion into the body with the body's best paddle (where the slice has it, else the slice's own) by the slice's table; none
-    /// where it cannot be followed.
+    /// The insertion into the body with the body's best paddle (where the slice has it, else the slice's own) by the
+    /// slice's table; none where it cannot be followed.
     pub closed_loop: Option<ClosedLoop>,
 }
 
@@ -126,8 +126,8 @@ pub struct SpaceFit {
 /// [`SpaceStudy::run`].
 ///
 /// # Errors
-/// [`ModelError`](crate::ModelError) when the body cannot be modelled within the tolerance, or no paddle controls the target. A slice that there is
-/// not, or that cannot be modelled, is a result.
+/// [`ModelError`](crate::ModelError) when the body cannot be modelled within the tolerance, or no paddle
+/// controls the target. A slice that there is not, or that cannot be modelled, is a result.
 pub fn fit_in_space(
     scene: &SpaceScene,
     text: &str,
@@ -197,8 +197,8 @@ fn beside(
     })
 }
 
-/// The slice through the best paddle and its study, or why there is none. Where that plane makes no slice, the first that has the
-/// best paddle of those through the others, from the next best on; where none has, the first.
+/// The slice through the best paddle and its study, or why there is none. Where that plane makes no slice, the first
+/// that has the best paddle of those through the others, from the next best on; where none has, the first.
 fn sliced(scene: &SpaceScene, text: &str, best: &[u32], threads: usize) -> Result<(Slice, PlacementStudy), String> {
     let mut first: Option<Result<Slice, SliceError>> = None;
     for paddle in best {

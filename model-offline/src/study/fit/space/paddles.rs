@@ -17,8 +17,8 @@ pub struct PaddleSet {
     pub paddles: Vec<u32>,
     /// 1/σ_min(NᵀJ).
     pub measure: f64,
-    /// Largest displacement of a paddle that takes the target's displacement by the insertion back to the needle's line, length
-    /// units, by the Jacobian at rest.
+    /// Largest displacement of a paddle that takes the target's displacement by the insertion back to the needle's
+    /// line, length units, by the Jacobian at rest.
     pub stroke: f64,
     /// The same over the paddles' limit, `max_displacement`.
     pub stroke_over_limit: f64,
@@ -30,8 +30,8 @@ pub struct PaddleSet {
     pub worst_over_limit: f64,
     /// Displacement of the paddles, root mean square, per standard deviation of a sensor's noise in each direction.
     pub noise_gain: f64,
-    /// Largest |1 − λ| of a table that knows of no inclusions; none where there are none. From 1 on corrections may lead to the
-    /// wrong side.
+    /// Largest |1 − λ| of a table that knows of no inclusions; none where there are none. From 1 on corrections may
+    /// lead to the wrong side.
     pub without_knowing: Option<f64>,
 }
 

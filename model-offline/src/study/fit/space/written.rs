@@ -10,8 +10,8 @@ use std::fmt::Write as _;
 const NONE: &str = "–";
 
 impl SpaceFit {
-    /// The scene file of what is needed: the slice's, or the text of the scene in space with the body's discretization in it, and
-    /// without pairs where one paddle will do.
+    /// The scene file of what is needed: the slice's, or the text of the scene in space with the body's discretization
+    /// in it, and without pairs where one paddle will do.
     ///
     /// # Errors
     /// What the text does not parse as; a scene that was read before always does.
