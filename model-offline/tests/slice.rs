@@ -269,6 +269,7 @@ fn plane_strain_will_do_for_a_long_prism() {
     println!("{followed:?} {estimated:?}");
     assert!(apart < 0.05 && followed.converges && followed.with_feedback.in_plane.abs() < 2e-3 * followed.without_help);
     assert!(followed.table_alone.whole() < 0.15 * followed.without_help);
+    assert!(followed.with_feedback.across_plane.abs() < 0.01 * slice.without_help.body_axial);
     // What is written is the slice.
     let text = fit.written(&scene(PRISM), PRISM).unwrap();
     assert_eq!(Scene::parse(&text, "written.toml").unwrap().paddles.len(), 2);

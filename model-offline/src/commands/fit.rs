@@ -16,34 +16,44 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 pub(super) struct FitArgs {
     #[command(flatten)]
-    pub(super) scene: SceneArgs,
+    scene: SceneArgs,
     /// Relative error of controllability and target displacement to keep. Of a needle that slips, tissue that creeps and a
     /// patient that moves, what changes less than 0.15 of it is left out.
     #[arg(long, value_name = "T")]
-    pub(super) tolerance: f64,
+    tolerance: f64,
     /// Write the scene with the choice in it.
     #[arg(short, long, value_name = "FILE")]
-    pub(super) output: Option<PathBuf>,
+    output: Option<PathBuf>,
     /// Write the choice and what was rejected as JSON.
     #[arg(long, value_name = "FILE")]
-    pub(super) json: Option<PathBuf>,
+    json: Option<PathBuf>,
     /// Of a scene in space: draw every paddle's measure in body and slice.
     #[arg(long, value_name = "FILE")]
-    pub(super) svg: Option<PathBuf>,
+    svg: Option<PathBuf>,
     /// Of a scene in space: write the slice through needle and target, a planar scene.
     #[arg(long, value_name = "FILE")]
-    pub(super) write_slice: Option<PathBuf>,
+    write_slice: Option<PathBuf>,
     /// Threads to use for training (default: all). Times are those of one thread.
     #[arg(long)]
-    pub(super) threads: Option<usize>,
+    threads: Option<usize>,
     /// No summary.
     #[arg(long)]
-    pub(super) quiet: bool,
+    quiet: bool,
 }
 
 pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
     if let Some(scene) = args.scene.read_in_space()? {
-        return fit_space::run(&scene, args);
+        let asked = fit_space::Asked {
+            scene: &args.scene,
+            tolerance: args.tolerance,
+            output: args.output.as_deref(),
+            json: args.json.as_deref(),
+            svg: args.svg.as_deref(),
+            write_slice: args.write_slice.as_deref(),
+            threads: args.threads,
+            quiet: args.quiet,
+        };
+        return fit_space::run(&scene, &asked);
     }
     let given = [("--svg", &args.svg), ("--write-slice", &args.write_slice)];
     if let Some((option, _)) = given.into_iter().find(|(_, file)| file.is_some()) {

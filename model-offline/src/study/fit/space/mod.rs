@@ -6,7 +6,7 @@
 //!    slice with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within the same tolerance.
 //! 3. **Dimension**: the slice will do where all that it says of the best paddle is within the tolerance of the body:
 //!    how far a correction from its Jacobian moves the target (λ, which should be 1), what that moves across the plane,
-//!    what the insertion moves across the plane, and which paddle is the best.
+//!    what the insertion moves across the plane, what a loop by its table leaves there, and which paddle is the best.
 //! 4. **Paddles**: one will do where, within its limits, it leaves no more than the tolerance of what the target moves
 //!    by without help, and a table that knows of no inclusions still leads to the right side.
 //!

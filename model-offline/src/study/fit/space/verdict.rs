@@ -74,6 +74,12 @@ pub enum ReasonInSpace {
     /// The way of the target without help.
     #[error("of the target's displacement without help: by so much the slice is off")]
     WithoutHelp(f64),
+    /// What the slice's controller leaves across the plane.
+    #[error("of the target's displacement without help is left by the slice's table with feedback")]
+    ClosedLoop(f64),
+    /// Corrections by the slice's table do not end.
+    #[error("corrections by the slice's table do not converge in the body")]
+    Diverges,
     /// Another paddle is the best in the slice.
     #[error("longer way in the body of paddle {0}, the best in the slice")]
     OtherOptimum(u32, f64),
@@ -106,12 +112,13 @@ impl ReasonInSpace {
     /// The number that rejects; none where there is only a failure.
     pub fn number(&self) -> Option<f64> {
         match *self {
-            Self::NoSlice(_) | Self::BestMissing(_) => None,
+            Self::NoSlice(_) | Self::BestMissing(_) | Self::Diverges => None,
             Self::Gain { mismatch: number, .. }
             | Self::Across { part: number, .. }
             | Self::NotNeeded { shorter: number, .. }
             | Self::OtherOptimum(_, number)
             | Self::WithoutHelp(number)
+            | Self::ClosedLoop(number)
             | Self::Dearer(number)
             | Self::AtLimit(number)
             | Self::TooSlow(number)
@@ -231,6 +238,14 @@ fn against_slice(fit: &SpaceFit) -> Vec<ReasonInSpace> {
     if is_wrong(off) {
         against.push(ReasonInSpace::WithoutHelp(off));
     }
+    match &slice.closed_loop {
+        Some(followed) if !followed.converges => against.push(ReasonInSpace::Diverges),
+        Some(followed) => {
+            let left = followed.with_feedback.whole() / largest_way(slice);
+            against.extend(is_wrong(left).then_some(ReasonInSpace::ClosedLoop(left)));
+        }
+        None => {}
+    }
     if let Some(other) = slice.optimum.dynamic.filter(|other| Some(*other) != best) {
         let measure = |index: Option<u32>| fit.paddles.iter().find(|p| Some(p.index) == index).map(|p| p.body);
         let longer = measure(Some(other)).zip(measure(best)).map_or(f64::INFINITY, |(other, best)| other / best - 1.0);
@@ -245,7 +260,11 @@ fn against_slice(fit: &SpaceFit) -> Vec<ReasonInSpace> {
 fn off_without_help(slice: &SliceInBody) -> f64 {
     let way = slice.without_help;
     let apart = [way.body_in_plane - way.slice_in_plane, way.body_across_plane, way.body_axial - way.slice_axial];
-    let largest =
-        [way.body_in_plane, way.body_across_plane, way.body_axial].map(f64::abs).into_iter().fold(0.0, f64::max);
-    apart.map(f64::abs).into_iter().fold(0.0, f64::max) / largest
+    apart.map(f64::abs).into_iter().fold(0.0, f64::max) / largest_way(slice)
+}
+
+/// The largest part of the target's displacement without help in the body.
+fn largest_way(slice: &SliceInBody) -> f64 {
+    let way = slice.without_help;
+    [way.body_in_plane, way.body_across_plane, way.body_axial].map(f64::abs).into_iter().fold(0.0, f64::max)
 }
