@@ -55,7 +55,7 @@ const HOST_SIM: [(&str, &str); 17] = [
     ("man", "OUT/man"),
     ("report", "IN/report"),
 ];
-const MODEL_OFFLINE: [(&str, &str); 16] = [
+const MODEL_OFFLINE: [(&str, &str); 17] = [
     ("place", "paper --quiet --json OUT/a.json"),
     ("check", "paper --json OUT/a.json"),
     ("draw", "IN/report/result.json -o OUT/a.svg"),
@@ -66,6 +66,7 @@ const MODEL_OFFLINE: [(&str, &str); 16] = [
     ("pareto", "paper --quick --out OUT/pareto"),
     ("sweep", "paper --out OUT/sweep"),
     ("fit", "paper --tolerance 0.1 -o OUT/a.toml"),
+    ("slice", "block -o OUT/a.toml --json OUT/b.json"),
     ("compare", "paper --json OUT/a.json --csv OUT/a.csv --svg OUT/a.svg"),
     ("new", "-o OUT/a.toml"),
     ("completions", "bash"),

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
     /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, breast-world, prostate, prostate-world,
-    /// tethered; in space, for `check`, `solve`, `place` and `table`: block, mound, scan).
+    /// tethered; in space, for `check`, `solve`, `place`, `table`, `slice` and `fit`: block, mound, scan).
     pub(super) scene: PathBuf,
     /// Leave the inclusions out: homogeneous tissue.
     #[arg(long)]

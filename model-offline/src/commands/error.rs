@@ -9,6 +9,7 @@ use model_offline::scene::{LimitError, Scene, SceneError, TissueVariant};
 use model_offline::solver::equilibrium::Failure;
 use model_offline::study::effects::EffectsError;
 use model_offline::study::fit::FitError;
+use model_offline::study::slice::SliceError;
 use model_offline::table::TableBuildError;
 use std::path::{Path, PathBuf};
 
@@ -67,6 +68,9 @@ pub(crate) enum CliError {
          where the law loses stability, add a barrier to the material"
     ))]
     World(FitError),
+    /// There is no slice of the scene.
+    #[error(transparent)]
+    Slice(SliceError),
     /// A file could not be written.
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -113,6 +117,16 @@ impl From<FitError> for CliError {
     }
 }
 
+impl From<SliceError> for CliError {
+    fn from(error: SliceError) -> Self {
+        match error {
+            SliceError::Model(error) => Self::Model(error),
+            SliceError::NoSuchPaddle(error) => Self::Model(error.into()),
+            other => Self::Slice(other),
+        }
+    }
+}
+
 impl From<LimitError> for CliError {
     fn from(error: LimitError) -> Self {
         // Scenes are checked when they are read: it is the option of that name.
@@ -129,6 +143,7 @@ impl CliError {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
+            Self::Slice(SliceError::NotFree { .. } | SliceError::OnLine { .. }) => 2,
             Self::Model(error) if error.is_usage() => 2,
             Self::Table(TableBuildError::Knots(_)) => 2,
             Self::Needle(NeedleError::HeldWeakly) | Self::Picture(PictureError::Format { .. }) | Self::Result(_) => 2,
@@ -143,6 +158,7 @@ impl CliError {
             Self::Needle(NeedleError::Equilibrium { source, .. }) => source.reason.to_string(),
             Self::Needle(_) => "no-shaft-forces".into(),
             Self::World(_) => "no-insertion".into(),
+            Self::Slice(_) => "no-slice".into(),
             Self::Table(_) => "no-table".into(),
             Self::Output(_) | Self::Picture(_) => "not-written".into(),
             Self::Result(_) => "bad-input".into(),

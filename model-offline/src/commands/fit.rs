@@ -1,7 +1,8 @@
-//! `model-offline fit`: the smallest model that keeps a tolerance, and the fewest of the scene's effects.
+//! `model-offline fit`: the smallest model that keeps a tolerance, and the fewest of the scene's effects or dimensions.
 
 use super::common::SceneArgs;
 use super::error::CliError;
+use super::fit_space;
 use super::json::write_json;
 use model_offline::discretization::Resolution;
 use model_offline::output;
@@ -26,6 +27,12 @@ pub(super) struct FitArgs {
     /// Write the choice and what was rejected as JSON.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Of a scene in space: draw every paddle's measure in body and slice.
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Of a scene in space: write the slice through needle and target, a planar scene.
+    #[arg(long, value_name = "FILE")]
+    write_slice: Option<PathBuf>,
     /// Threads to use for training (default: all). Times are those of one thread.
     #[arg(long)]
     threads: Option<usize>,
@@ -35,6 +42,26 @@ pub(super) struct FitArgs {
 }
 
 pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
+    if let Some(scene) = args.scene.read_in_space()? {
+        let asked = fit_space::Asked {
+            scene: &args.scene,
+            tolerance: args.tolerance,
+            output: args.output.as_deref(),
+            json: args.json.as_deref(),
+            svg: args.svg.as_deref(),
+            write_slice: args.write_slice.as_deref(),
+            threads: args.threads,
+            quiet: args.quiet,
+        };
+        return fit_space::run(&scene, &asked);
+    }
+    let given = [("--svg", &args.svg), ("--write-slice", &args.write_slice)];
+    if let Some((option, _)) = given.into_iter().find(|(_, file)| file.is_some()) {
+        return Err(CliError::usage(
+            format!("{option} is for scenes in space, whose slice is planar"),
+            "leave it out: this scene is planar",
+        ));
+    }
     let mut scene = args.scene.read_any()?;
     scene.discretization.resolution = match scene.discretization.resolution {
         Resolution::Spacing(h) => Resolution::Spacing(h),

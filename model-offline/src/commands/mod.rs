@@ -8,6 +8,7 @@ mod completions;
 mod draw;
 mod error;
 mod fit;
+mod fit_space;
 mod inspect;
 mod json;
 mod man;
@@ -18,6 +19,7 @@ mod place;
 mod place_space;
 mod place_text;
 mod schema;
+mod slice;
 mod solve;
 mod solve_space;
 mod stability;
@@ -70,11 +72,14 @@ enum Command {
     #[command(after_help = "Example:\n  model-offline sweep paper --without-inclusion --out charts")]
     Sweep(sweep::SweepArgs),
     /// The smallest model that keeps a tolerance, chosen from the cheapest up, and the fewest of the scene's effects (shaft,
-    /// creep, breathing); what was rejected, and by which number.
+    /// creep, breathing), or in space of its dimensions and paddles; what was rejected, and by which number.
     #[command(
-        after_help = "Examples:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json\n  model-offline fit breast-world --tolerance 0.02 -o fitted.toml"
+        after_help = "Examples:\n  model-offline fit paper --tolerance 0.01 -o fitted.toml --json fit.json\n  model-offline fit breast-world --tolerance 0.02 -o fitted.toml\n  model-offline fit block --tolerance 0.15 --svg both.svg"
     )]
     Fit(fit::FitArgs),
+    /// The planar scene that a plane through needle and target cuts of a scene in space.
+    #[command(after_help = "Example:\n  model-offline slice block -o plane.toml && model-offline place plane.toml")]
+    Slice(slice::SliceArgs),
     /// Which effects a scene needs: what a needle that slips, tissue that creeps and a patient that breathes add.
     #[command(after_help = "Example:\n  model-offline compare breast --svg effects.svg")]
     Compare(compare::CompareArgs),
@@ -117,6 +122,7 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
         Command::Pareto(args) => pareto::run(&args),
         Command::Sweep(args) => sweep::run(&args),
         Command::Fit(args) => fit::run(&args),
+        Command::Slice(args) => slice::run(&args),
         Command::Compare(args) => compare::run(&args),
         Command::New(args) => new::run(&args),
         Command::Completions(args) => completions::run(&args, &mut Cli::command()),
@@ -178,7 +184,7 @@ mod tests {
     use std::path::Path;
 
     /// How each command that takes numbers is called with everything that it needs; outputs are in `OUT`.
-    const CALLS: [(&str, &str); 12] = [
+    const CALLS: [(&str, &str); 13] = [
         ("place", "paper"),
         ("check", "paper"),
         ("draw", "result.json -o OUT/a.svg"),
@@ -188,6 +194,7 @@ mod tests {
         ("pareto", "paper --out OUT/pareto"),
         ("sweep", "paper --out OUT/sweep"),
         ("fit", "paper --tolerance 0.1 -o OUT/a.toml"),
+        ("slice", "block -o OUT/a.toml"),
         ("compare", "paper"),
         ("new", "-o OUT/a.toml"),
         ("schema", ""),

@@ -14,6 +14,6 @@ pub use measures::{Nearest, nearest_on_loop};
 pub use point::{Point, Point2, box_of, cross};
 pub use polygon::{
     Location, Polygon, PolygonError, bounds, clip_half_plane, distance_to_polyline, distance_to_segment, overlap_area,
-    segments_meet, shared_area, signed_area,
+    segments_meet, shared_area, signed_area, simplified_line, simplified_loop,
 };
 pub use solid::Solid;

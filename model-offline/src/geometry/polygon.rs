@@ -168,6 +168,49 @@ pub fn distance_to_polyline(p: Point2, polyline: &[Point2]) -> f64 {
     polyline.windows(2).map(|s| distance_to_segment(p, s[0], s[1])).fold(f64::INFINITY, f64::min)
 }
 
+/// A closed loop without vertices that lie within `tolerance` (length) of the line between others (Ramer, Douglas and
+/// Peucker).
+pub fn simplified_loop(points: &[Point2], tolerance: f64) -> Vec<Point2> {
+    let mut open: Vec<Point2> = points.to_vec();
+    while open.len() > 1 && (open[0] - open[open.len() - 1]).norm() <= 1e-9 * tolerance.max(f64::MIN_POSITIVE) {
+        open.pop();
+    }
+    // Two far corners split the loop into two open lines. Both are corners: the lowest-left and the one farthest away.
+    let first =
+        (0..open.len()).min_by(|&a, &b| (open[a].x + open[a].y).total_cmp(&(open[b].x + open[b].y))).unwrap_or(0);
+    open.rotate_left(first);
+    let far =
+        (0..open.len()).max_by(|&a, &b| (open[a] - open[0]).norm().total_cmp(&(open[b] - open[0]).norm())).unwrap_or(0);
+    let mut kept = simplified_line(&open[..=far], tolerance);
+    kept.pop();
+    let back: Vec<Point2> = open[far..].iter().chain(open.first()).copied().collect();
+    kept.extend(simplified_line(&back, tolerance));
+    kept.pop();
+    kept
+}
+
+/// The points of an open line that matter, ends included: the others lie within `tolerance` (length) of it (Ramer,
+/// Douglas and Peucker).
+pub fn simplified_line(line: &[Point2], tolerance: f64) -> Vec<Point2> {
+    let Some(end) = line.len().checked_sub(1) else {
+        return Vec::new();
+    };
+    // Not recursive: lines from files may be long.
+    let mut matters = vec![false; line.len()];
+    (matters[0], matters[end]) = (true, true);
+    let mut open = vec![(0, end)];
+    while let Some((from, to)) = open.pop() {
+        let off = |i: usize| distance_to_segment(line[i], line[from], line[to]);
+        if let Some(i) = (from + 1..to).max_by(|&a, &b| off(a).total_cmp(&off(b)))
+            && off(i) > tolerance
+        {
+            matters[i] = true;
+            open.extend([(from, i), (i, to)]);
+        }
+    }
+    line.iter().zip(matters).filter_map(|(p, matters)| matters.then_some(*p)).collect()
+}
+
 /// Signed area of a closed loop of vertices (positive when counter-clockwise).
 pub fn signed_area(vertices: &[Point2]) -> f64 {
     let n = vertices.len();
@@ -339,6 +382,16 @@ mod tests {
 
     fn polygon(v: &[[f64; 2]]) -> Result<Polygon, PolygonError> {
         Polygon::new(v.iter().map(|p| Point2::new(p[0], p[1])).collect())
+    }
+
+    #[test]
+    fn a_square_with_points_on_its_edges_keeps_its_four_corners() {
+        let edge = |a: [f64; 2], b: [f64; 2]| {
+            (0..10).map(move |i| Point2::from(a) + (Point2::from(b) - Point2::from(a)) * (f64::from(i) / 10.0))
+        };
+        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+        let points: Vec<Point2> = (0..4).flat_map(|i| edge(corners[i], corners[(i + 1) % 4])).collect();
+        assert_eq!(simplified_loop(&points, 1e-3), corners.map(Point2::from));
     }
 
     #[test]

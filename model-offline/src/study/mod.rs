@@ -10,6 +10,7 @@ pub mod measurement;
 pub mod pareto;
 mod pareto_chart;
 pub mod pareto_space;
+pub mod slice;
 pub mod stability;
 pub mod sweep;
 

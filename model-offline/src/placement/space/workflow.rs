@@ -183,7 +183,7 @@ impl Reference {
     fn within(scene: &SpaceScene, open: f64) -> Result<Self, ModelError> {
         let scene = scene.with_method(Method::new(Integration::FemT10));
         let mut reached = f64::INFINITY;
-        let mut coarser: Option<Vec<SpaceResponse>> = None;
+        let mut coarser: Option<(usize, Vec<SpaceResponse>)> = None;
         for level in *LEVELS.start() - 1..=*LEVELS.end() {
             let (model, rest) = match at_level(&scene, level) {
                 Ok(found) => found,
@@ -192,7 +192,11 @@ impl Reference {
                 Err(_) if coarser.is_none() && level <= *LEVELS.start() => continue,
                 Err(error) => return Err(error),
             };
-            if let Some(coarser) = &coarser {
+            if let Some((nodes, coarser)) = &coarser {
+                // Where a body is too thin for a level's sizes to change anything, nothing is learnt from it.
+                if *nodes == model.nodes() {
+                    continue;
+                }
                 let errors = estimates(distances(coarser, &rest));
                 let estimate = worst(&errors);
                 if estimate <= open {
@@ -200,7 +204,7 @@ impl Reference {
                 }
                 reached = reached.min(estimate);
             }
-            coarser = Some(rest);
+            coarser = Some((model.nodes(), rest));
         }
         Err(ModelError::ToleranceNotReached { tolerance: open, reached })
     }

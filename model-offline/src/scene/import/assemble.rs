@@ -2,9 +2,9 @@
 
 use super::along::Along;
 use super::role::{ROLES, Role};
-use super::shape::{DETAIL, Shape, simplified};
+use super::shape::{DETAIL, Shape};
 use super::{ImportError, ImportOptions, Imported, ImportedInclusion, Summary, parts};
-use crate::geometry::{Location, Point2, Polygon, bounds, shared_area};
+use crate::geometry::{Location, Point2, Polygon, bounds, shared_area, simplified_loop};
 use crate::material::Preset;
 use crate::number::{in_unit, short};
 use std::collections::BTreeSet;
@@ -131,7 +131,7 @@ impl Frame {
         if own < 1e3 * self.step {
             return Err("it encloses no area".to_owned());
         }
-        let mut rounded = simplified(points, DETAIL * self.longer.min(4.0 * own));
+        let mut rounded = simplified_loop(points, DETAIL * self.longer.min(4.0 * own));
         rounded.iter_mut().for_each(|p| *p = self.rounded(*p));
         if rounded.len() < 3 {
             return Err("it encloses no area".to_owned());

@@ -1,7 +1,7 @@
 //! Shapes as a file gives them, before the scene makes anything of them.
 
 use super::role::{Meaning, Role};
-use crate::geometry::{Point2, bounds, distance_to_segment, signed_area};
+use crate::geometry::{Point2, bounds, signed_area};
 use crate::material::Preset;
 
 /// Details below this part of the body's size are left out: nothing that a node spacing of a few percent could show.
@@ -69,59 +69,9 @@ impl Shape {
     }
 }
 
-/// A closed loop without vertices that lie on the line between others (Ramer, Douglas and Peucker).
-pub(super) fn simplified(points: &[Point2], tolerance: f64) -> Vec<Point2> {
-    let mut open: Vec<Point2> = points.to_vec();
-    while open.len() > 1 && (open[0] - open[open.len() - 1]).norm() <= 1e-9 * tolerance.max(f64::MIN_POSITIVE) {
-        open.pop();
-    }
-    // Two far corners split the loop into two open lines. Both are corners: the lowest-left and the one farthest away.
-    let first =
-        (0..open.len()).min_by(|&a, &b| (open[a].x + open[a].y).total_cmp(&(open[b].x + open[b].y))).unwrap_or(0);
-    open.rotate_left(first);
-    let far =
-        (0..open.len()).max_by(|&a, &b| (open[a] - open[0]).norm().total_cmp(&(open[b] - open[0]).norm())).unwrap_or(0);
-    let mut kept = keep(&open[..=far], tolerance);
-    kept.pop();
-    let back: Vec<Point2> = open[far..].iter().chain(open.first()).copied().collect();
-    kept.extend(keep(&back, tolerance));
-    kept.pop();
-    kept
-}
-
-/// The points of an open line that matter, ends included. Not recursive: lines from files may be long.
-fn keep(line: &[Point2], tolerance: f64) -> Vec<Point2> {
-    let Some(end) = line.len().checked_sub(1) else {
-        return Vec::new();
-    };
-    let mut matters = vec![false; line.len()];
-    (matters[0], matters[end]) = (true, true);
-    let mut open = vec![(0, end)];
-    while let Some((from, to)) = open.pop() {
-        let off = |i: usize| distance_to_segment(line[i], line[from], line[to]);
-        if let Some(i) = (from + 1..to).max_by(|&a, &b| off(a).total_cmp(&off(b)))
-            && off(i) > tolerance
-        {
-            matters[i] = true;
-            open.extend([(from, i), (i, to)]);
-        }
-    }
-    line.iter().zip(matters).filter_map(|(p, matters)| matters.then_some(*p)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_square_with_points_on_its_edges_keeps_its_four_corners() {
-        let edge = |a: [f64; 2], b: [f64; 2]| {
-            (0..10).map(move |i| Point2::from(a) + (Point2::from(b) - Point2::from(a)) * (f64::from(i) / 10.0))
-        };
-        let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
-        let points: Vec<Point2> = (0..4).flat_map(|i| edge(corners[i], corners[(i + 1) % 4])).collect();
-        assert_eq!(simplified(&points, 1e-3), corners.map(Point2::from));
-    }
 
     #[test]
     fn a_thin_shape_has_the_ends_of_its_length() {

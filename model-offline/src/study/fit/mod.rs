@@ -28,6 +28,7 @@ mod error;
 mod plant;
 mod rejection;
 mod search;
+pub mod space;
 mod table;
 mod world;
 mod written;
