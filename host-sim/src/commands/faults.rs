@@ -39,7 +39,7 @@ pub(crate) struct FaultsArgs {
     /// Part of the repetitions of rows 33, 35, 36 and 37 (200 kills, 100 kills, 100 cycles, 200 visits)
     #[arg(long, default_value_t = 1.0, value_name = "PART")]
     pub(crate) effort: f64,
-    /// Instead, switch off one monitor of the controller after the other, and show which rows of 1 to 32 notice
+    /// Instead, switch off one monitor of the controller after the other, and show which rows in lockstep notice
     #[arg(long, conflicts_with_all = ["only", "seeds", "effort", "out"])]
     pub(crate) monitors_off: bool,
     /// Write faults.csv and faults.json into this directory

@@ -172,6 +172,29 @@ mod tests {
         every_lockstep_row_holds(&brick_table().unwrap(), 1);
     }
 
+    /// With what tells the paddles apart, or their following monitor, off: those rows fail that are there for it.
+    #[test]
+    fn rows_of_two_paddles_notice_what_is_theirs() {
+        let (table, rows) = (brick_table().unwrap(), rows::<3, 2, 2>());
+        for (id, off) in [
+            (46, Faults::SECOND_PADDLE),
+            (46, Faults::PADDLE_STALE),
+            (47, Faults::FROZEN),
+            (48, Faults::SECOND_PADDLE),
+            (50, Faults::FOLLOWING_ERROR),
+            (51, Faults::FOLLOWING_ERROR),
+        ] {
+            let row = rows.iter().find(|row| row.id == id).unwrap();
+            let evidence = row.run_without(off, &table, 1).unwrap().unwrap();
+            assert_eq!(evidence.verdict(), RowVerdict::Failed, "row {id} without {off}");
+        }
+        assert_eq!(catalogue_length::<2, 1, 1>(), 45, "rows of two paddles are not for one");
+    }
+
+    fn catalogue_length<const D: usize, const N: usize, const P: usize>() -> usize {
+        rows::<D, N, P>().len()
+    }
+
     fn every_lockstep_row_holds<const D: usize, const N: usize, const P: usize>(
         table: &Table<f64, D, N, P>,
         seeds: u64,

@@ -47,7 +47,8 @@ pub fn monitors_off<const D: usize, const N: usize, const P: usize>(
         .map(|row| Ok(holds(row, Faults::NONE)?.then_some(row)))
         .filter_map(Result::transpose)
         .collect::<Result<_, SimError>>()?;
-    let monitors = Faults::NAMES.iter().filter(|(code, _)| NO_MONITORS.intersection(*code).is_empty());
+    let none = if P > 1 { NO_MONITORS } else { NO_MONITORS | Faults::SECOND_PADDLE };
+    let monitors = Faults::NAMES.iter().filter(|(code, _)| none.intersection(*code).is_empty());
     monitors
         .map(|(code, _)| {
             crate::runtime::signals::check()?;
