@@ -138,6 +138,23 @@ fn forged<const D: usize, const N: usize, const P: usize>(
 /// What is made of a table.
 type Change<const D: usize, const N: usize, const P: usize> = fn(&mut Table<f64, D, N, P>);
 
+/// Impossible numbers of the last paddle, and directions: in the plane, which has one of each, others stand for them.
+fn of_the_last_paddle<const D: usize, const N: usize, const P: usize>() -> [(&'static str, Change<D, N, P>); 6] {
+    [
+        ("NaN in the last Jacobian", |table| table.knots[1].jacobian[P - 1][(D - 1, D - 1)] = f64::NAN),
+        ("NaN in the last path", |table| table.knots[1].paddle_path[(D - 1, P - 1)] = f64::NAN),
+        ("path beyond the last limit", |table| {
+            table.knots[1].paddle_path[(D - 1, P - 1)] = 1.1 * table.paddles[P - 1].max_displacement;
+        }),
+        ("negative rate of the last paddle", |table| table.paddles[P - 1].max_rate = -1.0),
+        ("last paddle far away", |table| table.paddles[P - 1].extent[0][D - 1] = 1e300),
+        ("directions that are not orthogonal", |table| {
+            let axis = table.needle_axis;
+            table.orthogonal.set_column(N - 1, &axis);
+        }),
+    ]
+}
+
 /// Row 29: a valid checksum over numbers that cannot be: NaN, unsorted, huge sizes, and every single-bit flip sealed
 /// again. What is accepted has all invariants.
 pub(crate) fn impossible<const D: usize, const N: usize, const P: usize>(
@@ -173,21 +190,7 @@ pub(crate) fn impossible<const D: usize, const N: usize, const P: usize>(
             table.paddles[0].max_rate = 200.0 * table.paddles[0].max_displacement
         }),
     ];
-    // The last paddle's: in space the second one.
-    let of_the_last: [(&str, Change<D, N, P>); 6] = [
-        ("NaN in the last Jacobian", |table| table.knots[1].jacobian[P - 1][(D - 1, D - 1)] = f64::NAN),
-        ("NaN in the last path", |table| table.knots[1].paddle_path[(D - 1, P - 1)] = f64::NAN),
-        ("path beyond the last limit", |table| {
-            table.knots[1].paddle_path[(D - 1, P - 1)] = 1.1 * table.paddles[P - 1].max_displacement;
-        }),
-        ("negative rate of the last paddle", |table| table.paddles[P - 1].max_rate = -1.0),
-        ("last paddle far away", |table| table.paddles[P - 1].extent[0][D - 1] = 1e300),
-        ("directions that are not orthogonal", |table| {
-            let axis = table.needle_axis;
-            table.orthogonal.set_column(N - 1, &axis);
-        }),
-    ];
-    let of_the_last = of_the_last.into_iter().filter(|_| D > 2);
+    let of_the_last = of_the_last_paddle().into_iter().filter(|_| D > 2);
     for (name, change) in cases.into_iter().chain(of_the_last) {
         let bytes = forged(trial, change)?;
         demand(evidence, refusal::<D, N, P>(&bytes), || name.to_owned());
