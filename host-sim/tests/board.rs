@@ -104,7 +104,7 @@ impl<'t> BoardPlant<'t> {
         let target = TargetSensor::new(20 * MS, 20 * MS, 1e-9, 1);
         let sensors = Sensors { target, encoders: Encoders::new(table.paddles[0].index) };
         let tissue = LinearTissue::new(table);
-        let uncontrolled = tissue.error(&tissue.target(depth_end, &Vector2::zeros())).abs();
+        let uncontrolled = tissue.error(&tissue.target(depth_end, &[Vector2::zeros()])).norm();
         Self { world: World::of(tissue, drive, [PaddleActuator::new(actuator)], sensors), tick: 0, uncontrolled }
     }
 
@@ -112,7 +112,7 @@ impl<'t> BoardPlant<'t> {
     fn advance(&mut self, command: Option<&PaddleCommand>) -> (f64, Inputs) {
         let (truth, inputs) = self.world.tick(self.tick, command, MS).unwrap();
         self.tick += 1;
-        (self.world.tissue.error(&truth.target()).abs(), inputs)
+        (self.world.tissue.error(&truth.target()).norm(), inputs)
     }
 }
 

@@ -7,12 +7,12 @@ use clap::Args;
 use firmware::Mode;
 use firmware::contract::Table;
 use host_sim::SimError;
-use host_sim::bench::faults::catalogue::ROWS;
+use host_sim::bench::faults::catalogue::rows;
 use host_sim::bench::faults::evidence::RowVerdict;
 use host_sim::bench::faults::monitors::{MonitorOff, monitors_off};
 use host_sim::bench::faults::random::{Composed, composed};
-use host_sim::bench::faults::report::{FaultsResult, RowResult};
-use host_sim::bench::paper_table::paper_table;
+use host_sim::bench::faults::report::{CatalogueMode, FaultsResult, RowResult};
+use host_sim::bench::paper_table::{brick_table, paper_table};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
@@ -24,6 +24,9 @@ use model_offline::output::check_outputs;
 /// Options of `faults`.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct FaultsArgs {
+    /// 2: one paddle in the plane; 3: two paddles on a small body in space, and rows 46 to 51 of their own
+    #[arg(long, default_value_t = 2, value_name = "D", value_parser = clap::value_parser!(u32).range(2..=3))]
+    pub(crate) dimension: u32,
     /// Only these rows [default: all]
     #[arg(long, value_name = "N,...", value_delimiter = ',')]
     pub(crate) only: Vec<u32>,
@@ -36,7 +39,7 @@ pub(crate) struct FaultsArgs {
     /// Part of the repetitions of rows 33, 35, 36 and 37 (200 kills, 100 kills, 100 cycles, 200 visits)
     #[arg(long, default_value_t = 1.0, value_name = "PART")]
     pub(crate) effort: f64,
-    /// Instead, switch off one monitor of the controller after the other, and show which rows of 1 to 32 notice
+    /// Instead, switch off one monitor of the controller after the other, and show which rows in lockstep notice
     #[arg(long, conflicts_with_all = ["only", "seeds", "effort", "out"])]
     pub(crate) monitors_off: bool,
     /// Write faults.csv and faults.json into this directory
@@ -60,8 +63,17 @@ const DEFAULT_SEEDS: u64 = 1000;
 pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     signals::install();
     EFFORT.check(args.effort)?;
-    if let Some(unknown) = args.only.iter().find(|id| !ROWS.iter().any(|row| row.id == **id)) {
-        return Err(UsageError::NoRow { row: *unknown, last: ROWS.len() }.into());
+    if args.dimension > 2 { tried_on(args, brick_table) } else { tried_on(args, paper_table) }
+}
+
+/// The same on the table that `made` makes.
+fn tried_on<const D: usize, const N: usize, const P: usize>(
+    args: &FaultsArgs,
+    made: impl FnOnce() -> Result<Table<f64, D, N, P>, SimError>,
+) -> Result<(), SimError> {
+    let rows = rows::<D, N, P>();
+    if let Some(unknown) = args.only.iter().find(|id| !rows.iter().any(|row| row.id == **id)) {
+        return Err(UsageError::NoRow { row: *unknown, last: rows.len() }.into());
     }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
@@ -69,13 +81,16 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
-    let table = signals::ends_at_once(paper_table)?;
+    let table = signals::ends_at_once(made)?;
     if args.monitors_off {
         return without_monitors(args, &table);
     }
     let mut result =
         FaultsResult { version: env!("CARGO_PKG_VERSION").to_owned(), seed: args.seed, ..FaultsResult::default() };
-    for row in ROWS.iter().filter(|row| args.only.is_empty() || args.only.contains(&row.id)) {
+    if D > 2 {
+        (result.dimension, result.mode) = (Some(args.dimension), CatalogueMode::InSpace);
+    }
+    for row in rows.iter().filter(|row| args.only.is_empty() || args.only.contains(&row.id)) {
         signals::check()?;
         let started = Instant::now();
         let row = RowResult::new(row, &row.run(&table, args.seed, args.effort)?);
@@ -93,14 +108,18 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     write(args, &result)?;
     let (failed, schedules) = (result.failed(), result.composed.as_ref().map_or(0, |sums| sums.failures.len()));
     if failed + schedules > 0 {
-        println!("seed {}: host-sim faults --seed {} shows it again", args.seed, args.seed);
+        let space = if D > 2 { " --dimension 3" } else { "" };
+        println!("seed {}: host-sim faults{space} --seed {} shows it again", args.seed, args.seed);
         return Err(SimError::Faults { failed, rows: result.rows.len(), schedules });
     }
     Ok(())
 }
 
 /// The table monitor × row.
-fn without_monitors(args: &FaultsArgs, table: &Table<f64, 2>) -> Result<(), SimError> {
+fn without_monitors<const D: usize, const N: usize, const P: usize>(
+    args: &FaultsArgs,
+    table: &Table<f64, D, N, P>,
+) -> Result<(), SimError> {
     let monitors = signals::ends_at_once(|| monitors_off(table, args.seed))?;
     for MonitorOff { monitor, rows } in &monitors {
         let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();

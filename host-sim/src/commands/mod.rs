@@ -86,7 +86,7 @@ pub(crate) enum Command {
     TimingPeer(PeerArgs),
     /// Injects every fault of the catalogue and accounts for everything
     #[command(
-        after_help = "Examples:\n  host-sim faults --out faults\n  host-sim faults --only 16,23 --seed 7\n  nice host-sim faults --only 1 --seeds 4000"
+        after_help = "Examples:\n  host-sim faults --out faults\n  host-sim faults --only 16,23 --seed 7\n  host-sim faults --dimension 3 --only 46,49\n  nice host-sim faults --only 1 --seeds 4000"
     )]
     Faults(FaultsArgs),
     /// Where the closed loop stops being stable: simulated beside theory

@@ -32,7 +32,11 @@ pub struct EncodedTable {
 ///
 /// # Errors
 /// [`SimError::TableUnits`].
-pub fn check_units(table: &Table<f64, 2>, path: &Path, expected: &[String; 2]) -> Result<(), SimError> {
+pub fn check_units<const D: usize, const N: usize, const P: usize>(
+    table: &Table<f64, D, N, P>,
+    path: &Path,
+    expected: &[String; 2],
+) -> Result<(), SimError> {
     let found = [table.units.length.as_str().to_owned(), table.units.stress.as_str().to_owned()];
     if found == *expected {
         return Ok(());

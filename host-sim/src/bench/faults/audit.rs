@@ -1,6 +1,6 @@
 //! What became of every sample, known from outside of the controller: its ledger has to agree.
 
-use firmware::State;
+use firmware::Ledger;
 use firmware::inputs::StreamLedger;
 
 use super::fault::Stream;
@@ -157,7 +157,7 @@ impl StreamAudit {
 /// Accounts of a whole bench.
 #[derive(Clone, Debug, Default)]
 pub struct Audit {
-    streams: [StreamAudit; 3],
+    streams: [StreamAudit; Stream::ALL.len()],
     /// Ticks of the controller by mode on the wire: HOLD, RUN, SAFE.
     pub modes: [u64; 3],
     /// Periods that the controller was not started in, by arithmetic of its own.
@@ -181,10 +181,9 @@ impl Audit {
     }
 
     /// Everything that is not in both accounts: the controller's and this one.
-    pub fn unaccounted(&self, state: &State<f64>) -> u64 {
-        let ledger = state.ledger();
-        let ledgers = [&ledger.needle, &ledger.target, &ledger.paddles[0]];
-        let samples: u64 = self.streams.iter().zip(ledgers).map(|(audit, ledger)| audit.unaccounted(ledger)).sum();
+    pub fn unaccounted(&self, ledger: &Ledger) -> u64 {
+        let of = |stream: &Stream| self.streams[*stream as usize].unaccounted(stream.account(ledger));
+        let samples: u64 = Stream::ALL.iter().map(of).sum();
         let ticks = &ledger.ticks;
         let [hold, run, safe] = self.modes;
         samples

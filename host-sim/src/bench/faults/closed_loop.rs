@@ -3,19 +3,19 @@
 //! The plant ticks every period. The controller follows its own [`Schedule`] in the same virtual time, so that a slow
 //! step makes it skip periods while the plant goes on.
 
-use firmware::contract::frames::to_plane;
 use std::collections::VecDeque;
 
+use firmware::contract::frames::MAX_PADDLES;
 use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
 use firmware::io::{CommandSink, SampleSource, run_tick};
 use firmware::schedule::Schedule;
 use firmware::{Controller, Faults, Inputs, Mode, Settings, SettingsError, State};
-use nalgebra::Vector2;
+use nalgebra::SVector;
 use rand_pcg::Pcg64;
 
 use super::audit::Audit;
 use super::fault::{Event, Fault, Stream};
-use super::invariants::Invariants;
+use super::invariants::{Invariants, positions};
 use super::seam::{Channel, see};
 use super::shuttle::ShuttleDrive;
 use super::tissue::LinearTissue;
@@ -32,7 +32,7 @@ const FAULT_STREAM: u128 = 7;
 
 /// What a bench is built from.
 #[derive(Clone, Copy, Debug)]
-pub struct Setup {
+pub struct Setup<const D: usize = 2, const P: usize = 1> {
     /// Settings of the controller.
     pub settings: Settings,
     /// Standard deviation of the target sensor, length.
@@ -41,65 +41,81 @@ pub struct Setup {
     pub speed: f64,
     /// Depth where the needle stops, length.
     pub depth_end: f64,
-    /// The paddle's actuator.
-    pub actuator: ActuatorModel,
+    /// The actuator of each paddle.
+    pub actuators: [ActuatorModel; P],
     /// First sequence number of needle and paddle samples.
     pub sequence: u32,
     /// Whether the needle turns back at the end of the table, again and again.
     pub shuttles: bool,
-    /// Where the paddle is before the controller starts, length.
-    pub paddle: [f64; 2],
+    /// Where the paddles are before the controller starts, length.
+    pub paddles: [SVector<f64, D>; P],
     /// Seed of all noise.
     pub seed: u64,
     /// Monitors of the controller that are off, to see that somebody notices.
     pub without: Faults,
 }
 
-impl Setup {
+impl<const D: usize, const P: usize> Setup<D, P> {
     /// A 1 kHz loop on `table` with the target at 50 Hz, 20 ms late; the insertion takes 5 s.
-    pub fn new(table: &Table<f64, 2>, seed: u64) -> Self {
+    pub fn new<const N: usize>(table: &Table<f64, D, N, P>, seed: u64) -> Self {
         const MS: u64 = 1_000_000;
         let depth = table.validity.depth_end;
         let noise = IDEAL_NOISE_PER_DEPTH * depth;
+        let servo = |max_rate| ActuatorModel { max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 };
         Self {
             settings: Settings { target_noise: noise, ..Settings::new(MS, 20 * MS, 20 * MS) },
             noise,
             speed: depth / 5.0,
             depth_end: depth,
-            actuator: ActuatorModel { max_rate: table.paddles[0].max_rate, lag_s: 0.0, delay_ticks: 0, gain: 1.0 },
+            actuators: table.paddles.each_ref().map(|paddle| servo(paddle.max_rate)),
             sequence: 0,
             shuttles: false,
-            paddle: [0.0; 2],
+            paddles: [SVector::zeros(); P],
             seed,
             without: Faults::NONE,
         }
     }
 }
 
-impl Setup {
-    /// Plant, needle, actuator and sensors of this set-up.
-    fn world<'t>(&self, table: &'t Table<f64, 2>) -> World<LinearTissue<'t>, ShuttleDrive> {
+impl<const D: usize, const P: usize> Setup<D, P> {
+    /// Plant, needle, actuators and sensors of this set-up.
+    fn world<'t, const N: usize>(&self, table: &'t Table<f64, D, N, P>) -> BenchWorld<'t, D, N, P> {
         let settings = &self.settings;
         let period_s = settings.loop_period_ns as f64 * 1e-9;
         let drive = ShuttleDrive::new(table, self.depth_end, self.speed, period_s);
         let drive = if self.shuttles { drive.to_and_fro() } else { drive };
-        let actuator = PaddleActuator::at(self.actuator, Vector2::from(self.paddle));
+        let actuators = self.actuators.iter().zip(&self.paddles).map(|(model, at)| PaddleActuator::at(*model, *at));
         let (period_ns, latency_ns) = (settings.target_period_ns, settings.target_latency_ns);
         let sensors = Sensors {
             target: TargetSensor::new(period_ns, latency_ns, self.noise, self.seed),
-            encoders: Encoders::new(table.paddles[0].index).starting_at(self.sequence),
+            encoders: Encoders::of(&table.paddles.each_ref().map(|paddle| paddle.index)).starting_at(self.sequence),
         };
-        World::of(LinearTissue::new(table), drive, [actuator], sensors)
+        World::of(LinearTissue::new(table), drive, actuators, sensors)
     }
 }
 
+/// The simulated world of a bench.
+type BenchWorld<'t, const D: usize, const N: usize, const P: usize> = World<LinearTissue<'t, D, N, P>, ShuttleDrive, D>;
+
 /// What the controller's traits see of the bench.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct BenchLink {
     needle: Channel<NeedleSample>,
     target: Channel<TargetSample>,
-    paddle: Channel<PaddleSample>,
+    paddles: [Channel<PaddleSample>; MAX_PADDLES],
     sent: Option<PaddleCommand>,
+}
+
+impl BenchLink {
+    /// Nothing has been sent in so many dimensions.
+    fn new(dimension: usize) -> Self {
+        Self {
+            needle: Channel::new(Stream::Needle, dimension),
+            target: Channel::new(Stream::Target, dimension),
+            paddles: Stream::PADDLES.map(|stream| Channel::new(stream, dimension)),
+            sent: None,
+        }
+    }
 }
 
 impl SampleSource for BenchLink {
@@ -110,7 +126,7 @@ impl SampleSource for BenchLink {
         self.target.take()
     }
     fn paddle(&mut self, place: usize) -> Option<PaddleSample> {
-        if place == 0 { self.paddle.take() } else { None }
+        self.paddles.get_mut(place)?.take()
     }
 }
 
@@ -124,16 +140,16 @@ impl CommandSink for BenchLink {
 
 /// The closed loop.
 #[derive(Debug)]
-pub struct ClosedLoop<'t> {
-    setup: Setup,
-    controller: Controller<'t, f64>,
+pub struct ClosedLoop<'t, const D: usize = 2, const N: usize = 1, const P: usize = 1> {
+    setup: Setup<D, P>,
+    controller: Controller<'t, f64, D, N, P>,
     /// State of the controller.
-    pub state: State<f64>,
+    pub state: State<f64, D, N, P>,
     schedule: Schedule,
     events: Vec<Event>,
     active: Vec<Fault>,
     tick: u64,
-    world: World<LinearTissue<'t>, ShuttleDrive>,
+    world: BenchWorld<'t, D, N, P>,
     random: Pcg64,
     link: BenchLink,
     /// Commands on their way, with the time when the step that gave them has ended, ns.
@@ -144,12 +160,12 @@ pub struct ClosedLoop<'t> {
     /// Accounts from outside of the controller.
     pub audit: Audit,
     /// What must hold on every tick.
-    pub invariants: Invariants,
+    pub invariants: Invariants<P>,
     /// Last exchange of the controller.
     pub last: Option<ControllerTick>,
-    /// Orthogonal error now, length.
-    pub error: f64,
-    /// Largest orthogonal error so far, length.
+    /// Orthogonal error now, along each direction, length.
+    pub error: SVector<f64, N>,
+    /// Largest norm of the orthogonal error so far, length.
     pub max_error: f64,
     /// Injections so far.
     pub injected: u64,
@@ -157,12 +173,12 @@ pub struct ClosedLoop<'t> {
     pub flagged: u64,
 }
 
-impl<'t> ClosedLoop<'t> {
+impl<'t, const D: usize, const N: usize, const P: usize> ClosedLoop<'t, D, N, P> {
     /// Everything at rest at time 0.
     ///
     /// # Errors
     /// What the controller refuses.
-    pub fn new(table: &'t Table<f64, 2>, setup: Setup) -> Result<Self, SettingsError> {
+    pub fn new(table: &'t Table<f64, D, N, P>, setup: Setup<D, P>) -> Result<Self, SettingsError> {
         let settings = &setup.settings;
         let controller = Controller::new(table, settings)?.without(setup.without);
         Ok(Self {
@@ -174,14 +190,14 @@ impl<'t> ClosedLoop<'t> {
             tick: 0,
             world: setup.world(table),
             random: Pcg64::new(u128::from(setup.seed), FAULT_STREAM),
-            link: BenchLink::default(),
+            link: BenchLink::new(D),
             on_their_way: VecDeque::new(),
             next_release_ns: 0,
             wall_offset_ns: 0,
             audit: Audit::default(),
             invariants: Invariants::new(table, settings),
             last: None,
-            error: 0.0,
+            error: SVector::zeros(),
             max_error: 0.0,
             injected: 0,
             flagged: 0,
@@ -190,7 +206,7 @@ impl<'t> ClosedLoop<'t> {
     }
 
     /// The settings it was built from.
-    pub fn setup(&self) -> &Setup {
+    pub fn setup(&self) -> &Setup<D, P> {
         &self.setup
     }
 
@@ -209,13 +225,18 @@ impl<'t> ClosedLoop<'t> {
         self.world.drive.depth()
     }
 
-    /// Where the paddle is, length.
-    pub fn paddle(&self) -> Vector2<f64> {
-        self.world.paddle(0).unwrap_or_default()
+    /// Where the paddles are, length.
+    pub fn paddles(&self) -> [SVector<f64, D>; P] {
+        std::array::from_fn(|place| self.world.paddle(place).unwrap_or_else(SVector::zeros))
+    }
+
+    /// The orthogonal error along the direction of a push, length.
+    pub fn error_sideways(&self) -> f64 {
+        self.world.tissue.push_direction.dot(&self.error)
     }
 
     /// The tissue.
-    pub fn tissue(&mut self) -> &mut LinearTissue<'t> {
+    pub fn tissue(&mut self) -> &mut LinearTissue<'t, D, N, P> {
         &mut self.world.tissue
     }
 
@@ -267,7 +288,7 @@ impl<'t> ClosedLoop<'t> {
 
     /// What is in one account and not in the other.
     pub fn unaccounted(&self) -> u64 {
-        self.audit.unaccounted(&self.state)
+        self.audit.unaccounted(self.state.ledger())
     }
 
     /// One tick of the plant, and of the controller if it is due.
@@ -286,13 +307,14 @@ impl<'t> ClosedLoop<'t> {
     /// One period passes for needle, actuator and whatever pushes.
     fn move_plant(&mut self, time_ns: u64) {
         let period_s = self.setup.settings.loop_period_ns as f64 * 1e-9;
-        let mut actuator = self.setup.actuator;
-        let (mut speed, mut stuck) = (1.0, false);
+        let mut gains = self.setup.actuators.map(|actuator| actuator.gain);
+        let (mut speed, mut stuck, mut exchanged) = (1.0, [false; P], false);
         self.world.tissue.gain = 1.0;
         for fault in &self.active {
             match *fault {
-                Fault::Stuck => stuck = true,
-                Fault::ActuatorGain(gain) => actuator.gain = gain,
+                Fault::Stuck(place) => stuck.iter_mut().skip(place).take(1).for_each(|stuck| *stuck = true),
+                Fault::ActuatorGain(place, gain) => gains.iter_mut().skip(place).take(1).for_each(|of| *of = gain),
+                Fault::CommandsExchanged => exchanged = true,
                 Fault::TissueGain(gain) => self.world.tissue.gain = gain,
                 Fault::Push(rate) => self.world.tissue.push += rate * period_s,
                 Fault::NeedleSpeed(factor) => speed = factor,
@@ -308,12 +330,17 @@ impl<'t> ClosedLoop<'t> {
             command = Some(*sent);
             self.on_their_way.pop_front();
         }
-        let goal =
-            command.filter(PaddleCommand::is_valid).map(|command| Vector2::from(to_plane(command.displacement[0])));
-        for moved in &mut self.world.actuators {
-            moved.set_gain(actuator.gain);
-            if !stuck {
-                moved.advance(goal, period_s);
+        let goals = command.filter(PaddleCommand::is_valid).map(|command| {
+            let mut goals: [SVector<f64, D>; P] = positions(&command);
+            if exchanged {
+                goals.reverse();
+            }
+            goals
+        });
+        for (place, moved) in self.world.actuators.iter_mut().enumerate().take(P) {
+            moved.set_gain(gains[place]);
+            if !stuck[place] {
+                moved.advance(goals.map(|goals| goals[place]), period_s);
             }
         }
         self.world.drive.hurry = speed;
@@ -328,21 +355,14 @@ impl<'t> ClosedLoop<'t> {
         // A linear tissue always has an answer.
         let Ok(truth) = self.world.advance(self.tick, time_ns) else { return };
         self.error = self.world.tissue.error(&truth.target());
-        self.max_error = self.max_error.max(self.error.abs());
+        self.max_error = self.max_error.max(self.error.norm());
         let stopped = self.active.contains(&Fault::PeerStopped);
-        let (mut needle, mut paddle, mut seen) = (None, None, None);
+        let (mut needle, mut paddles, mut seen) = (None, [None; MAX_PADDLES], None);
         if stopped {
             self.injected += 1;
         } else {
-            let identity = self.active.iter().rev().find_map(|fault| match fault {
-                Fault::PaddleIdentity(index) => Some(*index),
-                _ => None,
-            });
-            self.injected += u64::from(identity.is_some());
-            let (from_needle, [from_paddle, _]) = self.world.encoders(time_ns);
-            let named =
-                |sample: PaddleSample| PaddleSample { paddle_index: identity.unwrap_or(sample.paddle_index), ..sample };
-            (needle, paddle) = (Some(from_needle), from_paddle.map(named));
+            let (from_needle, from_paddles) = self.world.encoders(time_ns);
+            (needle, paddles) = (Some(from_needle), self.attached(from_paddles));
             seen = self.world.target_samples(&truth).next();
             if let Some(sample) = &mut seen {
                 self.injected += see(sample, &self.active, &mut self.random);
@@ -350,8 +370,33 @@ impl<'t> ClosedLoop<'t> {
         }
         let (tick, audit) = (self.tick, &mut self.audit);
         self.injected += self.link.needle.pass(tick, needle, &self.active, audit)
-            + self.link.paddle.pass(tick, paddle, &self.active, audit)
             + self.link.target.pass(tick, seen, &self.active, audit);
+        for (channel, sample) in self.link.paddles.iter_mut().zip(paddles) {
+            self.injected += channel.pass(tick, sample, &self.active, audit);
+        }
+    }
+
+    /// What the encoders of the paddles say with the faults that are about paddles and not about streams.
+    fn attached(&mut self, mut samples: [Option<PaddleSample>; MAX_PADDLES]) -> [Option<PaddleSample>; MAX_PADDLES] {
+        if self.active.contains(&Fault::SamplesExchanged) {
+            self.injected += 1;
+            let there = samples.map(|sample| sample.map(|sample| sample.displacement));
+            for (sample, displacement) in samples.iter_mut().zip(there.into_iter().rev()) {
+                *sample =
+                    sample.zip(displacement).map(|(sample, displacement)| PaddleSample { displacement, ..sample });
+            }
+        }
+        for (place, sample) in samples.iter_mut().enumerate() {
+            let identity = self.active.iter().rev().find_map(|fault| match fault {
+                Fault::PaddleIdentity(at, index) if *at == place => Some(*index),
+                _ => None,
+            });
+            self.injected += u64::from(identity.is_some());
+            if let (Some(sample), Some(identity)) = (sample, identity) {
+                sample.paddle_index = identity;
+            }
+        }
+        samples
     }
 
     /// One tick of the controller.
@@ -377,6 +422,7 @@ impl<'t> ClosedLoop<'t> {
             inputs.needle.map(|sample| sample.sequence),
             inputs.target.map(|sample| sample.sequence),
             inputs.paddles[0].map(|sample| sample.sequence),
+            inputs.paddles[1].map(|sample| sample.sequence),
         ]) {
             if let Some(sequence) = sequence {
                 self.audit.stream(stream).read(sequence, accepted);

@@ -95,7 +95,11 @@ impl Evidence {
     }
 
     /// Takes over accounts, invariants, error and final state of a finished trial.
-    pub fn close(&mut self, bench: &ClosedLoop<'_>, what: impl Fn() -> String) {
+    pub fn close<const D: usize, const N: usize, const P: usize>(
+        &mut self,
+        bench: &ClosedLoop<'_, D, N, P>,
+        what: impl Fn() -> String,
+    ) {
         self.max_error = Some(self.max_error.unwrap_or(0.0).max(bench.max_error));
         self.final_state = Some(bench.mode());
         let unaccounted = bench.unaccounted();
@@ -107,7 +111,12 @@ impl Evidence {
     }
 
     /// The trial must end in this state.
-    pub fn expect_mode(&mut self, bench: &ClosedLoop<'_>, mode: Mode, what: impl Fn() -> String) {
+    pub fn expect_mode<const D: usize, const N: usize, const P: usize>(
+        &mut self,
+        bench: &ClosedLoop<'_, D, N, P>,
+        mode: Mode,
+        what: impl Fn() -> String,
+    ) {
         self.require(bench.mode() == mode, || {
             format!("{}: ended in {:?} instead of {mode:?}: {}", what(), bench.mode(), bench.state.faults())
         });

@@ -1,5 +1,6 @@
 //! What can go wrong, by name, and when.
 
+use firmware::contract::frames::{MAX_DIMENSION, MAX_PADDLES};
 use firmware::{Ledger, StreamLedger};
 use rand_distr::Distribution;
 use rand_distr::uniform::{UniformFloat, UniformInt, UniformSampler};
@@ -12,13 +13,36 @@ pub enum Stream {
     Needle,
     /// Target sensor, slow and late.
     Target,
-    /// Paddle encoder, at loop rate.
+    /// Encoder of the only or the first paddle, at loop rate.
     Paddle,
+    /// Encoder of the second paddle, at loop rate.
+    SecondPaddle,
 }
 
 impl Stream {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Needle, Self::Target, Self::Paddle];
+    pub const ALL: [Self; 2 + MAX_PADDLES] = [Self::Needle, Self::Target, Self::Paddle, Self::SecondPaddle];
+
+    /// Those of paddles, in the order of the controller's table.
+    pub const PADDLES: [Self; MAX_PADDLES] = [Self::Paddle, Self::SecondPaddle];
+
+    /// Those that there are with so many paddles.
+    pub fn with(paddles: usize) -> &'static [Self] {
+        &Self::ALL[..(2 + paddles).min(Self::ALL.len())]
+    }
+
+    /// Whether it is one of a paddle.
+    pub const fn is_of_paddle(self) -> bool {
+        matches!(self, Self::Paddle | Self::SecondPaddle)
+    }
+
+    /// How many numbers a sample of it has in this many dimensions.
+    pub const fn numbers(self, dimension: usize) -> usize {
+        match self {
+            Self::Needle => 2,
+            Self::Target | Self::Paddle | Self::SecondPaddle => dimension,
+        }
+    }
 
     /// The controller's account of it.
     pub const fn account(self, ledger: &Ledger) -> &StreamLedger {
@@ -28,6 +52,10 @@ impl Stream {
             Self::Paddle => {
                 let [first, _] = &ledger.paddles;
                 first
+            }
+            Self::SecondPaddle => {
+                let [_, second] = &ledger.paddles;
+                second
             }
         }
     }
@@ -52,7 +80,7 @@ pub enum Fault {
     Late(Stream, u64),
     /// The value stays while sequence and time go on.
     Frozen(Stream),
-    /// A number of the sample (0 or 1) has this value.
+    /// A number of the sample, counted from 0, has this value.
     Field(Stream, usize, f64),
     /// All numbers of the sample are this many times too large.
     Scaled(Stream, f64),
@@ -61,15 +89,19 @@ pub enum Fault {
     /// The sensor does not see the target.
     Hidden,
     /// The sensor follows something else, at this distance (length).
-    WrongTarget([f64; 2]),
+    WrongTarget([f64; MAX_DIMENSION]),
     /// The target sensor has this much more noise (standard deviation, length).
     Noise(f64),
-    /// The actuator does not move.
-    Stuck,
-    /// The actuator reaches this part of its command.
-    ActuatorGain(f64),
-    /// A paddle with this identity is attached.
-    PaddleIdentity(u32),
+    /// The actuator of the paddle in this place does not move.
+    Stuck(usize),
+    /// The actuator of the paddle in this place reaches this part of its command.
+    ActuatorGain(usize, f64),
+    /// A paddle with this identity is attached in this place.
+    PaddleIdentity(usize, u32),
+    /// Each paddle's actuator has the commands of the other one.
+    CommandsExchanged,
+    /// Each paddle's samples arrive where the other's are read, with the identity that is expected there.
+    SamplesExchanged,
     /// The tissue answers the paddle with this multiple of the table's Jacobian.
     TissueGain(f64),
     /// Something pushes the target sideways with this speed (length/s); what it has pushed stays.
@@ -80,8 +112,9 @@ pub enum Fault {
 
 impl Fault {
     /// Draws one fault with parameters from mild to absurd. Lengths are fractions of `length`, the depth of the table.
-    pub fn random(random: &mut Pcg64, period_ns: u64, length: f64) -> Self {
-        let stream = Stream::ALL[below(random, 3) as usize];
+    pub fn random<const D: usize, const P: usize>(random: &mut Pcg64, period_ns: u64, length: f64) -> Self {
+        let streams = Stream::with(P);
+        let stream = streams[below(random, streams.len() as u64) as usize];
         let sign = if below(random, 2) == 0 { 1.0 } else { -1.0 };
         match below(random, 20) {
             0 => Self::SlowStep(between(random, 0.5, 6.0)),
@@ -94,21 +127,29 @@ impl Fault {
             7 => Self::Frozen(stream),
             8 => {
                 const VALUES: [f64; 8] = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, 1e3, -1e3, f64::MAX, 0.0];
-                Self::Field(stream, below(random, 2) as usize, VALUES[below(random, VALUES.len() as u64) as usize])
+                let field = below(random, stream.numbers(D) as u64) as usize;
+                Self::Field(stream, field, VALUES[below(random, VALUES.len() as u64) as usize])
             }
             9 => Self::Scaled(stream, 10f64.powf(between(random, -3.0, 3.0)) * sign),
             10 => Self::Stamped(stream, (between(random, 0.0, 300.0) * sign * period_ns as f64) as i64),
             11 => Self::Hidden,
-            12 => Self::WrongTarget([between(random, -1.0, 1.0), between(random, -1.0, 1.0)].map(|part| part * length)),
+            12 => Self::WrongTarget(std::array::from_fn(
+                |i| if i < D { between(random, -1.0, 1.0) * length } else { 0.0 },
+            )),
             13 => Self::Noise(10f64.powf(between(random, -5.0, -1.0)) * length),
-            14 => Self::Stuck,
-            15 => Self::ActuatorGain(between(random, 0.0, 1.5)),
-            16 => Self::PaddleIdentity(below(random, 8) as u32),
+            14 => Self::Stuck(place(random, P)),
+            15 => Self::ActuatorGain(place(random, P), between(random, 0.0, 1.5)),
+            16 => Self::PaddleIdentity(place(random, P), below(random, 8) as u32),
             17 => Self::TissueGain(between(random, -2.0, 3.0)),
             18 => Self::Push(between(random, -0.1, 0.1) * length),
             _ => Self::NeedleSpeed(between(random, -8.0, 8.0)),
         }
     }
+}
+
+/// One of so many places for paddles; nothing is drawn where there is only one.
+fn place(random: &mut Pcg64, paddles: usize) -> usize {
+    if paddles > 1 { below(random, paddles as u64) as usize } else { 0 }
 }
 
 /// A fault and the ticks of the plant in which it is active.

@@ -1,9 +1,10 @@
 //! What must hold on every tick, whatever is injected.
 
-use firmware::contract::frames::to_plane;
 use firmware::contract::{PaddleCommand, Table};
 use firmware::{Faults, Inputs, Mode, Settings, State};
-use nalgebra::Vector2;
+use nalgebra::SVector;
+
+use crate::world::truth::from_frame;
 
 /// Rounding of one addition, relative.
 const ROUNDING: f64 = 1e-9;
@@ -12,9 +13,9 @@ const KEPT: usize = 5;
 
 /// Checks from outside of the controller.
 #[derive(Clone, Debug)]
-pub struct Invariants {
-    max_displacement: f64,
-    max_step: f64,
+pub struct Invariants<const P: usize = 1> {
+    /// Largest displacement and step of each paddle, length.
+    limits: [(f64, f64); P],
     last: Option<PaddleCommand>,
     /// Number and time of the last tick that went forward.
     forward: Option<(u64, u64)>,
@@ -24,12 +25,12 @@ pub struct Invariants {
     count: u64,
 }
 
-impl Invariants {
+impl<const P: usize> Invariants<P> {
     /// Limits of this table and these settings.
-    pub fn new(table: &Table<f64, 2>, settings: &Settings) -> Self {
+    pub fn new<const D: usize, const N: usize>(table: &Table<f64, D, N, P>, settings: &Settings) -> Self {
+        let period_s = settings.loop_period_ns as f64 * 1e-9;
         Self {
-            max_displacement: table.paddles[0].max_displacement,
-            max_step: table.paddles[0].max_rate * settings.loop_period_ns as f64 * 1e-9,
+            limits: table.paddles.each_ref().map(|paddle| (paddle.max_displacement, paddle.max_rate * period_s)),
             last: None,
             forward: None,
             latched: false,
@@ -81,21 +82,27 @@ impl Invariants {
     }
 
     /// Checks one tick of the controller.
-    pub fn check(&mut self, before: &State<f64>, after: &State<f64>, inputs: &Inputs, command: &PaddleCommand) {
+    pub fn check<const D: usize, const N: usize>(
+        &mut self,
+        before: &State<f64, D, N, P>,
+        after: &State<f64, D, N, P>,
+        inputs: &Inputs,
+        command: &PaddleCommand,
+    ) {
         let faults = Faults::from_bits(command.faults);
-        let displacement = Vector2::from(to_plane(command.displacement[0]));
+        let displacements: [SVector<f64, D>; P] = positions(command);
         let backwards = self.is_backwards(inputs);
         self.forward = Some(match self.forward {
             Some((tick, time_ns)) if backwards => (tick.max(inputs.tick), time_ns),
             _ => (inputs.tick, inputs.time_ns),
         });
-        self.require(displacement.iter().all(|component| component.is_finite()), inputs, "command not finite");
-        self.require(
-            displacement.norm() <= self.max_displacement * (1.0 + ROUNDING),
-            inputs,
-            "command beyond the position limit",
-        );
-        self.check_transition(inputs, command, &displacement);
+        let finite = displacements.iter().flatten().all(|component| component.is_finite());
+        self.require(finite, inputs, "command not finite");
+        let within =
+            |(displacement, (most, _)): (&SVector<f64, D>, &(f64, f64))| displacement.norm() <= most * (1.0 + ROUNDING);
+        let within = displacements.iter().zip(&self.limits).all(within);
+        self.require(within, inputs, "command beyond the position limit");
+        self.check_transition(inputs, command, &displacements);
         let mode = Mode::from_wire(command.state);
         let has = |codes: Faults| !faults.intersection(codes).is_empty();
         let expected = if has(Faults::LATCHING) {
@@ -120,7 +127,12 @@ impl Invariants {
     }
 
     /// Against the command before.
-    fn check_transition(&mut self, inputs: &Inputs, command: &PaddleCommand, displacement: &Vector2<f64>) {
+    fn check_transition<const D: usize>(
+        &mut self,
+        inputs: &Inputs,
+        command: &PaddleCommand,
+        displacements: &[SVector<f64, D>; P],
+    ) {
         let Some(last) = self.last else { return };
         let consecutive = command.sequence == last.sequence.wrapping_add(1);
         self.require(consecutive, inputs, "not exactly one command per tick");
@@ -134,8 +146,13 @@ impl Invariants {
             self.require(!known, inputs, "a valid command was followed by an invalid one without a reason");
             return;
         }
-        let step = (displacement - Vector2::from(to_plane(last.displacement[0]))).norm();
-        self.require(step <= self.max_step * (1.0 + ROUNDING), inputs, "command beyond the rate limit");
+        let before: [SVector<f64, D>; P] = positions(&last);
+        let within = displacements
+            .iter()
+            .zip(&before)
+            .zip(&self.limits)
+            .all(|((now, before), (_, most))| (now - before).norm() <= most * (1.0 + ROUNDING));
+        self.require(within, inputs, "command beyond the rate limit");
         // The tick that finds a reason in the law itself has moved already.
         let law = Faults::from_bits(command.faults).intersection(Faults::DIVERGENCE);
         if command.state != Mode::Run as u32 && law.is_empty() {
@@ -146,9 +163,16 @@ impl Invariants {
     }
 
     /// Without a sample of the target that was accepted in RUN, the integral keeps its bits.
-    fn check_integral(&mut self, before: &State<f64>, after: &State<f64>, inputs: &Inputs, command: &PaddleCommand) {
+    fn check_integral<const D: usize, const N: usize>(
+        &mut self,
+        before: &State<f64, D, N, P>,
+        after: &State<f64, D, N, P>,
+        inputs: &Inputs,
+        command: &PaddleCommand,
+    ) {
         let consumed = after.ledger().target.consumed > before.ledger().target.consumed;
-        let bits = |state: &State<f64>| state.integral().map(|integral| integral[0].map(f64::to_bits));
+        let bits =
+            |state: &State<f64, D, N, P>| state.integral().map(|integral| integral.map(|of| of.map(f64::to_bits)));
         if let Some(old) = bits(before)
             && (!consumed || command.state == Mode::Hold as u32)
         {
@@ -157,6 +181,11 @@ impl Invariants {
     }
 }
 
-fn was_reversed(state: &State<f64>) -> bool {
+/// Where a command has each paddle, length.
+pub fn positions<const D: usize, const P: usize>(command: &PaddleCommand) -> [SVector<f64, D>; P] {
+    std::array::from_fn(|place| command.displacement.get(place).map_or_else(SVector::zeros, |of| from_frame(*of)))
+}
+
+fn was_reversed<const D: usize, const N: usize, const P: usize>(state: &State<f64, D, N, P>) -> bool {
     state.faults().contains(Faults::CLOCK_REVERSED)
 }

@@ -8,7 +8,7 @@ use firmware::contract::{Faults, Table};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::catalogue::{ROWS, Row};
+use super::catalogue::{Row, rows};
 use super::evidence::RowVerdict;
 use crate::bench::error::SimError;
 
@@ -32,18 +32,23 @@ pub struct MonitorOff {
 ///
 /// # Errors
 /// [`SimError`] when a row could not be set up.
-pub fn monitors_off(table: &Table<f64, 2>, seed: u64) -> Result<Vec<MonitorOff>, SimError> {
+pub fn monitors_off<const D: usize, const N: usize, const P: usize>(
+    table: &Table<f64, D, N, P>,
+    seed: u64,
+) -> Result<Vec<MonitorOff>, SimError> {
     // The control: a row that fails with every monitor on says nothing.
-    let holds = |row: &Row, without: Faults| -> Result<bool, SimError> {
+    let holds = |row: &Row<D, N, P>, without: Faults| -> Result<bool, SimError> {
         let evidence = row.run_without(without, table, seed)?;
         Ok(evidence.is_none_or(|evidence| evidence.verdict() != RowVerdict::Failed))
     };
-    let sound: Vec<&Row> = ROWS
+    let rows = rows::<D, N, P>();
+    let sound: Vec<&Row<D, N, P>> = rows
         .iter()
         .map(|row| Ok(holds(row, Faults::NONE)?.then_some(row)))
         .filter_map(Result::transpose)
         .collect::<Result<_, SimError>>()?;
-    let monitors = Faults::NAMES.iter().filter(|(code, _)| NO_MONITORS.intersection(*code).is_empty());
+    let none = if P > 1 { NO_MONITORS } else { NO_MONITORS | Faults::SECOND_PADDLE };
+    let monitors = Faults::NAMES.iter().filter(|(code, _)| none.intersection(*code).is_empty());
     monitors
         .map(|(code, _)| {
             crate::runtime::signals::check()?;

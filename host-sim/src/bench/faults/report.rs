@@ -41,7 +41,7 @@ pub struct RowResult {
 
 impl RowResult {
     /// The result of a row.
-    pub fn new(row: &Row, evidence: &Evidence) -> Self {
+    pub fn new<const D: usize, const N: usize, const P: usize>(row: &Row<D, N, P>, evidence: &Evidence) -> Self {
         let notes = evidence.not_run.iter().chain(&evidence.failures).chain(&evidence.notes);
         Self {
             id: row.id,
@@ -65,6 +65,9 @@ pub enum CatalogueMode {
     #[default]
     #[serde(rename = "rows 1 to 32 and random schedules: lockstep; rows 33 to 45: real processes")]
     LockstepThenProcesses,
+    /// The same in space, where there are rows of two paddles.
+    #[serde(rename = "rows 1 to 32, 46 to 51 and random schedules: lockstep; rows 33 to 45: real processes")]
+    InSpace,
 }
 
 /// Result of `faults`.
@@ -72,6 +75,9 @@ pub enum CatalogueMode {
 pub struct FaultsResult {
     /// Version of host-sim.
     pub version: String,
+    /// 3 in space; none in the plane.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dimension: Option<u32>,
     /// Seed of phases, noise and schedules.
     pub seed: u64,
     /// Rows 1 to 32 are in lockstep, the others in real time.

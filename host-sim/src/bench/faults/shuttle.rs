@@ -27,7 +27,12 @@ pub struct ShuttleDrive {
 
 impl ShuttleDrive {
     /// At rest where the table begins, to go to `depth_end` at this speed, in steps of `period_s`.
-    pub fn new(table: &Table<f64, 2>, depth_end: f64, speed: f64, period_s: f64) -> Self {
+    pub fn new<const D: usize, const N: usize, const P: usize>(
+        table: &Table<f64, D, N, P>,
+        depth_end: f64,
+        speed: f64,
+        period_s: f64,
+    ) -> Self {
         let start = table.validity.depth_start;
         Self {
             motion: NeedleMotion { depth: start, velocity: 0.0 },

@@ -13,7 +13,7 @@ use crate::exchange::{ClockFrame, ClockKind, PlantPorts, Space};
 use crate::runtime::accounting::accounts::CommandAccount;
 use crate::runtime::error::{Role, RuntimeError};
 use crate::runtime::peer::Peer;
-use crate::runtime::time::clock::{now_ns, release_real_time, request_real_time};
+use crate::runtime::time::clock::{Scheduling, now_ns, release_real_time, request_real_time};
 use crate::runtime::time::durations::{LoopDurations, LoopTiming};
 use crate::runtime::time::periodic::PeriodicLoop;
 use crate::world::tissue::TissueResponse;
@@ -94,23 +94,35 @@ impl<S: Service> FreeRun<'_, '_, S> {
     /// # Errors
     /// [`RuntimeError`].
     pub fn run<T: TissueResponse<D>, const D: usize>(
-        mut self,
+        self,
         plant: &mut PlantLoop<T, D>,
         progress: &dyn Fn(),
     ) -> Result<(CommandAccount, LoopTiming), RuntimeError> {
+        self.run_in(plant, progress, request_real_time, release_real_time)
+    }
+
+    /// The same with what asks for real time and what gives it up.
+    fn run_in<T: TissueResponse<D>, const D: usize>(
+        mut self,
+        plant: &mut PlantLoop<T, D>,
+        progress: &dyn Fn(),
+        request: impl FnOnce() -> Scheduling,
+        release: impl FnOnce(),
+    ) -> Result<(CommandAccount, LoopTiming), RuntimeError> {
         let mut durations = LoopDurations::default();
-        let scheduling = request_real_time();
+        let scheduling = request();
         let first_ns = now_ns() + LEAD_NS;
         let mut periodic = PeriodicLoop::new(first_ns, self.period_ns);
-        let outcome = self
-            .ports
-            .clock
-            .send(ClockFrame::new(ClockKind::Start, 0, first_ns))
-            .map_err(RuntimeError::from)
-            .and_then(|()| self.ticks(plant, &mut periodic, &mut durations, progress));
-        release_real_time();
+        let started = self.ports.clock.send(ClockFrame::new(ClockKind::Start, 0, first_ns));
+        let outcome = started.map_err(RuntimeError::from).and_then(|()| {
+            let account = self.ticks(plant, &mut periodic, &mut durations, progress)?;
+            // Before real time is given up: after that somebody else may have the processor for longer than samples may be
+            // old, and a controller that has not heard of the end goes to HOLD or SAFE.
+            self.ports.clock.send(ClockFrame::new(ClockKind::Stop, 0, now_ns()))?;
+            Ok(account)
+        });
+        release();
         let account = outcome?;
-        self.ports.clock.send(ClockFrame::new(ClockKind::Stop, 0, now_ns()))?;
         let [input_age, target_age] = plant.ages.distributions();
         let timing = durations.timing(self.rate_hz, &periodic, &scheduling);
         Ok((account, LoopTiming { input_age, target_age, ..timing }))
@@ -172,5 +184,73 @@ impl<S: Service> FreeRun<'_, '_, S> {
             Some(succession) => succession.look(self.ports, next_ns),
             None => self.peer.check::<S>(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+
+    use iceoryx2::service::local;
+    use model_offline::scene::Scene;
+    use nalgebra::Vector2;
+
+    use super::*;
+    use crate::exchange::{ControllerPorts, Departure};
+    use crate::runtime::plant::observer::{Moment, Observer};
+    use crate::world::World;
+    use crate::world::error::WorldError;
+    use crate::world::simulation::Simulation;
+
+    /// Tissue that nothing moves.
+    #[derive(Debug)]
+    struct Rigid;
+
+    impl TissueResponse for Rigid {
+        fn step(&mut self, _: f64, _: &[Vector2<f64>]) -> Result<Vector2<f64>, WorldError> {
+            Ok(Vector2::zeros())
+        }
+    }
+
+    /// Has seen enough before the first tick.
+    #[derive(Debug)]
+    struct EndsAtOnce;
+
+    impl Observer<Rigid> for EndsAtOnce {
+        fn offer(&mut self, _: &Rigid, _: &Moment) {}
+
+        fn ends_early(&self) -> bool {
+            true
+        }
+
+        fn hold(&mut self) {}
+    }
+
+    #[test]
+    fn the_controller_hears_of_the_end_before_real_time_is_given_up() {
+        let space = Space::unique().unwrap();
+        let mut ports = PlantPorts::<local::Service>::open(&space).unwrap();
+        let controller = RefCell::new(ControllerPorts::<local::Service>::open(&space).unwrap());
+        ports.connect().unwrap();
+        let kinds = || {
+            let clock = &mut controller.borrow_mut().clock;
+            std::iter::from_fn(|| clock.oldest().unwrap()).map(|frame| frame.kind().unwrap()).collect::<Vec<_>>()
+        };
+        let simulation = Simulation::new(&Scene::bundled("paper").unwrap());
+        let mut plant = PlantLoop::new(World::simulated(Rigid, 3, &simulation), &simulation);
+        plant.observed_by(Box::new(EndsAtOnce));
+        let (mut peer, patience) = (Peer::Thread(Role::Controller), Duration::from_secs(1));
+        let (rate_hz, period_ns) = (1000.0, 1_000_000);
+        let free_run = FreeRun { ports: &mut ports, peer: &mut peer, rate_hz, period_ns, patience, succession: None };
+        let (mut before, mut heard) = (Vec::new(), Vec::new());
+        let asks = || {
+            before = kinds();
+            Scheduling::default()
+        };
+        free_run.run_in(&mut plant, &|| {}, asks, || heard = kinds()).unwrap();
+        assert!(before.is_empty(), "real time comes before the start: {before:?}");
+        assert_eq!(heard, [ClockKind::Start, ClockKind::Stop]);
+        drop((ports, controller));
+        space.leave::<local::Service>(Departure::Last);
     }
 }

@@ -4,13 +4,13 @@ use std::os::unix::fs::PermissionsExt;
 use std::process::Command;
 use std::time::Duration;
 
-use firmware::contract::frames::{TARGET_VISIBLE, from_plane, to_plane};
-use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
+use firmware::contract::frames::{MAX_PADDLES, TARGET_VISIBLE};
+use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, Table, TargetSample};
 use firmware::{Faults, Mode};
 use iceoryx2::node::NodeBuilder;
 use iceoryx2::prelude::{ServiceName, SignalHandlingMode};
 use iceoryx2::service::ipc;
-use nalgebra::Vector2;
+use nalgebra::SVector;
 use rand_pcg::Pcg64;
 use rustix::process::Signal;
 
@@ -18,6 +18,7 @@ use super::stage::{Stage, TIMEOUT, left_behind, ms, pause, read_json, unaccounte
 use crate::bench::error::SimError;
 use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::{below, between};
+use crate::bench::faults::invariants::positions;
 use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 use crate::record::recording::Recording;
 use crate::runtime::controller::process::ControllerResult;
@@ -37,7 +38,7 @@ fn close(evidence: &mut Evidence, controller: &std::path::Path, plant: &std::pat
     let plant = read_json::<PlantResult>(plant);
     evidence.require(result.is_some() && plant.is_some(), || "no accounts were left".to_owned());
     let (result, plant) = (result?, plant?);
-    let unaccounted = unaccounted(&result, Some(plant.published));
+    let unaccounted = unaccounted(&result, Some(&plant));
     evidence.unaccounted += unaccounted;
     evidence.require(unaccounted == 0, || format!("{unaccounted} unaccounted"));
     evidence.max_error = Some(evidence.max_error.unwrap_or(0.0).max(plant.largest_error));
@@ -46,7 +47,10 @@ fn close(evidence: &mut Evidence, controller: &std::path::Path, plant: &std::pat
 }
 
 /// Row 37: a second controller on the same link is refused, and the first does not notice.
-pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn two_controllers<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let link = stage.link();
     let (mut first, _, json) = stage.controller(&link, &[])?;
     // Many visits: somebody who goes looks dead for a moment, and must not be taken for the first. One takes 25 ms on a
@@ -54,7 +58,7 @@ pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Res
     let visits = stage.repetitions(200);
     let duration = format!("{:.3}", 2.5 + 0.05 * visits as f64);
     let (mut plant, plant_json) = stage.plant(&link, &["--insertion-time", "2", "--duration", &duration])?;
-    pause(ms(600));
+    pause(stage.after_the_start(ms(600)));
     for _ in 0..visits {
         let (mut second, ..) = stage.controller(&link, &[])?;
         let code = second.code();
@@ -84,11 +88,14 @@ pub(crate) fn two_controllers(stage: &Stage<'_>, evidence: &mut Evidence) -> Res
 
 /// Row 38: a reader that is stopped: the plant's loop goes on, what is overwritten is counted, and the reader goes on
 /// with the newest sample.
-pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn never_reads<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let link = stage.link();
     let (mut controller, _, json) = stage.controller(&link, &[])?;
     let (mut plant, plant_json) = stage.plant(&link, &["--insertion-time", "2.5", "--duration", "3"])?;
-    pause(ms(1000));
+    pause(stage.after_the_start(ms(1000)));
     controller.signal(Signal::STOP);
     pause(ms(1000));
     controller.signal(Signal::CONT);
@@ -110,12 +117,15 @@ pub(crate) fn never_reads(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<
 }
 
 /// Row 41: another user can neither read, nor join, nor prepare the place.
-pub(crate) fn other_user(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn other_user<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     const NOBODY: [&str; 3] = ["--reuid=65534", "--regid=65534", "--clear-groups"];
     let link = stage.link();
     let (mut controller, ..) = stage.controller(&link, &[])?;
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
-    pause(ms(700));
+    pause(stage.after_the_start(ms(700)));
     let traces = Space::new(&link)?.traces();
     evidence.require(traces.len() > 5, || format!("only {} names", traces.len()));
     for path in &traces {
@@ -136,12 +146,11 @@ pub(crate) fn other_user(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(
             evidence.require(code == Some(1), || format!("nobody could read {}: {code:?}", path.display()));
         }
         let table = stage.table_file.to_string_lossy().into_owned();
-        for arguments in [
-            &["controller", "--table", &table, "--link", &link, "--patience", "2"] as &[&str],
-            &["plant", "--paddle", "3", "--link", &link, "--patience", "2"],
-        ] {
+        let mut plant_of_nobody = vec!["plant", "--link", &link, "--patience", "2"];
+        plant_of_nobody.extend(stage.plant_arguments());
+        for arguments in [vec!["controller", "--table", &table, "--link", &link, "--patience", "2"], plant_of_nobody] {
             evidence.injected += 1;
-            let mut intruder = as_nobody(&stage.program, arguments)?;
+            let mut intruder = as_nobody(&stage.program, &arguments)?;
             let code = intruder.code();
             let message = intruder.message();
             evidence.detected += u64::from(code == Some(1));
@@ -181,7 +190,10 @@ fn any_u32(random: &mut Pcg64) -> u32 {
 }
 
 /// Row 42: a plant that writes garbage into shared memory: every command keeps the limits, nothing panics.
-pub(crate) fn garbage(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn garbage<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = Pcg64::new(u128::from(stage.seed), 42);
     for kind_at_end in [ClockKind::Stop as u32, 77] {
         let link = stage.link();
@@ -195,7 +207,13 @@ pub(crate) fn garbage(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), 
 }
 
 /// Samples of one tick with numbers of all kinds in all places.
-fn garbage_samples(tick: u64, time_ns: u64, random: &mut Pcg64) -> (NeedleSample, TargetSample, PaddleSample) {
+fn garbage_samples<const D: usize, const N: usize, const P: usize>(
+    table: &Table<f64, D, N, P>,
+    tick: u64,
+    time_ns: u64,
+    random: &mut Pcg64,
+) -> (NeedleSample, TargetSample, [Option<PaddleSample>; MAX_PADDLES]) {
+    let place = |random: &mut Pcg64| std::array::from_fn(|i| if i < D { any_number(random) } else { 0.0 });
     let time = |random: &mut Pcg64| if below(random, 4) == 0 { below(random, u64::MAX) } else { time_ns };
     let sequence = |random: &mut Pcg64| if below(random, 4) == 0 { any_u32(random) } else { tick as u32 };
     let needle = NeedleSample {
@@ -205,53 +223,65 @@ fn garbage_samples(tick: u64, time_ns: u64, random: &mut Pcg64) -> (NeedleSample
         depth: any_number(random),
         velocity: any_number(random),
     };
-    let paddle = PaddleSample {
+    let paddle = |random: &mut Pcg64, index: u32| PaddleSample {
         sequence: sequence(random),
-        paddle_index: if below(random, 100) == 0 { any_u32(random) } else { 3 },
+        paddle_index: if below(random, 100) == 0 { any_u32(random) } else { index },
         time_ns: time(random),
-        displacement: from_plane([any_number(random), any_number(random)]),
+        displacement: place(random),
     };
+    let mut paddles = [None; MAX_PADDLES];
+    paddles[0] = Some(paddle(random, table.paddles[0].index));
     let target = TargetSample {
         sequence: sequence(random),
         flags: any_u32(random) | TARGET_VISIBLE,
         time_ns: time(random),
-        displacement: from_plane([any_number(random), any_number(random)]),
+        displacement: place(random),
     };
-    (needle, target, paddle)
+    for (sample, known) in paddles.iter_mut().zip(&table.paddles).skip(1) {
+        *sample = Some(paddle(random, known.index));
+    }
+    (needle, target, paddles)
 }
 
 /// The witness: how many samples of a tick are garbage, by arithmetic of this bench only.
-fn garbage_among(tick: u64, time_ns: u64, needle: &NeedleSample, target: &TargetSample, paddle: &PaddleSample) -> u64 {
-    let is_garbage = |number: u32, stamp: u64, values: [f64; 2]| {
+fn garbage_among(
+    tick: u64,
+    time_ns: u64,
+    needle: &NeedleSample,
+    target: &TargetSample,
+    paddles: &[Option<PaddleSample>; MAX_PADDLES],
+) -> u64 {
+    let is_garbage = |number: u32, stamp: u64, values: &[f64]| {
         let plausible = values.iter().all(|value| *value == 0.0 || (value.is_normal() && value.abs() <= 0.1));
         u64::from(number != tick as u32 || stamp != time_ns || !plausible)
     };
-    is_garbage(needle.sequence, needle.time_ns, [needle.depth, needle.velocity])
-        + is_garbage(paddle.sequence, paddle.time_ns, to_plane(paddle.displacement))
-        + is_garbage(target.sequence, target.time_ns, to_plane(target.displacement))
+    let of_paddle = |paddle: &PaddleSample| is_garbage(paddle.sequence, paddle.time_ns, &paddle.displacement);
+    is_garbage(needle.sequence, needle.time_ns, &[needle.depth, needle.velocity])
+        + paddles.iter().flatten().map(of_paddle).sum::<u64>()
+        + is_garbage(target.sequence, target.time_ns, &target.displacement)
 }
 
-fn garbage_on(
-    stage: &Stage<'_>,
+fn garbage_on<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
     space: &Space,
     random: &mut Pcg64,
     kind_at_end: u32,
     evidence: &mut Evidence,
 ) -> Result<(), SimError> {
     const TICKS: u64 = 5000;
-    let mut ports = PlantPorts::<ipc::Service>::open(space)?;
+    let mut ports = PlantPorts::<ipc::Service>::open_for(space, P)?;
     let (mut controller, _, json) = stage.controller(space.name(), &["--mode", "lockstep"])?;
     evidence.require(wait_until(TIMEOUT, || ports.has_peer()), || controller.message());
     ports.connect()?;
-    let limits = (stage.table.paddles[0].max_displacement, stage.table.paddles[0].max_rate * 1e-3);
+    let limits = stage.table.paddles.each_ref().map(|paddle| (paddle.max_displacement, paddle.max_rate * 1e-3));
     let mut last: Option<PaddleCommand> = None;
     for tick in 0..TICKS {
         signals::check()?;
         let time_ns = tick * 1_000_000;
-        let (needle, target, paddle) = garbage_samples(tick, time_ns, random);
-        evidence.injected += garbage_among(tick, time_ns, &needle, &target, &paddle);
+        let (needle, target, paddles) = garbage_samples(stage.table, tick, time_ns, random);
+        evidence.injected += garbage_among(tick, time_ns, &needle, &target, &paddles);
         ports.needle.send(needle)?;
-        ports.paddle.send(paddle)?;
+        ports.send_paddles(&paddles)?;
         ports.target.send(target)?;
         ports.clock.send(ClockFrame::new(ClockKind::Step, tick, time_ns))?;
         let mut answer = None;
@@ -263,14 +293,16 @@ fn garbage_on(
             evidence.require(false, || format!("tick {tick}: no answer: {}", controller.message()));
             return Ok(());
         };
-        let displacement = Vector2::from(to_plane(command.displacement[0]));
-        evidence.require(command.tick == tick && displacement.norm() <= limits.0 * (1.0 + 1e-9), || {
-            format!("tick {tick}: {command:?}")
-        });
+        let now: [SVector<f64, D>; P] = positions(&command);
+        let within = now.iter().zip(&limits).all(|(now, (most, _))| now.norm() <= most * (1.0 + 1e-9));
+        evidence.require(command.tick == tick && within, || format!("tick {tick}: {command:?}"));
         // A command that is not valid is none.
         if let Some(last) = last.filter(|last| last.is_valid() && command.is_valid()) {
-            let step = (displacement - Vector2::from(to_plane(last.displacement[0]))).norm();
-            evidence.require(step <= limits.1 * (1.0 + 1e-9), || format!("tick {tick}: step of {step}"));
+            let before: [SVector<f64, D>; P] = positions(&last);
+            for ((now, before), (_, most)) in now.iter().zip(&before).zip(&limits) {
+                let step = (now - before).norm();
+                evidence.require(step <= most * (1.0 + 1e-9), || format!("tick {tick}: step of {step}"));
+            }
         }
         last = Some(command);
     }
@@ -281,8 +313,9 @@ fn garbage_on(
     if let Some(result) = read_json::<ControllerResult>(&json) {
         // Published cannot be known from sequence numbers that are garbage: the ledger must agree with itself.
         evidence.unaccounted += unaccounted(&result, None);
-        let refused = [&result.accounts.needle, &result.accounts.target, &result.accounts.paddle];
-        evidence.detected += refused.iter().map(|stream| stream.discarded.iter().sum::<u64>()).sum::<u64>();
+        let accounts = &result.accounts;
+        let refused = [&accounts.needle, &accounts.target, &accounts.paddle].into_iter().chain(&accounts.second_paddle);
+        evidence.detected += refused.map(|stream| stream.discarded.iter().sum::<u64>()).sum::<u64>();
         evidence.final_state = Some(Mode::Safe);
         evidence.require(result.accounts.final_state == Some(Mode::Safe), || {
             format!("ended in {:?}", result.accounts.final_state)
@@ -300,7 +333,10 @@ fn wait_until_spinning(mut condition: impl FnMut() -> bool) {
 }
 
 /// Row 43: a service of the same name and size with another type is refused.
-pub(crate) fn other_layout(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn other_layout<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let link = stage.link();
     let space = Space::new(&link)?;
     let setup = |what: String| RuntimeError::Protocol { peer: Role::Controller, what };
@@ -339,7 +375,10 @@ pub(crate) fn other_layout(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
 }
 
 /// Row 45: a panic in the step: from that tick on the watchdog answers SAFE where the paddle was.
-pub(crate) fn panic_in_step(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn panic_in_step<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     for tick in [0, 700u64] {
         let link = stage.link();
         let panic_at = tick.to_string();

@@ -15,7 +15,10 @@ use crate::runtime::controller::process::ControllerResult;
 use crate::runtime::plant::process::PlantResult;
 
 /// Runs a script in a mount namespace of its own: as root, or where ordinary users may make one.
-fn in_own_namespace(stage: &Stage<'_>, script: &str) -> Result<Process, SimError> {
+fn in_own_namespace<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    script: &str,
+) -> Result<Process, SimError> {
     let mut command = Command::new("unshare");
     if rustix::process::geteuid().is_root() {
         command.arg("--mount");
@@ -27,13 +30,16 @@ fn in_own_namespace(stage: &Stage<'_>, script: &str) -> Result<Process, SimError
 }
 
 /// Whether a small file system can be mounted here.
-fn can_mount(stage: &Stage<'_>) -> Result<bool, SimError> {
+fn can_mount<const D: usize, const N: usize, const P: usize>(stage: &Stage<'_, D, N, P>) -> Result<bool, SimError> {
     let probe = in_own_namespace(stage, "mount -t tmpfs -o size=64k tmpfs /dev/shm");
     Ok(probe.is_ok_and(|mut probe| probe.code() == Some(0)))
 }
 
 /// Row 39: shared memory that is full is an error at the start; memory that fills up later does not reach the loop.
-pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn memory_full<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     if !can_mount(stage)? {
         evidence.not_run = Some("needs root, or a user namespace, to mount a small tmpfs".to_owned());
         return Ok(());
@@ -41,11 +47,12 @@ pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<
     // Both processes in the namespace; their exit codes in words, so that a signal (128 and more) is seen.
     let pair = |size: &str, more: &str| {
         let (program, link) = (stage.program.display(), stage.link());
-        let common = format!("--mode free-run --link {link} --patience 3");
+        let common = format!("--mode free-run --link {link} --patience {}", stage.patience());
+        let plant = stage.plant_arguments().collect::<Vec<_>>().join(" ");
         format!(
             "mount -t tmpfs -o size={size} tmpfs /dev/shm || exit 3; {more} \
              {program} controller {common} --table {} & c=$!; \
-             {program} plant {common} --paddle 3 --insertion-time 1.5 --duration 2; p=$?; wait $c; \
+             {program} plant {common} {plant} --insertion-time 1.5 --duration 2; p=$?; wait $c; \
              echo codes $p $?. >&2",
             stage.table_file.display(),
         )
@@ -65,8 +72,9 @@ pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<
         evidence.require(refused, || format!("{size}: {message}"));
     }
     // Filled up to the last page in the middle of things.
-    let fill = "(sleep 0.8; dd if=/dev/zero of=/dev/shm/filler bs=4k) &";
-    let mut process = in_own_namespace(stage, &pair("8m", fill))?;
+    let after_s = stage.after_the_start(ms(800)).as_secs_f64();
+    let fill = format!("(sleep {after_s:.3}; dd if=/dev/zero of=/dev/shm/filler bs=4k) &");
+    let mut process = in_own_namespace(stage, &pair("8m", &fill))?;
     evidence.injected += 1;
     let ended = process.code().is_some();
     let message = process.message();
@@ -77,7 +85,10 @@ pub(crate) fn memory_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<
 }
 
 /// Row 40: the files are deleted under it: the loop goes on, and without a plant it is SAFE.
-pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn file_deleted<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let link = stage.link();
     let (mut controller, record, json) = stage.controller(&link, &[])?;
     let (mut plant, _) = stage.plant(&link, &["--duration", "60"])?;
@@ -122,7 +133,10 @@ pub(crate) fn file_deleted(stage: &Stage<'_>, evidence: &mut Evidence) -> Result
 }
 
 /// Row 44: the disk of the log is full: the loop does not notice, what is lost is counted.
-pub(crate) fn disk_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn disk_full<const D: usize, const N: usize, const P: usize>(
+    stage: &Stage<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let small = stage.path("small");
     std::fs::create_dir(&small).map_err(FileError::write(&small))?;
     let mut places = vec![("/dev/full".to_owned(), String::new())];
@@ -137,8 +151,9 @@ pub(crate) fn disk_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<()
         let link = stage.link();
         let json = stage.path("controller.json");
         let command = format!(
-            "{} controller --mode free-run --link {link} --patience 3 --table {} --json {} --record {place}",
+            "{} controller --mode free-run --link {link} --patience {} --table {} --json {} --record {place}",
             stage.program.display(),
+            stage.patience(),
             stage.table_file.display(),
             json.display()
         );
@@ -156,7 +171,7 @@ pub(crate) fn disk_full(stage: &Stage<'_>, evidence: &mut Evidence) -> Result<()
         let plant = read_json::<PlantResult>(&plant_json);
         evidence.require(result.is_some() && plant.is_some(), || format!("{}: no accounts", what()));
         let (Some(result), Some(plant)) = (result, plant) else { continue };
-        evidence.unaccounted += unaccounted(&result, Some(plant.published));
+        evidence.unaccounted += unaccounted(&result, Some(&plant));
         evidence.max_error = Some(evidence.max_error.unwrap_or(0.0).max(plant.largest_error));
         let record = result.accounts.record.clone().unwrap_or_default();
         let lost = record.lost_in_ring + record.lost_on_disk;

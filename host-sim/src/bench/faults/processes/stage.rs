@@ -14,10 +14,12 @@ use rustix::process::{Pid, Signal, kill_process, kill_process_group};
 use serde::de::DeserializeOwned;
 
 use crate::bench::error::SimError;
+use crate::bench::paper_table::BRICK;
 use crate::exchange::{Departure, LinkError, Space};
 use crate::record::error::FileError;
 use crate::runtime::controller::process::ControllerResult;
 use crate::runtime::error::RuntimeError;
+use crate::runtime::plant::process::PlantResult;
 use crate::runtime::signals;
 
 /// How long any of them may take to end.
@@ -25,13 +27,17 @@ pub(super) const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Where the rows with real processes take place.
 #[derive(Debug)]
-pub(crate) struct Stage<'t> {
+pub(crate) struct Stage<'t, const D: usize = 2, const N: usize = 1, const P: usize = 1> {
     /// The controller's table.
-    pub(super) table: &'t Table<f64, 2>,
+    pub(super) table: &'t Table<f64, D, N, P>,
     /// This program.
     pub(super) program: PathBuf,
     /// The table as a file.
     pub(super) table_file: PathBuf,
+    /// Which plant belongs to it.
+    plant: Vec<String>,
+    /// How long that takes before it looks for a controller: what it has to compute first.
+    lead: Duration,
     /// Seed of the phases.
     pub(super) seed: u64,
     /// Part of the catalogue's number of repetitions, 1 for all.
@@ -41,9 +47,9 @@ pub(crate) struct Stage<'t> {
     counter: AtomicU32,
 }
 
-impl<'t> Stage<'t> {
+impl<'t, const D: usize, const N: usize, const P: usize> Stage<'t, D, N, P> {
     /// A folder with a copy of this program and the table, for other users to read.
-    pub(crate) fn new(table: &'t Table<f64, 2>, seed: u64, effort: f64) -> Result<Self, SimError> {
+    pub(crate) fn new(table: &'t Table<f64, D, N, P>, seed: u64, effort: f64) -> Result<Self, SimError> {
         let folder = tempfile::Builder::new().prefix("stillpoint-faults-").tempdir().map_err(RuntimeError::Spawn)?;
         let write = |path: &Path, outcome: std::io::Result<()>| outcome.map_err(FileError::write(path));
         let readable = std::fs::Permissions::from_mode(0o755);
@@ -53,7 +59,51 @@ impl<'t> Stage<'t> {
         write(&program, std::fs::copy(current, &program).map(drop))?;
         let table_file = folder.path().join("controller.table");
         write(&table_file, std::fs::write(&table_file, to_bytes(table)?))?;
-        Ok(Self { table, program, table_file, seed, effort, folder, counter: AtomicU32::new(0) })
+        let indices = table.paddles.each_ref().map(|paddle| paddle.index.to_string());
+        let mut plant = vec!["--paddle".to_owned(), indices.join(",")];
+        if D > 2 {
+            let scene = folder.path().join("brick.toml");
+            write(&scene, std::fs::write(&scene, BRICK))?;
+            plant.extend(["--scene".to_owned(), scene.to_string_lossy().into_owned()]);
+        }
+        let (counter, lead) = (AtomicU32::new(0), Duration::ZERO);
+        let stage = Self { table, program, table_file, plant, lead, seed, effort, folder, counter };
+        if D > 2 { stage.with_lead() } else { Ok(stage) }
+    }
+
+    /// The same with the time that a plant takes: one that finds no controller gives up at once.
+    fn with_lead(self) -> Result<Self, SimError> {
+        let started = Instant::now();
+        let mut plant = self.start(&self.plant_call(&self.link(), &["--patience", "0.001"]))?;
+        let _ = plant.code();
+        Ok(Self { lead: started.elapsed(), ..self })
+    }
+
+    /// This long after its start the plant is at work, and then so much longer.
+    pub(super) fn after_the_start(&self, then: Duration) -> Duration {
+        self.lead + then
+    }
+
+    /// Milliseconds until a plant looks for a controller.
+    pub(super) fn lead_ms(&self) -> u64 {
+        u64::try_from(self.lead.as_millis()).unwrap_or(u64::MAX)
+    }
+
+    /// Seconds that either side waits for the other.
+    pub(super) fn patience(&self) -> String {
+        (3 + 3 * self.lead.as_secs()).to_string()
+    }
+
+    /// Which plant belongs to the table, as arguments.
+    pub(super) fn plant_arguments(&self) -> impl Iterator<Item = &str> {
+        self.plant.iter().map(String::as_str)
+    }
+
+    fn plant_call<'a>(&'a self, link: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+        let mut arguments = vec!["plant", "--mode", "free-run", "--link", link];
+        arguments.extend(self.plant_arguments());
+        arguments.extend(more);
+        arguments
     }
 
     /// This many repetitions, or the part of them that was asked for.
@@ -92,7 +142,8 @@ impl<'t> Stage<'t> {
         let (record, json) = (self.path("controller.rec"), self.path("controller.json"));
         let files = [&self.table_file, &record, &json].map(|path| path.to_string_lossy().into_owned());
         let [table, record_text, json_text] = files.each_ref().map(String::as_str);
-        let mut arguments = vec!["controller", "--link", link, "--patience", "3"];
+        let patience = self.patience();
+        let mut arguments = vec!["controller", "--link", link, "--patience", &patience];
         if !more.contains(&"--mode") {
             arguments.extend(["--mode", "free-run"]);
         }
@@ -105,8 +156,8 @@ impl<'t> Stage<'t> {
     pub(super) fn plant(&self, link: &str, more: &[&str]) -> Result<(Process, PathBuf), SimError> {
         let json = self.path("plant.json");
         let json_text = json.to_string_lossy().into_owned();
-        let mut arguments = vec!["plant", "--mode", "free-run", "--link", link, "--paddle", "3", "--patience", "3"];
-        arguments.extend(["--json", &json_text]);
+        let patience = self.patience();
+        let mut arguments = self.plant_call(link, &["--patience", &patience, "--json", &json_text]);
         arguments.extend(more);
         Ok((self.start(&arguments)?, json))
     }
@@ -211,16 +262,17 @@ pub(super) fn children() -> usize {
     children.map(|list| list.split_whitespace().count()).sum()
 }
 
-/// Samples and ticks that a controller cannot account for, given what the plant says it published, if it lived to say.
-pub(super) fn unaccounted(result: &ControllerResult, published: Option<[u64; 3]>) -> u64 {
+/// Samples and ticks that a controller cannot account for, given the plant's account of what it published, if it lived to say.
+pub(super) fn unaccounted(result: &ControllerResult, plant: Option<&PlantResult>) -> u64 {
     let handover = &result.accounts;
-    let streams = [&handover.needle, &handover.target, &handover.paddle];
-    let own: u64 = streams.iter().map(|stream| stream.unaccounted).sum();
-    let lost: u64 = published.map_or(0, |published| {
+    let streams = [&handover.needle, &handover.target, &handover.paddle].into_iter().chain(&handover.second_paddle);
+    let own: u64 = streams.clone().map(|stream| stream.unaccounted).sum();
+    let lost: u64 = plant.map_or(0, |plant| {
+        let published = plant.published.into_iter().chain(plant.published_second_paddle);
         let entries = streams.map(|stream| {
             stream.consumed + stream.overwritten + stream.discarded.iter().sum::<u64>() + stream.in_flight
         });
-        published.iter().zip(entries).map(|(published, entries)| published.abs_diff(entries)).sum()
+        published.zip(entries).map(|(published, entries)| published.abs_diff(entries)).sum()
     });
     let record = handover.record.as_ref().map_or(0, |record| record.unaccounted());
     own + lost + handover.ticks.unaccounted + record

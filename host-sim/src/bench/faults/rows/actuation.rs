@@ -1,31 +1,45 @@
 //! Rows 19 to 25: saturation, the actuator, the sign and the identity of the plant, Jacobians near singularity.
 
-use firmware::contract::frames::to_plane;
 use firmware::contract::{MAX_TABLE_BYTES, Table, encode};
 use firmware::detection::{FOLLOWING_FRACTION, FOLLOWING_SAMPLES, FROZEN_TRAVEL};
 use firmware::{Faults, Feedback, Mode, Settings, loop_stability};
-use nalgebra::{Matrix2, Rotation2, Vector2};
+use nalgebra::{Rotation2, Rotation3, SMatrix, Unit, Vector3};
 
-use super::{FOR_EVER, Trial, comes_back, stays_safe_until_rearmed};
+use super::{FOR_EVER, Trial, comes_back, excursions, largest, stays_safe_until_rearmed, steepest};
 use crate::bench::error::SimError;
 use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
 use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::Fault;
+use crate::bench::faults::tissue::sideways;
+use crate::world::actuator::ActuatorModel;
+use crate::world::truth::from_frame;
 
 const MS: u64 = 1_000_000;
 
-/// Orthogonal target displacement that the paddle can take away at most, length.
-fn reach(table: &Table<f64, 2>) -> f64 {
-    let measure = |knot: &firmware::contract::Knot<f64, 2>| {
-        knot.jacobian[0].try_inverse().map_or(f64::INFINITY, |inverse| (inverse * table.orthogonal).norm())
-    };
-    let worst = table.knots.iter().map(measure).fold(0.0, f64::max);
-    table.paddles[0].max_displacement / worst
+/// Push of the target up to which no paddle is at its limit, length.
+fn reach<const D: usize, const N: usize, const P: usize>(table: &Table<f64, D, N, P>) -> f64 {
+    let ranges =
+        table.paddles.iter().zip(excursions(table, &sideways())).map(|(paddle, worst)| paddle.max_displacement / worst);
+    ranges.fold(f64::INFINITY, f64::min)
+}
+
+/// Push that no motion of the paddles can take away, length. In the plane the law leaves the axis alone, and there is one way only;
+/// in space each paddle can move the target along the push by its range times the norm of that row of its Jacobian, at most.
+fn beyond_reach<const D: usize, const N: usize, const P: usize>(table: &Table<f64, D, N, P>) -> f64 {
+    if D == 2 {
+        return reach(table);
+    }
+    let direction = table.orthogonal * sideways::<N>();
+    let rows = largest(table, |knot| knot.jacobian.map(|jacobian| jacobian.tr_mul(&direction).norm()));
+    table.paddles.iter().zip(rows).map(|(paddle, row)| paddle.max_displacement * row).sum()
 }
 
 /// Row 19: the paddle at the end of its range: clamped, no windup, back without overshoot.
-pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
-    let reach = reach(trial.table);
+pub(crate) fn position_saturation<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
+    let reach = beyond_reach(trial.table);
     for sign in [1.0, -1.0] {
         let what = || format!("push of {sign} × 1.5 reach");
         let mut bench = ClosedLoop::new(trial.table, Setup { noise: 0.0, speed: 0.0, ..trial.setup() })?;
@@ -36,7 +50,7 @@ pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) ->
         evidence.detect(bench.until(15_000, carries(Faults::POSITION_LIMITED)), 12_000, what);
         bench.run(20_000 - (bench.now() - 200));
         evidence.expect_mode(&bench, Mode::Run, what);
-        let left = sign * bench.error;
+        let left = sign * bench.error_sideways();
         evidence.require(left > 0.3 * reach, || format!("{}: only {left} is left over", what()));
         bench.max_error = 0.0;
         bench.inject(Fault::Push(-sign * rate), 15_000);
@@ -44,12 +58,12 @@ pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) ->
         let mut worst: f64 = 0.0;
         for _ in 0..15_000 {
             bench.step();
-            worst = worst.max(-sign * bench.error);
+            worst = worst.max(-sign * bench.error_sideways());
         }
         // Behind a ramp the error is the ramp's lag; anything beyond would be windup.
         evidence.require(worst < lag, || format!("{}: overshoot of {worst} past the lag {lag}", what()));
         bench.run(1000);
-        let error = bench.error.abs();
+        let error = bench.error.norm();
         evidence.require(error < 0.01 * lag + 1e-9, || format!("{}: {error} is left at the end", what()));
         evidence.expect_mode(&bench, Mode::Run, what);
         evidence.close(&bench, what);
@@ -58,30 +72,30 @@ pub(crate) fn position_saturation(trial: &Trial<'_>, evidence: &mut Evidence) ->
 }
 
 /// Row 20: a paddle that is too slow for its feed-forward: limited, no windup, there without overshoot.
-pub(crate) fn rate_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn rate_saturation<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut table = trial.table.clone();
     let setup = Setup { noise: 0.0, ..trial.setup() };
-    let steepest = table.knots.iter().map(|knot| knot.paddle_path_slope.norm()).fold(0.0, f64::max);
-    table.paddles[0].max_rate = 0.5 * steepest * setup.speed;
-    let mut bench = ClosedLoop::new(
-        &table,
-        Setup {
-            actuator: crate::world::actuator::ActuatorModel { max_rate: table.paddles[0].max_rate, ..setup.actuator },
-            ..setup
-        },
-    )?;
+    let mut setup = setup;
+    for (place, steepest) in steepest(trial.table).into_iter().enumerate() {
+        let max_rate = 0.5 * steepest * setup.speed;
+        (table.paddles[place].max_rate, setup.actuators[place].max_rate) = (max_rate, max_rate);
+    }
+    let mut bench = ClosedLoop::new(&table, setup)?;
     evidence.detect(bench.until(3000, carries(Faults::RATE_LIMITED)), 3000, || "slow paddle".to_owned());
     bench.run(6000 - bench.now());
-    let late = bench.error;
+    let late = bench.error.normalize();
     let mut overshoot: f64 = 0.0;
     for _ in 0..10_000 {
         bench.step();
-        overshoot = overshoot.max(-late.signum() * bench.error);
+        overshoot = overshoot.max(-late.dot(&bench.error));
     }
     evidence.require(overshoot <= 0.02 * bench.max_error, || {
         format!("overshoot of {overshoot}, the largest error was {}", bench.max_error)
     });
-    let error = bench.error.abs();
+    let error = bench.error.norm();
     evidence.require(error < 1e-3 * bench.max_error + 1e-9, || format!("{error} is left at the end"));
     evidence.expect_mode(&bench, Mode::Run, || "slow paddle".to_owned());
     evidence.close(&bench, || "slow paddle".to_owned());
@@ -89,9 +103,14 @@ pub(crate) fn rate_saturation(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
 }
 
 /// Row 21: an actuator that is stuck or reaches half of its commands trips the following error.
-pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn actuator_broken<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(21);
-    for fault in [Fault::Stuck, Fault::ActuatorGain(0.5)] {
+    let broken =
+        trial.paddles().flat_map(|(place, _)| [(place, Fault::Stuck(place)), (place, Fault::ActuatorGain(place, 0.5))]);
+    for (place, fault) in broken {
         let what = || format!("{fault:?}");
         let mut bench = trial.running(&mut random)?;
         bench.inject(fault, FOR_EVER);
@@ -100,17 +119,18 @@ pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
         let settings = bench.setup().settings;
         let table = trial.table;
         let delay_s = (settings.actuator_delay_ns + settings.loop_period_ns) as f64 * 1e-9;
-        let part = if fault == Fault::Stuck { FROZEN_TRAVEL } else { FOLLOWING_FRACTION };
-        let admitted = part * table.paddles[0].max_displacement + table.paddles[0].max_rate * delay_s;
+        let part = if fault == Fault::Stuck(place) { FROZEN_TRAVEL } else { FOLLOWING_FRACTION };
+        let limits = &table.paddles[place];
+        let admitted = part * limits.max_displacement + limits.max_rate * delay_s;
         let mut off_since = None;
         let mut tripped = None;
         for tick in 1..=6000u64 {
-            let commanded = bench.last.map(|last| Vector2::from(to_plane(last.command.displacement[0])));
+            let commanded = bench.last.map(|last| from_frame::<D>(last.command.displacement[place]));
             if let Some(exchange) = bench.step()
-                && let (Some(sample), Some(commanded)) = (exchange.inputs.paddles[0], commanded)
+                && let (Some(sample), Some(commanded)) = (exchange.inputs.paddles[place], commanded)
             {
                 // What is past it for a moment only is jitter of the command.
-                let off = (Vector2::from(to_plane(sample.displacement)) - commanded).norm() > admitted;
+                let off = (from_frame::<D>(sample.displacement) - commanded).norm() > admitted;
                 off_since = if off { off_since.or(Some(tick)) } else { None };
                 let faults = Faults::from_bits(exchange.command.faults);
                 if !faults.intersection(Faults::FOLLOWING_ERROR | Faults::FROZEN).is_empty() {
@@ -131,9 +151,12 @@ pub(crate) fn actuator_broken(trial: &Trial<'_>, evidence: &mut Evidence) -> Res
 
 /// Row 22: lag and delay of the actuator, 0 to 10 ticks: the integral, whose limit is known, is stable right up to it; at
 /// the default gain always.
-pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn actuator_late<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut table = trial.table.clone();
-    table.paddles[0].max_rate = 1e3;
+    table.paddles.iter_mut().for_each(|paddle| paddle.max_rate = 1e3);
     let start = 1e-5 * table.validity.depth_end;
     let mut growth = |delay: u32, lag_s: f64, gain: Option<f64>| -> Result<f64, crate::bench::error::SimError> {
         let mut setup = Setup { noise: 0.0, speed: 0.0, ..trial.setup() };
@@ -144,9 +167,9 @@ pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Resul
             actuator_delay_ns: u64::from(delay) * MS + (2.0 * lag_s * 1e9) as u64,
             ..Settings::new(MS, MS, 0)
         };
-        setup.actuator.delay_ticks = delay;
-        setup.actuator.lag_s = lag_s;
-        setup.actuator.max_rate = 1e3;
+        for actuator in &mut setup.actuators {
+            *actuator = ActuatorModel { delay_ticks: delay, lag_s, max_rate: 1e3, ..*actuator };
+        }
         let mut bench = ClosedLoop::new(&table, setup)?;
         bench.run(100);
         bench.tissue().push = start;
@@ -186,23 +209,30 @@ pub(crate) fn actuator_late(trial: &Trial<'_>, evidence: &mut Evidence) -> Resul
 }
 
 /// The witness: ticks until a paddle whose actuator is this many ticks late has moved at all.
-fn arrival(table: &Table<f64, 2>, trial: &Trial<'_>, delay: u32) -> Result<u64, SimError> {
+fn arrival<const D: usize, const N: usize, const P: usize>(
+    table: &Table<f64, D, N, P>,
+    trial: &Trial<'_, D, N, P>,
+    delay: u32,
+) -> Result<u64, SimError> {
     let mut setup = Setup { noise: 0.0, ..trial.setup() };
-    setup.actuator.delay_ticks = delay;
+    setup.actuators.iter_mut().for_each(|actuator| actuator.delay_ticks = delay);
     setup.settings.actuator_delay_ns = 10 * MS;
     let mut bench = ClosedLoop::new(table, setup)?;
-    let start = bench.paddle();
+    let start = bench.paddles();
     Ok((0..1000)
         .find(|_| {
             bench.step();
-            bench.paddle() != start
+            bench.paddles() != start
         })
         .unwrap_or(u64::MAX / 2))
 }
 
 /// Row 23: tissue that answers with the wrong sign leads to SAFE; with the right sign and up to half again as strong,
 /// or pushed with up to a third of what the paddle can follow, it never does.
-pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn sign_error<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     for (gain, seed) in [(-1.0, 1), (-0.5, 2), (-1.5, 3), (-1.0, 4)] {
         let what = || format!("response × {gain}");
         let mut bench = ClosedLoop::new(trial.table, Setup { seed: trial.seed + seed, ..trial.setup() })?;
@@ -213,7 +243,8 @@ pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
         evidence.expect_mode(&bench, Mode::Safe, what);
         evidence.close(&bench, what);
     }
-    let follow = reach(trial.table) / trial.table.paddles[0].max_displacement * trial.table.paddles[0].max_rate;
+    let crossings = trial.table.paddles.iter().map(|paddle| paddle.max_rate / paddle.max_displacement);
+    let follow = reach(trial.table) * crossings.fold(f64::INFINITY, f64::min);
     for gain in [0.3, 0.7, 1.0, 1.5] {
         for push in [0.0, 0.1, -0.1, 0.33, -0.33] {
             let what = || format!("response × {gain}, push {push}");
@@ -236,12 +267,20 @@ pub(crate) fn sign_error(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
 
 /// Row 24: another paddle than the table's is known by its identity; one that lies about it, by the loop that it makes
 /// unstable. A wrong one with which the loop is stable is no danger.
-pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn wrong_paddle<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(24);
-    for index in [0, trial.table.paddles[0].index + 1, u32::MAX] {
-        let what = || format!("paddle {index}");
+    let wrong = trial.table.paddles.iter().enumerate().flat_map(|(place, paddle)| {
+        // In space the other paddle, too.
+        let other = trial.table.paddles.iter().map(|paddle| paddle.index).find(|index| *index != paddle.index);
+        [0, paddle.index + 1, u32::MAX].into_iter().chain(other).map(move |index| (place, index))
+    });
+    for (place, index) in wrong {
+        let what = || format!("paddle {index} in place {place}");
         let mut bench = trial.running(&mut random)?;
-        let found = bench.inject(Fault::PaddleIdentity(index), 10).until(1, carries(Faults::PADDLE_IDENTITY));
+        let found = bench.inject(Fault::PaddleIdentity(place, index), 10).until(1, carries(Faults::PADDLE_IDENTITY));
         evidence.detect(found, 1, what);
         bench.run(20);
         stays_safe_until_rearmed(&mut bench, evidence, what);
@@ -250,7 +289,7 @@ pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
     for degrees in [0.0, 30.0, -45.0, 150.0, 180.0, -160.0f64] {
         let what = || format!("response turned by {degrees}°");
         let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
-        bench.tissue().turn = Rotation2::new(degrees.to_radians()).into_inner();
+        bench.tissue().turn = about_the_needle(trial.table, degrees.to_radians());
         if degrees.abs() > 90.0 {
             evidence.detect(bench.until(6000, carries(Faults::DIVERGENCE)), 4500, what);
             bench.run(50);
@@ -258,8 +297,8 @@ pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
         } else {
             bench.run(6500);
             evidence.expect_mode(&bench, Mode::Run, what);
-            let settled = bench.error.abs();
-            let bound = 4.0 * bench.setup().noise;
+            let settled = bench.error.norm();
+            let bound = 4.0 * (N as f64).sqrt() * bench.setup().noise;
             evidence.require(settled < bound, || format!("{}: {settled} is left", what()));
         }
         evidence.close(&bench, what);
@@ -268,17 +307,45 @@ pub(crate) fn wrong_paddle(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
     Ok(())
 }
 
+/// A turn by an angle, rad: in space about an axis that is none of the scene's.
+fn turned<const D: usize>(angle: f64) -> SMatrix<f64, D, D> {
+    let solid = Rotation3::from_axis_angle(&Unit::new_normalize(Vector3::new(0.3, -0.5, 0.8)), angle).into_inner();
+    let flat = Rotation2::new(angle).into_inner();
+    SMatrix::from_fn(|i, j| if D == 2 { flat[(i, j)] } else { solid[(i, j)] })
+}
+
+/// A turn about the needle by an angle, rad; in the plane, which has no such axis, about the target.
+fn about_the_needle<const D: usize, const N: usize, const P: usize>(
+    table: &Table<f64, D, N, P>,
+    angle: f64,
+) -> SMatrix<f64, D, D> {
+    if D == 2 {
+        return turned(angle);
+    }
+    let axis = Vector3::from_fn(|i, _| table.needle_axis[i]);
+    let solid = Rotation3::from_axis_angle(&Unit::new_normalize(axis), angle).into_inner();
+    SMatrix::from_fn(|i, j| solid[(i, j)])
+}
+
 /// Row 25: Jacobians with σmin from 1e-1 to 1e-12: refused past the condition limit, harmless up to it.
-pub(crate) fn near_singular(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn near_singular<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     for exponent in 1..=12 {
         for angle in [0.3, 1.2, 2.5f64] {
             let what = || format!("σmin = 1e-{exponent}");
             let mut table = trial.table.clone();
-            let (left, right) = (Rotation2::new(angle), Rotation2::new(2.0 * angle + 0.1));
+            let [left, right] = [angle, 2.0 * angle + 0.1].map(turned::<D>);
             for knot in &mut table.knots {
-                let singular_values = Matrix2::new(0.3, 0.0, 0.0, 0.3 * 10f64.powi(-exponent));
-                knot.jacobian = [left.matrix() * singular_values * right.matrix()];
-                (knot.paddle_path, knot.paddle_path_slope) = (Vector2::zeros(), Vector2::zeros());
+                // The same of all paddles in the target's weak direction, or they would help each other.
+                let singular_values = SMatrix::from_fn(|i, j| match (i == j, i + 1 == D) {
+                    (false, _) => 0.0,
+                    (true, false) => 0.3,
+                    (true, true) => 0.3 * 10f64.powi(-exponent),
+                });
+                knot.jacobian = [left * singular_values * right; P];
+                (knot.paddle_path, knot.paddle_path_slope) = (SMatrix::zeros(), SMatrix::zeros());
             }
             evidence.injected += 1;
             let mut buffer = vec![0; MAX_TABLE_BYTES];

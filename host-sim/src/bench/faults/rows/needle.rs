@@ -1,18 +1,22 @@
 //! Rows 30 to 32: a needle that leaves the table, turns back, or is too fast.
 
-use firmware::contract::frames::to_plane;
 use firmware::{Faults, Mode};
-use nalgebra::Vector2;
+use nalgebra::SVector;
 
-use super::{Trial, comes_back};
+use super::{Trial, comes_back, largest, law, steepest};
 use crate::bench::error::SimError;
 use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
 use crate::bench::faults::evidence::{Evidence, carries};
 use crate::bench::faults::fault::Fault;
+use crate::bench::faults::invariants::positions;
 use crate::bench::faults::tissue::LinearTissue;
+use crate::world::truth::from_frame;
 
 /// Row 30: past the last knot the feed-forward stays at its last value, and says so.
-pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn beyond_the_table<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut short = trial.table.clone();
     let kept = 2 * short.knots.len() / 3;
     short.knots.truncate(kept);
@@ -40,8 +44,10 @@ pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Re
         if faults.intersection(Faults::POSITION_LIMITED | Faults::RATE_LIMITED).is_empty()
             && let Some(added) = bench.state.added()
         {
-            let expected = last.paddle_path + Vector2::from(to_plane(added[0]));
-            let off = (Vector2::from(to_plane(command.displacement[0])) - expected).norm();
+            let now: [SVector<f64, D>; P] = positions(&command);
+            let off =
+                |place: usize| (now[place] - (last.paddle_path.column(place) + from_frame::<D>(added[place]))).norm();
+            let off = (0..P).map(off).fold(0.0, f64::max);
             evidence.require(off < 1e-12, || format!("depth {}: {off} off the last knot's path", needle.depth));
         }
     }
@@ -51,19 +57,21 @@ pub(crate) fn beyond_the_table(trial: &Trial<'_>, evidence: &mut Evidence) -> Re
 }
 
 /// Row 31: the needle turns back in the middle: the command goes on without a step.
-pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn reversal<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(31);
     for factor in [-1.0, -3.0] {
         let what = || format!("speed × {factor}");
         let mut bench = trial.running(&mut random)?;
         let period_s = bench.setup().settings.loop_period_ns as f64 * 1e-9;
-        let slope = trial.table.knots.iter().map(|knot| knot.paddle_path_slope.norm()).fold(0.0, f64::max);
+        let slopes = steepest(trial.table);
         bench.inject(Fault::NeedleSpeed(factor), 400);
         let (started_at, mut least, mut turned, mut heard) = (bench.depth(), bench.depth(), None, None);
         // A step: more than feed-forward at this speed and one correction of the feedback explain.
-        let direction = trial.table.knots.iter().filter_map(|knot| knot.jacobian[0].try_inverse());
-        let measure = direction.map(|inverse| (inverse * trial.table.orthogonal).norm()).fold(0.0, f64::max);
-        let mut last = bench.last.map(|last| Vector2::from(to_plane(last.command.displacement[0])));
+        let measures = largest(trial.table, |knot| law(trial.table, knot).map(|direction| direction.norm()));
+        let mut last: Option<[SVector<f64, D>; P]> = bench.last.map(|last| positions(&last.command));
         for tick in 1..=600u64 {
             let (error, before) = (bench.max_error, bench.depth());
             let Some(exchange) = bench.step() else { continue };
@@ -74,12 +82,15 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(),
                 heard = heard.or(Some(tick));
             }
             least = least.min(bench.depth());
-            let now = Vector2::from(to_plane(exchange.command.displacement[0]));
+            let now: [SVector<f64, D>; P] = positions(&exchange.command);
             let speed = bench.setup().speed * factor.abs();
             let noise = 8.0 * bench.setup().noise;
-            let explained = 2.0 * slope * speed * period_s + bench.loop_gain() * measure * (error + noise);
-            let step = last.map_or(0.0, |last| (now - last).norm());
-            evidence.require(step <= explained, || format!("{}: step of {step}, {explained} explained", what()));
+            for place in 0..P {
+                let (slope, measure) = (slopes[place], measures[place]);
+                let explained = 2.0 * slope * speed * period_s + bench.loop_gain() * measure * (error + noise);
+                let step = last.map_or(0.0, |last| (now[place] - last[place]).norm());
+                evidence.require(step <= explained, || format!("{}: step of {step}, {explained} explained", what()));
+            }
             last = Some(now);
         }
         // The needle itself has turned, and the controller, which heard of it at once, has gone on.
@@ -93,7 +104,10 @@ pub(crate) fn reversal(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(),
 }
 
 /// Row 32: a needle faster than the table holds for: HOLD on that very tick, RUN when it is slower again.
-pub(crate) fn too_fast(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn too_fast<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(32);
     let limit = trial.table.validity.needle_speed;
     for excess in [1.2, 2.0] {

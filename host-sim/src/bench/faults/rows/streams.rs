@@ -20,12 +20,19 @@ fn age_limits(stream: Stream, settings: &Settings) -> [u64; 2] {
     let floor = SAFE_AGE_FLOOR_NS / period;
     match stream {
         Stream::Target => [target(TARGET_SAMPLES_TO_HOLD), target(TARGET_SAMPLES_TO_SAFE).max(floor)],
-        Stream::Needle | Stream::Paddle => [TICKS_TO_HOLD, floor.max(10 * TICKS_TO_HOLD)],
+        Stream::Needle | Stream::Paddle | Stream::SecondPaddle => [TICKS_TO_HOLD, floor.max(10 * TICKS_TO_HOLD)],
     }
 }
 
+/// The streams of encoders: a sample on every tick.
+fn at_loop_rate<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+) -> impl Iterator<Item = Stream> {
+    trial.streams().iter().copied().filter(|stream| *stream != Stream::Target)
+}
+
 /// Goes on until a target sample has just arrived; its age then, ticks.
-fn after_a_target_sample(bench: &mut ClosedLoop<'_>) -> u64 {
+fn after_a_target_sample<const D: usize, const N: usize, const P: usize>(bench: &mut ClosedLoop<'_, D, N, P>) -> u64 {
     let period = bench.setup().settings.loop_period_ns;
     loop {
         if let Some(exchange) = bench.step()
@@ -37,9 +44,12 @@ fn after_a_target_sample(bench: &mut ClosedLoop<'_>) -> u64 {
 }
 
 /// Row 7: a stream that stops leads to HOLD on the first tick past its first limit and to SAFE past its second.
-pub(crate) fn stale(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn stale<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(7);
-    for stream in Stream::ALL {
+    for stream in trial.streams().iter().copied() {
         let mut bench = trial.running(&mut random)?;
         let age = if stream == Stream::Target { after_a_target_sample(&mut bench) } else { 0 };
         let [hold, safe] = age_limits(stream, &bench.setup().settings).map(|limit| limit - age + 1);
@@ -55,7 +65,7 @@ pub(crate) fn stale(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Si
         evidence.close(&bench, || format!("{stream:?}"));
     }
     // Samples that arrive, all of them, but older than the limit.
-    for stream in [Stream::Needle, Stream::Paddle] {
+    for stream in at_loop_rate(trial) {
         let mut bench = trial.running(&mut random)?;
         bench.inject(Fault::Late(stream, TICKS_TO_HOLD + 3), FOR_EVER);
         evidence.detect(bench.until(50, is_in(Mode::Hold)), TICKS_TO_HOLD + 1, || format!("late {stream:?}"));
@@ -67,9 +77,12 @@ pub(crate) fn stale(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Si
 }
 
 /// Row 8: gaps in the sequence are counted exactly.
-pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn gaps<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(8);
-    for stream in Stream::ALL {
+    for stream in trial.streams().iter().copied() {
         for gap in [1, 10, 1000] {
             let what = || format!("{gap} of {stream:?}");
             let mut setup = trial.setup();
@@ -94,7 +107,10 @@ pub(crate) fn gaps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Sim
 }
 
 /// Row 9: a sample that arrives twice is used once.
-pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn duplicates<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(9);
     let mut twins = trial.twins(&mut random)?;
     twins[1].inject(Fault::Duplicated(Stream::Target), 1000);
@@ -111,7 +127,7 @@ pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
     evidence.expect_mode(doubled, Mode::Run, || "Target".to_owned());
     evidence.close(doubled, || "Target".to_owned());
     // At loop rate a duplicate takes the place of the sample that arrives with it.
-    for stream in [Stream::Needle, Stream::Paddle] {
+    for stream in at_loop_rate(trial) {
         let mut bench = trial.running(&mut random)?;
         for _ in 0..100 {
             let found = bench.inject(Fault::Duplicated(stream), 1).until(3, carries(Faults::DUPLICATE));
@@ -127,9 +143,13 @@ pub(crate) fn duplicates(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
 }
 
 /// Row 10: a sample that arrives after a newer one is discarded and counted.
-pub(crate) fn reordered(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn reordered<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(10);
-    for (stream, late, spacing) in [(Stream::Needle, 2, 5), (Stream::Paddle, 2, 5), (Stream::Target, 30, 80)] {
+    let encoders = at_loop_rate(trial).map(|stream| (stream, 2, 5));
+    for (stream, late, spacing) in encoders.chain([(Stream::Target, 30, 80)]) {
         let mut bench = trial.running(&mut random)?;
         for _ in 0..20 {
             if stream == Stream::Target {
@@ -151,7 +171,10 @@ pub(crate) fn reordered(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<()
 }
 
 /// Row 11: a value that stays while the sequence advances and the needle moves is detected.
-pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn frozen<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(11);
     let setup = trial.setup();
     let period_s = setup.settings.loop_period_ns as f64 * 1e-9;
@@ -160,13 +183,15 @@ pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), S
     let travel_ticks = ticks_of(FROZEN_TRAVEL);
     let samples = u64::from(FROZEN_SAMPLES) + 1;
     let per_target = setup.settings.target_period_ns / setup.settings.loop_period_ns;
-    for (stream, code, limit) in [
-        (Stream::Needle, Faults::FROZEN, ticks_of(NEEDLE_CONTRADICTION_TRAVEL)),
-        // The first frozen sample is a new value; the travel counts from sample to sample.
-        (Stream::Target, Faults::FROZEN, (samples + 1) * per_target + travel_ticks),
-        // The command has to go away from where it was.
-        (Stream::Paddle, Faults::FROZEN, 1500),
-    ] {
+    for stream in trial.streams().iter().copied() {
+        let code = Faults::FROZEN;
+        let limit = match stream {
+            Stream::Needle => ticks_of(NEEDLE_CONTRADICTION_TRAVEL),
+            // The first frozen sample is a new value; the travel counts from sample to sample.
+            Stream::Target => (samples + 1) * per_target + travel_ticks,
+            // The command has to go away from where it was.
+            Stream::Paddle | Stream::SecondPaddle => 1500,
+        };
         let [mut healthy, mut bench] = trial.twins(&mut random)?;
         let (depth, injected) = (bench.depth(), bench.injected);
         bench.inject(Fault::Frozen(stream), FOR_EVER);
@@ -185,7 +210,10 @@ pub(crate) fn frozen(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), S
 }
 
 /// Row 12: a target sensor of 30 Hz in a loop of 1 kHz makes no oscillation.
-pub(crate) fn slow_sensor(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn slow_sensor<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     const MS: u64 = 1_000_000;
     let setup = Setup { settings: Settings::new(MS, 33_333_333, 20 * MS), noise: 0.0, speed: 0.0, ..trial.setup() };
     let offset = 0.01 * trial.table.validity.depth_end;
@@ -197,9 +225,9 @@ pub(crate) fn slow_sensor(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
         let mut overshoot: f64 = 0.0;
         for _ in 0..4000 {
             bench.step();
-            overshoot = overshoot.max(-sign * bench.error);
+            overshoot = overshoot.max(-sign * bench.error_sideways());
         }
-        let left = bench.error.abs();
+        let left = bench.error.norm();
         evidence.require(overshoot < 0.01 * offset, || format!("overshoot of {overshoot} of {offset}"));
         evidence.require(left < 1e-6 * offset, || format!("{left} of {offset} is left"));
         evidence.detected += u64::from(overshoot < 0.01 * offset);
@@ -210,7 +238,10 @@ pub(crate) fn slow_sensor(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
 }
 
 /// Row 16: the target is lost for 1 to 500 ticks: HOLD, then SAFE; the return keeps the limits.
-pub(crate) fn target_lost(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn target_lost<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(16);
     let settings = trial.setup().settings;
     let [hold, safe] = age_limits(Stream::Target, &settings);

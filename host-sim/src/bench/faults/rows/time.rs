@@ -13,7 +13,10 @@ use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::time::mode::RunMode;
 
 /// Row 1: a step over its budget is counted, whole periods are skipped, the phase stays, nothing runs twice.
-pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn overrun<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(1);
     for (periods, skipped) in [(0.5, 0), (1.0, 0), (3.5, 3)] {
         let mut bench = trial.running(&mut random)?;
@@ -36,7 +39,10 @@ pub(crate) fn overrun(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), 
 }
 
 /// Row 2: an overrun on every tick leads to SAFE.
-pub(crate) fn overrun_on_every_tick(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn overrun_on_every_tick<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(2);
     for (periods, spacing) in [(1.5, 2), (3.5, 4)] {
         let mut bench = trial.running(&mut random)?;
@@ -54,13 +60,16 @@ pub(crate) fn overrun_on_every_tick(trial: &Trial<'_>, evidence: &mut Evidence) 
 }
 
 /// Row 3: the peer stops for 100 ms: one gap, HOLD, and RUN on fresh data.
-pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn peer_stopped<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(3);
     for lost in [false, true] {
         let what = || if lost { "samples lost" } else { "sequences stand still" }.to_owned();
         let mut bench = trial.running(&mut random)?;
         if lost {
-            for stream in Stream::ALL {
+            for stream in trial.streams().iter().copied() {
                 bench.inject(Fault::Lost(stream), 100);
             }
         } else {
@@ -86,7 +95,10 @@ pub(crate) fn peer_stopped(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
 
 /// Row 4: jumps of the wall clock by an hour leave no trace in the record: the same bytes. A steady clock that jumps as
 /// far does leave one.
-pub(crate) fn wall_clock(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn wall_clock<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     const HOUR_NS: i64 = 3_600_000_000_000;
     let mut random = trial.random(4);
     let untouched = run_with(trial, &[], evidence)?;
@@ -121,7 +133,11 @@ struct WallClockRun {
     wall_ns: i64,
 }
 
-fn run_with(trial: &Trial<'_>, events: &[Event], evidence: &mut Evidence) -> Result<WallClockRun, SimError> {
+fn run_with<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    events: &[Event],
+    evidence: &mut Evidence,
+) -> Result<WallClockRun, SimError> {
     let mut bench = ClosedLoop::new(trial.table, trial.setup())?;
     for event in events {
         bench.inject_at(*event);
@@ -132,7 +148,11 @@ fn run_with(trial: &Trial<'_>, events: &[Event], evidence: &mut Evidence) -> Res
     Ok(WallClockRun { record: recording(trial, &bench, &exchanges), wall_ns: bench.wall_clock_ns() })
 }
 
-fn recording(trial: &Trial<'_>, bench: &ClosedLoop<'_>, exchanges: &[ControllerTick]) -> Vec<u8> {
+fn recording<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    bench: &ClosedLoop<'_, D, N, P>,
+    exchanges: &[ControllerTick],
+) -> Vec<u8> {
     let header = RecordingHeader {
         mode: RunMode::Lockstep,
         seed: trial.seed,
@@ -145,7 +165,10 @@ fn recording(trial: &Trial<'_>, bench: &ClosedLoop<'_>, exchanges: &[ControllerT
 }
 
 /// Row 5: a tick from the past, or from the far future, is rejected: SAFE at once, nothing of it is used.
-pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn clock_back<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     const MS: u64 = 1_000_000;
     let mut random = trial.random(5);
     for back_ns in [MS + 1, 5 * MS, 3_600_000 * MS] {
@@ -178,8 +201,11 @@ pub(crate) fn clock_back(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(
 }
 
 /// Row 6: counters that wrap are no event: same motion, same accounts, gaps counted across the wrap.
-pub(crate) fn counter_wrap(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
-    let bench = |sequence| -> Result<ClosedLoop<'_>, crate::bench::error::SimError> {
+pub(crate) fn counter_wrap<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
+    let bench = |sequence| -> Result<ClosedLoop<'_, D, N, P>, crate::bench::error::SimError> {
         let mut setup = trial.setup();
         setup.sequence = sequence;
         Ok(ClosedLoop::new(trial.table, setup)?)

@@ -3,14 +3,21 @@
 use firmware::detection::NEEDLE_SPEED_MARGIN;
 use firmware::inputs::Discard;
 use firmware::{Faults, Mode};
+use nalgebra::SVector;
+use rand_pcg::Pcg64;
 
-use super::{Trial, comes_back, integral_bits, same_motion};
+use super::{Trial, comes_back, integral_bits, motion_bits, same_motion};
 use crate::bench::error::SimError;
 use crate::bench::faults::closed_loop::{ClosedLoop, Setup};
 use crate::bench::faults::evidence::{Evidence, carries, is_in};
-use crate::bench::faults::fault::{Fault, Stream, below, between};
+use crate::bench::faults::fault::{Fault, Stream, below, between, normal};
+use crate::world::truth::to_frame;
 
-fn refusals(bench: &ClosedLoop<'_>, stream: Stream, reason: Discard) -> u64 {
+fn refusals<const D: usize, const N: usize, const P: usize>(
+    bench: &ClosedLoop<'_, D, N, P>,
+    stream: Stream,
+    reason: Discard,
+) -> u64 {
     stream.account(bench.state.ledger()).discarded_for(reason)
 }
 
@@ -23,10 +30,10 @@ struct Bad<'r> {
 
 /// A single sample with the fault is refused for one of the reasons, does not touch the integral, and the paddle moves
 /// as if it had never arrived.
-fn refused(
-    trial: &Trial<'_>,
+fn refused<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
     evidence: &mut Evidence,
-    random: &mut rand_pcg::Pcg64,
+    random: &mut Pcg64,
     bad: &Bad<'_>,
 ) -> Result<(), SimError> {
     let Bad { stream, fault, reasons } = *bad;
@@ -42,8 +49,7 @@ fn refused(
     let mut found = None;
     let mut same = true;
     for tick in 1..=ticks {
-        let [a, b] =
-            [&mut lost, &mut hit].map(|bench| bench.step().map(|e| e.command.displacement[0].map(f64::to_bits)));
+        let [a, b] = [&mut lost, &mut hit].map(|bench| bench.step().map(|e| motion_bits(&e.command)));
         same &= a == b;
         let after: u64 = reasons.iter().map(|reason| refusals(&hit, stream, *reason)).sum();
         if found.is_none() && after > before {
@@ -64,10 +70,13 @@ fn refused(
 }
 
 /// Row 13: NaN, ±Inf, a subnormal in each number, and absurd times, are refused.
-pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn not_numbers<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(13);
-    for stream in Stream::ALL {
-        for field in 0..2 {
+    for stream in trial.streams().iter().copied() {
+        for field in 0..stream.numbers(D) {
             for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, -5e-324] {
                 let fault = Fault::Field(stream, field, value);
                 refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &[Discard::NotFinite] })?;
@@ -84,16 +93,19 @@ pub(crate) fn not_numbers(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
 }
 
 /// Row 14: finite numbers that cannot be are refused, and no start is made from a place where no paddle can rest.
-pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn out_of_range<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     not_adopted(trial, evidence)?;
     let mut random = trial.random(14);
     let reasons = [Discard::OutOfRange, Discard::Innovation];
     for value in [1e3, -1e3, 1e300, f64::MAX, f64::MIN, 1.0, -1.0] {
-        for stream in Stream::ALL {
-            let fault = Fault::Field(stream, 0, value);
-            refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
-            if stream != Stream::Needle {
-                let fault = Fault::Field(stream, 1, value);
+        for stream in trial.streams().iter().copied() {
+            // The needle's velocity has limits of its own, below.
+            let fields = if stream == Stream::Needle { 1 } else { stream.numbers(D) };
+            for field in 0..fields {
+                let fault = Fault::Field(stream, field, value);
                 refused(trial, evidence, &mut random, &Bad { stream, fault, reasons: &reasons })?;
             }
         }
@@ -108,16 +120,34 @@ pub(crate) fn out_of_range(trial: &Trial<'_>, evidence: &mut Evidence) -> Result
         let found = bench.until(1, |command| command.state == Mode::Hold as u32);
         evidence.detect(found, 1, || format!("velocity {value}"));
         bench.run(100);
-        evidence.expect_mode(&bench, Mode::Run, || format!("velocity {value}"));
+        // It contradicts the depth until the needle has gone on by as much again as both may differ by: up to 100 ticks.
+        comes_back(&mut bench, 100, evidence, || format!("velocity {value}"));
         evidence.close(&bench, || format!("velocity {value}"));
     }
     Ok(())
 }
 
 /// The start: HOLD until the paddle is known to rest where it may be commanded to.
-fn not_adopted(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
-    let range = trial.table.paddles[0].max_displacement;
-    let at = |part: f64| Setup { paddle: [part * range, 0.0], ..trial.setup() };
+fn not_adopted<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
+    trial.paddles().try_for_each(|(place, stream)| not_adopted_in(trial, place, stream, evidence))
+}
+
+/// The same of the paddle in one place.
+fn not_adopted_in<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    place: usize,
+    stream: Stream,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
+    let range = trial.table.paddles[place].max_displacement;
+    let at = |part: f64| {
+        let mut setup = trial.setup();
+        setup.paddles[place][0] = part * range;
+        setup
+    };
     let mut healthy = ClosedLoop::new(trial.table, at(0.5))?;
     let first = healthy.step().map(|exchange| exchange.command);
     let waits = first.is_some_and(|command| is_in(Mode::Hold)(&command) && !command.is_valid());
@@ -135,7 +165,7 @@ fn not_adopted(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimErro
     let mut found = None;
     for tick in 1..=40 {
         if tick % 2 == 0 {
-            pushed.inject(Fault::Scaled(Stream::Paddle, 0.9), 1);
+            pushed.inject(Fault::Scaled(stream, 0.9), 1);
         }
         let command = pushed.step().map(|exchange| exchange.command);
         if command.is_some_and(|command| carries(Faults::PADDLE_MOVING)(&command)) {
@@ -148,13 +178,16 @@ fn not_adopted(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimErro
 }
 
 /// Row 15: units that are off by 1000 are refused for as long as they last, and move nothing.
-pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn wrong_units<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     let mut random = trial.random(15);
     let reasons = [Discard::OutOfRange, Discard::Innovation];
     // A target or a paddle that is a thousand times too near its rest position is plausible by itself: what follows
     // from it (an error that never shrinks, a paddle that does not follow) is found by the monitors of rows 21 and 23.
-    let cases = [(Stream::Needle, 1e3), (Stream::Target, 1e3), (Stream::Paddle, 1e3), (Stream::Needle, 1e-3)];
-    for (stream, factor) in cases {
+    let too_large = trial.streams().iter().map(|stream| (*stream, 1e3));
+    for (stream, factor) in too_large.chain([(Stream::Needle, 1e-3)]) {
         let what = || format!("{stream:?} × {factor}");
         let mut twins = trial.twins(&mut random)?;
         for bench in &mut twins {
@@ -180,7 +213,10 @@ pub(crate) fn wrong_units(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<
 /// Row 17: single samples of something else. 5σ is noise and taken. 50σ is refused unless the motion of the needle
 /// explains as much: then it may be taken, and moves the target by no more than the gain's part of it. At rest it is the
 /// paddle's own answer to noise that explains as much now and then: 3 of 30,000 jumps over 150 seeds.
-pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn jumps<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     for (name, sigmas, moving) in
         [("default σ, needle at rest", 1.0, false), ("10 × σ", 10.0, true), ("default σ", 1.0, true)]
     {
@@ -216,23 +252,22 @@ pub(crate) fn jumps(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Si
 const MOST_MISSED_AT_REST: u64 = 2;
 
 /// 400 jumps, 5σ and 50σ in turns; how many were accepted and refused wrongly.
-fn jump_trial(
-    trial: &Trial<'_>,
-    setup: crate::bench::faults::closed_loop::Setup,
+fn jump_trial<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    setup: Setup<D, P>,
     evidence: &mut Evidence,
     name: &str,
 ) -> Result<[u64; 2], crate::bench::error::SimError> {
     const PER_TARGET: u64 = 20;
     let mut random = trial.random(17);
     let mut bench = trial.running_with(setup, &mut random)?;
-    let refusals = |bench: &ClosedLoop<'_>| refusals(bench, Stream::Target, Discard::Innovation);
+    let refusals = |bench: &ClosedLoop<'_, D, N, P>| refusals(bench, Stream::Target, Discard::Innovation);
     let (mut accepted, mut detected, mut slowest) = (0, 0, None);
     bench.max_error = 0.0;
     let start = refusals(&bench);
     for jump in 0..400 {
         let sigmas = if jump % 2 == 0 { 5.0 } else { 50.0 };
-        let angle = between(&mut random, 0.0, std::f64::consts::TAU);
-        let away = [angle.cos(), angle.sin()].map(|part| part * sigmas * setup.noise);
+        let away = to_frame(&any_direction::<D>(&mut random).map(|part| part * sigmas * setup.noise));
         bench.run(PER_TARGET * (10 + below(&mut random, 5)));
         let before = refusals(&bench);
         let injected = bench.injected;
@@ -262,8 +297,20 @@ fn jump_trial(
     Ok([accepted, refusals(&bench) - start - detected])
 }
 
+/// A direction drawn with equal chances for all.
+fn any_direction<const D: usize>(random: &mut Pcg64) -> SVector<f64, D> {
+    if D > 2 {
+        return SVector::<f64, D>::from_fn(|_, _| normal(random)).normalize();
+    }
+    let angle = between(random, 0.0, std::f64::consts::TAU);
+    SVector::from_fn(|i, _| if i == 0 { angle.cos() } else { angle.sin() })
+}
+
 /// Row 18: stated noise over five decades: the error stays in proportion, the state does not chatter.
-pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), SimError> {
+pub(crate) fn noise<const D: usize, const N: usize, const P: usize>(
+    trial: &Trial<'_, D, N, P>,
+    evidence: &mut Evidence,
+) -> Result<(), SimError> {
     /// The loop averages: at g·λ = 0.2 its error has 0.35 of the noise's deviation. This is 11 of those.
     const MOST_SIGMAS: f64 = 4.0;
     let depth = trial.table.validity.depth_end;
@@ -281,7 +328,8 @@ pub(crate) fn noise(trial: &Trial<'_>, evidence: &mut Evidence) -> Result<(), Si
         evidence.injected += bench.state.ledger().target.consumed - injected;
         let held = bench.audit.modes[0] - hold;
         evidence.require(held == 0, || format!("{}: {held} ticks in HOLD", what()));
-        let bound = MOST_SIGMAS * sigma + 1e-6 * depth;
+        // Every direction orthogonal to the needle has noise of its own.
+        let bound = MOST_SIGMAS * (N as f64).sqrt() * sigma + 1e-6 * depth;
         evidence.require(bench.max_error < bound, || format!("{}: error {:e} > {bound:e}", what(), bench.max_error));
         evidence.expect_mode(&bench, Mode::Run, what);
         evidence.close(&bench, what);
