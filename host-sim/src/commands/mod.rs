@@ -198,8 +198,21 @@ fn man(directory: &Path) -> Result<(), SimError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 12] =
-    ["place", "check", "draw", "solve", "table", "inspect", "new", "fit", "compare", "materials", "pareto", "sweep"];
+const ELSEWHERE: [&str; 13] = [
+    "place",
+    "check",
+    "draw",
+    "solve",
+    "table",
+    "inspect",
+    "new",
+    "fit",
+    "slice",
+    "compare",
+    "materials",
+    "pareto",
+    "sweep",
+];
 
 /// Reads the command line; ends the process with help, or with what is wrong and what was meant. Without a word it is `run`.
 pub(crate) fn parse() -> Command {

@@ -376,10 +376,19 @@ impl TissueModel {
         groups.all().chain([&self.target]).map(|stencil| stencil.nodes.as_slice())
     }
 
-    /// The rows of every paddle's nodes, where each paddle can be attached to a body that holds without it: none where
-    /// Nitsche's method imposes the values, or where a node of a paddle is one of the immobile part or of the needle too.
+    /// Whether one factor answers for every paddle.
+    pub(crate) fn attaches_to_one_factor(&self) -> bool {
+        self.attachable_rows().is_some()
+    }
+
+    /// The rows of every paddle's nodes, where each paddle can be attached to a body that holds without it. None where
+    /// Nitsche's method imposes the values; where what is held are no single unknowns, since the penalty that then holds them
+    /// would cost the compliance seven digits; or where a node of a paddle is one of the immobile part or of the needle too.
     pub(crate) fn attachable_rows(&self) -> Option<&[Vec<Stencil<2>>]> {
         let EssentialBoundary::Nodes(groups) = &self.essential else { return None };
+        if !ConstrainedRows::new(groups.with_paddle(None)).are_unknowns() {
+            return None;
+        }
         let same = |a: &Stencil<2>, b: &Stencil<2>| a.nodes == b.nodes && a.values == b.values;
         let apart = |row: &Stencil<2>| !groups.with_paddle(None).any(|held| same(held, row));
         groups.paddles.iter().flatten().all(apart).then_some(&groups.paddles)

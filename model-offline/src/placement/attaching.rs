@@ -4,12 +4,11 @@
 //! `C λ = g − Λ u°` give them the displacements g, where C = Λ K⁻¹ Λᵀ and u° is what the body does without the paddle. The
 //! fields are then `u° + K⁻¹ Λᵀ λ`, all of a paddle through the factor together.
 
-use super::condensed::CondensedBody;
+use super::condensed::{CondensedBody, singular};
 use super::fields::{Fields, Loads, RATES};
 use crate::discretization::Stencil;
 use crate::mechanics::ConstrainedRows;
 use crate::model::{ModelError, TissueModel};
-use crate::solver::equilibrium::{Failure, FailureReason};
 use faer::linalg::solvers::{Llt, Solve as _};
 use faer::{Mat, Side};
 use nalgebra::Vector2;
@@ -33,11 +32,11 @@ pub(super) struct Attaching<'m> {
 }
 
 impl<'m> Attaching<'m> {
-    /// Factorises the body without paddles; none where they are not attached to nodes of their own, where what is held are no
-    /// single unknowns (their penalty would cost the compliance seven digits), or where it does not hold without paddles.
+    /// Factorises the body without paddles; none where its [rows](TissueModel::attachable_rows) are not attachable, or where it
+    /// does not hold without paddles.
     pub(super) fn new(model: &'m TissueModel, loads: Loads) -> Option<Self> {
-        let held = model.constrained_rows(None).filter(ConstrainedRows::are_unknowns)?;
-        let (paddles, (analysis, retained)) = (model.attachable_rows()?, model.condensing_analysis()?);
+        let (paddles, held) = (model.attachable_rows()?, model.constrained_rows(None)?);
+        let (analysis, retained) = model.condensing_analysis()?;
         let sampled = (&**model.rule(), model.tissue());
         let mut body = CondensedBody::new(sampled, analysis, retained.len(), held).ok()?;
         let mut forces = vec![0.0; model.dofs()];
@@ -68,12 +67,7 @@ impl<'m> Attaching<'m> {
     /// Cholesky factor of a paddle's compliance.
     fn factor(&self, rows: &Range<usize>) -> Result<Llt<f64>, ModelError> {
         let own = self.compliance.submatrix(rows.start, rows.start, rows.len(), rows.len());
-        let refused = |_| Failure {
-            reason: FailureReason::SingularTangent,
-            reached: 0.0,
-            detail: "the compliance of the paddle is not positive definite".into(),
-        };
-        Ok(own.llt(Side::Lower).map_err(refused)?)
+        Ok(own.llt(Side::Lower).map_err(|_| singular("the compliance of the paddle is not positive definite"))?)
     }
 
     /// What the paddle's nodes have to move beyond `fields`, if anything: a column per field.

@@ -9,8 +9,7 @@
 use super::controllability::Controllability;
 use crate::model::ModelError;
 use crate::model::space::{Holder, SpaceModel};
-use crate::placement::condensed::CondensedBody;
-use crate::solver::equilibrium::{Failure, FailureReason};
+use crate::placement::condensed::{CondensedBody, singular};
 use faer::linalg::solvers::Solve as _;
 use faer::{Mat, Side};
 use nalgebra::{DMatrix, Vector3};
@@ -107,11 +106,8 @@ impl<'m> CondensedRest<'m> {
             }
             (place, _) => self.per_depth[*place][r % 3],
         });
-        let factor = attached_compliance.llt(Side::Lower).map_err(|_| Failure {
-            reason: FailureReason::SingularTangent,
-            reached: 0.0,
-            detail: "the compliance of the paddles is not positive definite".into(),
-        })?;
+        let refused = |_| singular("the compliance of the paddles is not positive definite");
+        let factor = attached_compliance.llt(Side::Lower).map_err(refused)?;
         factor.solve_in_place(sides.as_mut());
         let target = self.compliance.nrows() - 3;
         let answer =

@@ -22,9 +22,10 @@ const PER_ENTRY_ORDERED: f64 = 6e-9;
 /// Cost of nodes, shape functions and all paddles' Jacobians, in seconds of one core of the kind that it was calibrated on.
 pub(super) fn cost(model: &TissueModel) -> f64 {
     let factor = model.analysis().symbolic();
-    let paddles = model.scene().paddles.len() as f64;
+    // Paddles on nodes of their own are attached to one factor, others have one each.
+    let factors = if model.attaches_to_one_factor() { 1.0 } else { model.scene().paddles.len() as f64 };
     let entries = factor.entries() as f64;
-    shape_functions(model) + PER_ENTRY_ORDERED * entries + paddles * (PER_FLOP * factor.flops() + PER_ENTRY * entries)
+    shape_functions(model) + PER_ENTRY_ORDERED * entries + factors * (PER_FLOP * factor.flops() + PER_ENTRY * entries)
 }
 
 fn shape_functions(model: &TissueModel) -> f64 {
