@@ -262,7 +262,7 @@ fn options_that_do_not_belong_to_space_are_refused() {
             vec!["solve", "block", "--depth", "0.01", "--paddle", "3", "--paddle-displacement", "0,nan,0"],
             "three finite",
         ),
-        (vec!["solve", "paper", "--depth", "0.01", "--paddle", "3", "--paddle", "4"], "more than once"),
+        (vec!["solve", "paper", "--depth", "0.01", "--paddle", "3", "--paddle", "4"], "names 2 paddles"),
         (vec!["solve", "paper", "--depth", "0.01", "--paddle", "3", "--paddle-displacement", "0,0,0"], "two finite"),
         (vec!["new", "--dimension", "3", "--svg", "a.svg"], "--svg"),
         (vec!["draw", "block", "-o", "a.svg"], "`check`, `solve` and `place`"),
