@@ -94,6 +94,50 @@ fn inclusions_of_any_size_are_seen_or_said_to_be_missing() {
     assert!(code == 2 && said.contains("too thin"), "{code} {said}");
 }
 
+/// Volume of a body as it is meshed at level 0, and how far its surface is from the mesh's.
+fn meshed(body: &str) -> (f64, f64) {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene_file, json) = (folder.path().join("scene.toml"), folder.path().join("check.json"));
+    std::fs::write(&scene_file, scene(&[(BOX, body)])).unwrap();
+    let mut command = Command::cargo_bin("model-offline").unwrap();
+    command.arg("check").arg(&scene_file).arg("--json").arg(&json).assert().success();
+    let survey: Value = serde_json::from_str(&std::fs::read_to_string(json).unwrap()).unwrap();
+    (survey["volume"].as_f64().unwrap(), survey["mesh"]["off_surface"].as_f64().unwrap())
+}
+
+#[test]
+fn bores_voids_slots_and_rods_are_in_the_mesh_however_coarse_it_is() {
+    let with = |operation: &str, part: &str| format!("solid = {{ {operation} = [{{ {BOX} }}, {part}] }}");
+    let cylinder = |from: &str, to: &str, radius: f64| {
+        format!("{{ cylinder = {{ from = {from}, to = {to}, radius = {radius} }} }}")
+    };
+    let bore = |radius: f64| cylinder("[0.0, 0.75, 0.7]", "[1.0, 0.75, 0.7]", radius);
+    let sphere = |radius: f64| format!("{{ sphere = {{ centre = [0.3, 0.3, 0.75], radius = {radius} }} }}");
+    let slot = "{ box = { min = [0.7123, -0.1, 0.6217], max = [0.7523, 0.313, 0.873] } }";
+    let disc = |radius: f64| std::f64::consts::PI * radius.powi(2);
+    // What is taken away or added, and how much of it at least a coarse mesh is to have.
+    for (body, exact, share) in [
+        (with("difference", &bore(0.1)), -disc(0.1), 0.95),
+        (with("difference", &bore(0.03)), -disc(0.03), 0.8),
+        (with("difference", &bore(0.01)), -disc(0.01), 0.6),
+        // Its ends are outside of the body, and it slants.
+        (
+            with("difference", &cylinder("[-0.5, 0.2, 0.3]", "[1.5, 0.7, 0.9]", 0.05)),
+            -disc(0.05) * (1.0_f64 + 0.25 * 0.25 + 0.3 * 0.3).sqrt(),
+            0.85,
+        ),
+        (with("difference", &sphere(0.08)), -disc(0.08) * 4.0 / 3.0 * 0.08, 0.85),
+        (with("difference", &sphere(0.01)), -disc(0.01) * 4.0 / 3.0 * 0.01, 0.5),
+        (with("difference", slot), -0.04 * 0.313 * (0.873 - 0.6217), 1.0 - 1e-9),
+        (with("union", &cylinder("[0.8, 0.2, 0.9]", "[0.8, 0.2, 1.3]", 0.03)), disc(0.03) * 0.3, 0.85),
+    ] {
+        let (volume, off) = meshed(&body);
+        let found = (volume - 1.0) / exact;
+        assert!((share..1.0 + 1e-6).contains(&found), "{body}: {found} of {exact}");
+        assert!(off < 0.03, "{body}: {off}");
+    }
+}
+
 #[test]
 fn what_is_easily_overlooked_is_said() {
     let law = "model = \"fung\"\nlambda = 383.0\nmu = 318.5\nc = 0.779\nlambda_c = 1.5\nmu_c = 1.0";

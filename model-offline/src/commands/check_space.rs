@@ -13,6 +13,8 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
 
+/// Lengths below this part of the body's size are rounding.
+const ROUNDING: f64 = 1e-9;
 /// Elements with smaller angles than this make the answers worse, degrees.
 const FLAT: f64 = 3.0;
 
@@ -166,14 +168,22 @@ impl Told<'_> {
     fn mesh(&self) -> String {
         let mesh = &self.survey.mesh;
         format!(
-            "{} corners, {} tetrahedra; dihedral angles {:.1}° to {:.1}°; volumes {} to {}",
+            "{} corners, {} tetrahedra; dihedral angles {:.1}° to {:.1}°; volumes {} to {}; its surface {}",
             mesh.nodes,
             mesh.tetrahedra,
             mesh.dihedral[0],
             mesh.dihedral[1],
             short(mesh.volume[0]),
-            self.volume(mesh.volume[1])
+            self.volume(mesh.volume[1]),
+            self.off_surface(mesh.off_surface)
         )
+    }
+
+    fn off_surface(&self, length: f64) -> String {
+        if length < ROUNDING * self.scene.size() {
+            return "on the body's".to_string();
+        }
+        format!("within {} of the body's", self.long(length))
     }
 
     fn method(&self) -> String {

@@ -44,6 +44,11 @@ pub trait Implicit: Debug + Send + Sync {
         0.0
     }
 
+    /// Whether the surface is a measured one, from a scan: its finest details are noise.
+    fn is_measured(&self) -> bool {
+        false
+    }
+
     /// The plane of a flat region, which as a patch catches only what lies in that plane.
     fn carrier(&self) -> Option<Sheet<'_>> {
         None

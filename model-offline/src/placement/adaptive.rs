@@ -151,12 +151,13 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
             reference = Reference::sharpened(&mut refinement, SHARP_SHARE * tolerance)?;
             estimate = ErrorEstimate::of(&responses, &reference, level);
         }
+        if estimate.worst() <= tolerance && !reference.tells(&responses, SHARP_SHARE * tolerance) {
+            // Enough to accept, but not to say how far off each paddle is.
+            reference = Reference::sharpened(&mut refinement, TELLING_SHARE * tolerance)?;
+            estimate = ErrorEstimate::of(&responses, &reference, level);
+        }
+        // What is now known better may be too much.
         if estimate.worst() <= tolerance {
-            if !reference.tells(&responses, SHARP_SHARE * tolerance) {
-                // Enough to accept, but not to say how far off each paddle is.
-                reference = Reference::sharpened(&mut refinement, TELLING_SHARE * tolerance)?;
-                estimate = ErrorEstimate::of(&responses, &reference, level);
-            }
             return Ok(Judged { model, estimate: Some(estimate), reference: Some(reference) });
         }
         level += 1;

@@ -28,6 +28,9 @@ const SHIFT: f64 = 0.7;
 const OPEN: f64 = 1.0;
 /// What direction may add to the error of a length whose own difference vanishes by accident.
 const SIDEWAYS: f64 = 0.25;
+/// What an error of the Jacobian may do to a length besides, of the most that it can: where a Jacobian is all but
+/// singular, differences of the length cancel by accident.
+const CANCELLED: f64 = 0.1;
 /// Share of the sum of the triangles' parts that the triangles cut next make up.
 const CUT: f64 = 0.6;
 /// More nodes than this are not tried on the fine mesh.
@@ -231,6 +234,13 @@ impl Pair {
     }
 }
 
+/// By how much an error of the Jacobian can change the relative error of ‖b‖: ‖J⁻ᵀb‖ / ‖b‖.
+fn amplification(response: &RestResponse) -> f64 {
+    let b = response.best_direction.unwrap_or_default();
+    let inverse = response.jacobian.transpose().try_inverse();
+    inverse.map_or(0.0, |inverse| (inverse * b).norm() / b.norm())
+}
+
 /// What is prescribed and where it is looked at, as weights on the fields (paddle x, y, needle, target x, y): the
 /// controllability measure ‖b‖, whose relative change is `−(J⁻ᵀ b)ᵀ ∂J b / ‖b‖²`, and the needle's two displacements.
 pub(super) fn pairs(response: &RestResponse, largest: f64) -> [([f64; 5], [f64; 5]); 3] {
@@ -260,8 +270,10 @@ fn shifted(coarse: &RestResponse, fine: &RestResponse, normal: Vector2<f64>) -> 
 fn left_open(coarse: &RestResponse, fine: &RestResponse) -> f64 {
     match (coarse.best_direction, fine.best_direction) {
         (Some(before), Some(after)) => {
-            (OPEN * (after.norm() - before.norm()).abs()).max(SIDEWAYS * (after - before).norm())
-                / fine.controllability_measure
+            let differences =
+                (OPEN * (after.norm() - before.norm()).abs()).max(SIDEWAYS * (after - before).norm()) / after.norm();
+            let amplified = amplification(fine) * (fine.jacobian - coarse.jacobian).norm();
+            differences.max(CANCELLED * amplified)
         }
         (None, None) => 0.0,
         _ => f64::INFINITY,

@@ -200,7 +200,9 @@ impl<'a> Fitted<'a> {
         let beside = star.iter().map(|t| self.complex.centroid(self.complex.tetrahedron(*t)));
         let along = [c.part].into_iter().chain(ELSEWHERE).map(|part| p + (q - p) * part);
         let guesses = along.chain(beside).filter_map(|x| self.features.project(&x, on));
-        guesses.into_iter().find(|x| self.can_split(c, star, x))
+        // Sheets that are almost parallel meet far away.
+        let is_near = |x: &Point<3>| (x - (p + q) * 0.5).norm() <= c.length;
+        guesses.into_iter().find(|x| is_near(x) && self.can_split(c, star, x))
     }
 
     /// Whether all tetrahedra around an edge stay positive when it is split at `x`.

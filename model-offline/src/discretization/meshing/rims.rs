@@ -12,8 +12,8 @@ const APART: f64 = 0.7;
 /// Points of the rim of a patch, that is of the boundary of what `region` holds of the surface of `body`, roughly
 /// `spacing` (length units) apart; corners are among them. Empty if there is no rim or the body has no bounds.
 pub fn rim_points(body: &dyn Implicit, region: &dyn Implicit, spacing: f64) -> Vec<Point<3>> {
-    let patches = [region];
-    let Some(curves) = Curves::new(body, &[], &patches, spacing) else { return Vec::new() };
+    let (patches, everywhere) = ([region], |_: &Point<3>| spacing);
+    let Some(curves) = Curves::new(body, &[], &patches, &everywhere) else { return Vec::new() };
     let [of_body, of_region] = [0, 1].map(|o| curves.features.owners[o].sheets.clone());
     let carrier = curves.features.owners[1].carrier;
     let tolerance = curves.features.tolerance;
@@ -36,7 +36,8 @@ pub fn rim_points(body: &dyn Implicit, region: &dyn Implicit, spacing: f64) -> V
 /// Points of the sharp edges of a body, roughly `spacing` (length units) apart; corners are among them. Empty if it
 /// has none or no bounds.
 pub fn feature_points(body: &dyn Implicit, spacing: f64) -> Vec<Point<3>> {
-    let Some(curves) = Curves::new(body, &[], &[], spacing) else { return Vec::new() };
+    let everywhere = |_: &Point<3>| spacing;
+    let Some(curves) = Curves::new(body, &[], &[], &everywhere) else { return Vec::new() };
     let sheets = curves.features.owners[0].sheets.clone();
     let tolerance = curves.features.tolerance;
     let pairs = |i: usize| sheets[i + 1..].iter().map(move |b| (i, *b));
@@ -44,9 +45,10 @@ pub fn feature_points(body: &dyn Implicit, spacing: f64) -> Vec<Point<3>> {
     curves.points(&sets, |x| body.level(x).abs() <= tolerance)
 }
 
-/// Points of the surface of `region` inside of `body`, roughly `spacing` (length units) apart: where an interface is
-/// to be resolved. Empty if the body has no bounds.
-pub fn surface_points(body: &dyn Implicit, region: &dyn Implicit, spacing: f64) -> Vec<Point<3>> {
+/// Points of the surface of `region` inside of `body`, roughly `spacing` (at a point; length units) apart: where an
+/// interface is to be resolved. However small a part of the surface is, there is a point of it. Empty if the body has no
+/// bounds.
+pub fn surface_points(body: &dyn Implicit, region: &dyn Implicit, spacing: &dyn Fn(&Point<3>) -> f64) -> Vec<Point<3>> {
     let interfaces = [region];
     let Some(curves) = Curves::new(body, &interfaces, &[], spacing) else { return Vec::new() };
     let sets: Vec<Vec<u16>> = curves.features.owners[1].sheets.iter().map(|k| vec![*k]).collect();
@@ -58,7 +60,7 @@ pub fn surface_points(body: &dyn Implicit, region: &dyn Implicit, spacing: f64) 
 struct Curves<'a> {
     features: Features<'a>,
     bounds: (Point<3>, Point<3>),
-    spacing: f64,
+    spacing: &'a dyn Fn(&Point<3>) -> f64,
     /// Whether points inside of the body count.
     within: bool,
 }
@@ -68,7 +70,7 @@ impl<'a> Curves<'a> {
         body: &'a dyn Implicit,
         interfaces: &'a [&'a dyn Implicit],
         patches: &'a [&'a dyn Implicit],
-        spacing: f64,
+        spacing: &'a dyn Fn(&Point<3>) -> f64,
     ) -> Option<Self> {
         let bounds = body.bounds()?;
         let request = Request { body, interfaces, patches, size: &|_| 1.0, most_nodes: 0, pinned: &[] };
@@ -80,8 +82,9 @@ impl<'a> Curves<'a> {
     fn points(&self, sets: &[Vec<u16>], belongs: impl Fn(&Point<3>) -> bool) -> Vec<Point<3>> {
         let mut cubes = Vec::new();
         let (low, high) = self.bounds;
-        let half = 0.5 * (high - low).max() + self.spacing;
-        self.search(0.5 * (low + high), half, &mut cubes);
+        let middle = 0.5 * (low + high);
+        let half = 0.5 * (high - low).max() + (self.spacing)(&middle);
+        self.search(middle, half, &mut cubes);
         let mut corners: Vec<Point<3>> = Vec::new();
         let mut along: Vec<Point<3>> = Vec::new();
         for (centre, half) in cubes {
@@ -127,7 +130,7 @@ impl<'a> Curves<'a> {
         if !self.features.owners.iter().all(meets) {
             return;
         }
-        if half <= 0.26 * self.spacing {
+        if half <= 0.26 * (self.spacing)(&centre) {
             out.push((centre, half));
             return;
         }
@@ -145,7 +148,7 @@ impl<'a> Curves<'a> {
         for (x, apart) in marked {
             let site = [x.x, x.y, x.z];
             let distance = kept.nearest_neighbor(&site).map_or(f64::INFINITY, |p| (Point::from(*p) - x).norm());
-            if distance >= apart * self.spacing {
+            if distance >= apart * (self.spacing)(&x) {
                 kept.insert(site);
                 points.push(x);
             }

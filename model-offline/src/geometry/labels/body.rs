@@ -146,6 +146,10 @@ impl Implicit for LabelBody {
     fn sheets(&self) -> Vec<Sheet<'_>> {
         vec![Sheet::Smooth(self)]
     }
+
+    fn is_measured(&self) -> bool {
+        true
+    }
 }
 
 /// Distances along axes are distances in space only where axes are at right angles.

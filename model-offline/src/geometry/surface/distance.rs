@@ -73,4 +73,8 @@ impl Implicit for CheckedSurface {
     fn precision(&self) -> f64 {
         self.precision
     }
+
+    fn is_measured(&self) -> bool {
+        true
+    }
 }

@@ -4,6 +4,7 @@ mod check;
 mod curved;
 mod distance;
 mod error;
+mod facets;
 mod flat;
 mod foot;
 mod gaps;
@@ -17,6 +18,7 @@ mod tests;
 
 pub use distance::CheckedSurface;
 pub use error::{Gap, SurfaceError};
+pub(crate) use facets::Facets;
 
 use super::point::Point;
 use std::collections::HashMap;

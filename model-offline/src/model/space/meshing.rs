@@ -1,16 +1,18 @@
 //! The mesh of a scene in space: small tetrahedra at the rims of patches, where the solution is singular, large ones elsewhere.
 
 use super::super::error::{BoundaryPart, ModelError};
-use super::seen::poorly_seen;
+use super::patches::Surface;
+use super::seen::{BodySurface, poorly_seen};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::{Grading, Request, StuffingError, rim_points, stuff, surface_points};
 use crate::geometry::{Implicit, Point};
 use crate::scene::space::{SpaceInclusion, SpaceScene};
+use std::collections::BTreeMap;
 
 /// How long edges are.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeshSize {
-    /// At the rims of patches, over the width of the patch.
+    /// At the rims of patches, over the width of the patch: that of a strip is twice the narrow one.
     pub rim: f64,
     /// On the surface of inclusions, over the width of the inclusion.
     pub inclusion: f64,
@@ -28,6 +30,8 @@ const MOST_NODES: usize = 400_000;
 const MOST_TRIES: usize = 24;
 /// Points on rims and surfaces are this share of the size there apart.
 const SAMPLED: f64 = 0.5;
+/// Points of the body's surface at which a mesh is looked at are this share of the longest edges apart.
+const LOOKED_AT: f64 = 0.5;
 /// Patches at an even spacing have at least this many edges across.
 const ACROSS: f64 = 3.0;
 
@@ -52,10 +56,10 @@ struct Asking {
 }
 
 impl Asking {
-    /// `points` at a spacing; width is the longest side of their bounding box.
-    fn new(points: impl Fn(f64) -> Vec<Point<3>>, first: f64, share: f64) -> Option<Self> {
+    /// `points` at a spacing; width is the longest side of their bounding box, or `at_most`.
+    fn new(points: impl Fn(f64) -> Vec<Point<3>>, first: f64, share: f64, at_most: f64) -> Option<Self> {
         let rough = points(first);
-        let width = width(&rough)?;
+        let width = width(&rough)?.min(at_most);
         let spacing = SAMPLED * share * width;
         Some(Self { points: if spacing < first { points(spacing) } else { rough }, width })
     }
@@ -72,23 +76,33 @@ fn width(points: &[Point<3>]) -> Option<f64> {
 /// # Errors
 /// [`ModelError`] where a patch catches no surface, or details are too small for the mesh.
 pub fn mesh(scene: &SpaceScene, size: &MeshSize) -> Result<TetMesh, ModelError> {
+    let mesh = graded(scene, size, &[])?;
+    let surface = Surface::new(&mesh, scene.size());
+    let narrow: Vec<f64> = patches(scene).map(|region| surface.narrow_width(&surface.patch(&[region]))).collect();
+    // The length of a strip says nothing of how its rims act on each other.
+    if narrow.iter().all(|width| width.is_infinite()) { Ok(mesh) } else { graded(scene, size, &narrow) }
+}
+
+/// Meshes a scene whose patches are at most so wide, as far as that is known; length units.
+fn graded(scene: &SpaceScene, size: &MeshSize, at_most: &[f64]) -> Result<TetMesh, ModelError> {
     let body: &dyn Implicit = scene.body.as_ref();
     let extent = extent(scene);
     let coarsest = (size.coarsest * extent).min(size.thickest * shortest(scene));
     let mut grading = Grading::new(coarsest, size.growth);
-    for region in patches(scene) {
+    for (k, region) in patches(scene).enumerate() {
         let rim = |spacing: f64| rim_points(body, region, spacing);
-        if let Some(asking) = Asking::new(rim, 0.02 * extent, size.rim) {
+        let at_most = at_most.get(k).copied().unwrap_or(f64::INFINITY);
+        if let Some(asking) = Asking::new(rim, 0.02 * extent, size.rim, at_most) {
             grading = grading.with(&asking.points, size.rim * asking.width);
         }
     }
     for inclusion in &scene.inclusions {
-        let surface = |spacing: f64| surface_points(body, inclusion.region.as_ref(), spacing);
-        if let Some(asking) = Asking::new(surface, sampling(inclusion, extent), size.inclusion) {
+        let surface = |spacing: f64| surface_points(body, inclusion.region.as_ref(), &|_| spacing);
+        if let Some(asking) = Asking::new(surface, sampling(inclusion, extent), size.inclusion, f64::INFINITY) {
             grading = grading.with(&asking.points, size.inclusion * asking.width);
         }
     }
-    stuffed(scene, grading)
+    stuffed(scene, grading, &Grading::new(coarsest, size.growth))
 }
 
 /// Meshes a scene evenly, but so that every patch and inclusion is seen.
@@ -97,14 +111,17 @@ pub fn mesh(scene: &SpaceScene, size: &MeshSize) -> Result<TetMesh, ModelError> 
 /// [`ModelError`] where a patch catches no surface, or details are too small for the mesh.
 pub fn even_mesh(scene: &SpaceScene, spacing: f64) -> Result<TetMesh, ModelError> {
     let (body, extent): (&dyn Implicit, f64) = (scene.body.as_ref(), extent(scene));
-    let mut grading = Grading::new(spacing, 1.0);
-    let rims = patches(scene).map(|region| Asking::new(|s| rim_points(body, region, s), 0.02 * extent, 0.2));
-    let points = |i: &SpaceInclusion, spacing: f64| surface_points(body, i.region.as_ref(), spacing);
-    let surfaces = scene.inclusions.iter().map(|i| Asking::new(|s| points(i, s), sampling(i, extent), 0.2));
+    let coarsest = Grading::new(spacing, 1.0);
+    let mut grading = coarsest.clone();
+    let rims =
+        patches(scene).map(|region| Asking::new(|s| rim_points(body, region, s), 0.02 * extent, 0.2, f64::INFINITY));
+    let points = |i: &SpaceInclusion, spacing: f64| surface_points(body, i.region.as_ref(), &|_| spacing);
+    let surfaces =
+        scene.inclusions.iter().map(|i| Asking::new(|s| points(i, s), sampling(i, extent), 0.2, f64::INFINITY));
     for asking in rims.chain(surfaces).flatten() {
         grading = grading.with(&asking.points, (asking.width / ACROSS).min(spacing));
     }
-    stuffed(scene, grading)
+    stuffed(scene, grading, &coarsest)
 }
 
 /// How far apart an inclusion's surface is looked for first, in a body of this extent: the smallest is to be found.
@@ -128,32 +145,55 @@ fn patches(scene: &SpaceScene) -> impl Iterator<Item = &dyn Implicit> {
 }
 
 /// Meshes at these sizes, and at smaller ones where elements turn out too large for the surface or for an inclusion.
-fn stuffed(scene: &SpaceScene, mut grading: Grading) -> Result<TetMesh, ModelError> {
+/// Nowhere are they larger than `coarsest`, which asks nothing of any place.
+fn stuffed(scene: &SpaceScene, mut grading: Grading, coarsest: &Grading) -> Result<TetMesh, ModelError> {
+    let most = coarsest.size(&scene.target);
+    let (mut closely, mut surface) = (coarsest.clone(), BodySurface::new(scene, &|_| LOOKED_AT * most));
     for left in (0..=MOST_TRIES).rev() {
-        match stuffed_once(scene, &|x| grading.size(x)) {
+        let mesh = match stuffed_once(scene, &|x| grading.size(x)) {
+            Ok(mesh) => mesh,
             Err(ModelError::Mesh(StuffingError::Unresolved { at })) if left > 0 => {
                 let size = 0.5 * grading.size(&at);
                 grading = grading.with(&[at], size);
+                continue;
             }
             Err(error) => return Err(error),
-            Ok(mesh) => match poorly_seen(scene, &mesh)[..] {
-                [] => return Ok(mesh),
-                [first, ..] if left == 0 => return Err(ModelError::UnseenInclusion { number: first + 1 }),
-                ref places => {
-                    for place in places {
-                        grading = finer(scene, grading, *place)?;
-                    }
-                }
-            },
+        };
+        let unseen = poorly_seen(scene, &mesh);
+        let missed = surface.missed(&mesh, &|x| grading.size(x), most);
+        match (unseen.first(), missed.all.first()) {
+            (None, None) => return Ok(mesh),
+            (Some(first), _) if left == 0 => return Err(ModelError::UnseenInclusion { number: first + 1 }),
+            (None, Some(at)) if left == 0 => return Err(ModelError::Mesh(StuffingError::Unresolved { at: *at })),
+            _ => {}
         }
+        for place in unseen {
+            grading = finer(scene, grading, place)?;
+        }
+        if !missed.lost.is_empty() {
+            // There it is looked at more closely, lest the rest of a thin bore be lost between two points.
+            closely = halved(&grading, closely, missed.lost);
+            surface = BodySurface::new(scene, &|x| LOOKED_AT * closely.size(x));
+        }
+        grading = halved(&grading, grading.clone(), missed.all);
     }
     Err(ModelError::Mesh(StuffingError::Vanishes))
+}
+
+/// A grading with half of the `present` size at each of some points.
+fn halved(present: &Grading, grading: Grading, points: Vec<Point<3>>) -> Grading {
+    // Powers of two, so that few sizes are told apart.
+    let mut by_power: BTreeMap<i32, Vec<Point<3>>> = BTreeMap::new();
+    for x in points {
+        by_power.entry((0.5 * present.size(&x)).log2().round() as i32).or_default().push(x);
+    }
+    by_power.into_iter().fold(grading, |grading, (power, points)| grading.with(&points, 2.0_f64.powi(power)))
 }
 
 /// Half the size on the surface of an inclusion.
 fn finer(scene: &SpaceScene, grading: Grading, place: usize) -> Result<Grading, ModelError> {
     let (inclusion, lost) = (&scene.inclusions[place], ModelError::UnseenInclusion { number: place + 1 });
-    let points = |spacing: f64| surface_points(scene.body.as_ref(), inclusion.region.as_ref(), spacing);
+    let points = |spacing: f64| surface_points(scene.body.as_ref(), inclusion.region.as_ref(), &|_| spacing);
     let few = points(sampling(inclusion, extent(scene)));
     let size = 0.5 * few.iter().map(|x| grading.size(x)).fold(f64::INFINITY, f64::min);
     let all = if size.is_finite() { points(SAMPLED * size) } else { return Err(lost) };

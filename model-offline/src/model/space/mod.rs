@@ -175,6 +175,11 @@ impl SpaceModel {
         &self.held.paddles[paddle]
     }
 
+    /// Nodes on the needle's patch and on that of each paddle: how many.
+    pub(crate) fn nodes_on_patches(&self) -> Vec<usize> {
+        [&self.held.needle].into_iter().chain(&self.held.paddles).map(Vec::len).collect()
+    }
+
     /// Those of the scene's pairs whose patches have a piece of the surface in common, where two paddles cannot both be.
     pub fn overlapping(&self) -> &[[usize; 2]] {
         &self.overlapping

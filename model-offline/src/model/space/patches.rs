@@ -8,6 +8,8 @@ use std::collections::{BTreeMap, BTreeSet};
 const ROUNDING: f64 = 1e-8;
 /// The surface turns by no more than this where a patch ends in the middle of a face: cos 30°.
 const SMOOTH: f64 = 0.866;
+/// A patch is a strip if its narrow side is below this part of its extent.
+const NARROW: f64 = 1.0 / 3.0;
 
 /// The boundary triangles of a body.
 #[derive(Debug)]
@@ -48,6 +50,25 @@ impl<'m> Surface<'m> {
             _ => false,
         });
         rim.map(|(edge, _)| edge).collect()
+    }
+
+    /// Twice the narrow side of the rectangle with a patch's area and rim (its hydraulic diameter, where it is a strip); infinite
+    /// for what is less than three times as long as wide. Length units.
+    pub(super) fn narrow_width(&self, patch: &[[u32; 3]]) -> f64 {
+        let at = |n: u32| self.mesh.nodes[n as usize];
+        let area: f64 = patch.iter().map(|&[a, b, c]| 0.5 * (at(b) - at(a)).cross(&(at(c) - at(a))).norm()).sum();
+        let mut once: BTreeMap<(u32, u32), bool> = BTreeMap::new();
+        patch.iter().flat_map(edges).for_each(|edge| {
+            once.entry(edge).and_modify(|once| *once = false).or_insert(true);
+        });
+        let ends = once.into_iter().filter(|(_, once)| *once);
+        let quarter = ends.map(|((a, b), _)| (at(b) - at(a)).norm()).sum::<f64>() / 4.0;
+        // The sides are the roots of s² − 2 s · quarter + area; discs have none.
+        let side = quarter - (quarter * quarter - area).max(0.0).sqrt();
+        let corners = || patch.iter().flatten().map(|n| at(*n));
+        let low = corners().fold(Point::<3>::repeat(f64::INFINITY), |a, b| a.inf(&b));
+        let high = corners().fold(Point::<3>::repeat(f64::NEG_INFINITY), |a, b| a.sup(&b));
+        if side < NARROW * (high - low).max() { 2.0 * side } else { f64::INFINITY }
     }
 
     /// All triangles, outwards.

@@ -1,14 +1,30 @@
-//! Whether a mesh has a scene's inclusions: small ones fall through coarse meshes.
+//! Whether a mesh has what a scene has: small inclusions, bores and slots fall through coarse meshes.
 
 use crate::discretization::TetMesh;
-use crate::geometry::Point;
+use crate::discretization::meshing::surface_points;
 use crate::geometry::implicit::share;
+use crate::geometry::surface::Facets;
+use crate::geometry::{Implicit, Point};
 use crate::scene::space::SpaceScene;
 
+/// What is farther away than this part of the edges there is no chord across a curved surface.
+const LOST: f64 = 0.3;
+/// Beside a point of the surface, at this part of the spacing of such points, there is some of the body.
+const BESIDE: f64 = 1e-3;
+/// As deep at least as this part of that distance.
+const LEAST: f64 = 0.1;
 /// An inclusion is seen if elements have this part of its volume.
 const SEEN: f64 = 0.5;
 /// Volumes are sampled on grids of so many points along each side.
 const STEPS: i32 = 24;
+/// The surface of a mesh is nowhere farther from the body's than this part of the edges there: with eight edges around
+/// a bore it is at 0.1 of them.
+const SAG: f64 = 0.1;
+/// Nor need it be nearer than this part of the longest edges that the mesh may have: creases that no edge follows are cut
+/// at any size.
+const NEAR: f64 = 0.05;
+/// The same of a measured surface.
+const NEAR_MEASURED: f64 = 0.2;
 
 /// Places of the inclusions of which elements have too little, or nothing, without what later ones take of them.
 pub(super) fn poorly_seen(scene: &SpaceScene, mesh: &TetMesh) -> Vec<usize> {
@@ -18,6 +34,73 @@ pub(super) fn poorly_seen(scene: &SpaceScene, mesh: &TetMesh) -> Vec<usize> {
     (0..scene.inclusions.len())
         .filter(|i| found[i + 1] < SEEN * volume(scene, *i) || found[i + 1] == 0.0 && is_there(scene, *i))
         .collect()
+}
+
+/// Points of the body's surface.
+#[derive(Debug)]
+pub(super) struct BodySurface<'a> {
+    body: &'a dyn Implicit,
+    points: Vec<Point<3>>,
+}
+
+/// Where the surface of a mesh is too far from the body's.
+#[derive(Debug, Default)]
+pub(super) struct Missed {
+    /// Points on one of the two surfaces, too far from the other.
+    pub(super) all: Vec<Point<3>>,
+    /// Those of them on the body's surface that are so far away that the mesh knows nothing of what they belong to.
+    pub(super) lost: Vec<Point<3>>,
+}
+
+impl<'a> BodySurface<'a> {
+    /// Roughly `spacing` (at a point; length units) apart. However small a bore is, there is a point of it.
+    pub(super) fn new(scene: &'a SpaceScene, spacing: &dyn Fn(&Point<3>) -> f64) -> Self {
+        let body = scene.body.as_ref();
+        let mut points = surface_points(body, body, spacing);
+        points.retain(|x| has_inside(body, x, BESIDE * spacing(x)));
+        Self { body, points }
+    }
+
+    /// What a mesh misses, given how long edges are (at a point, and at most; length units).
+    pub(super) fn missed(&self, mesh: &TetMesh, size: &dyn Fn(&Point<3>) -> f64, coarsest: f64) -> Missed {
+        let near = coarsest * if self.body.is_measured() { NEAR_MEASURED } else { NEAR };
+        let allowed = |x: &Point<3>| (SAG * size(x)).max(near.min(LOST * size(x)));
+        let (triangles, mut missed) = (triangles(mesh), Missed::default());
+        let middles = triangles.iter().map(|t| t.iter().sum::<Point<3>>() / 3.0);
+        missed.all.extend(middles.filter(|x| self.body.level(x).abs() > allowed(x)));
+        let facets = Facets::new(triangles.into_iter());
+        for x in &self.points {
+            let distance = facets.distance(x);
+            if distance > allowed(x) {
+                missed.all.push(*x);
+            }
+            if distance > LOST * size(x) {
+                missed.lost.push(*x);
+            }
+        }
+        missed
+    }
+
+    /// The longest way from one of them to the surface of a mesh, length units.
+    pub(super) fn farthest(&self, mesh: &TetMesh) -> f64 {
+        let facets = Facets::new(triangles(mesh).into_iter());
+        self.points.iter().map(|x| facets.distance(x)).fold(0.0, f64::max)
+    }
+}
+
+/// Those of a mesh's surface.
+fn triangles(mesh: &TetMesh) -> Vec<[Point<3>; 3]> {
+    mesh.boundary().into_iter().map(|t| t.map(|n| mesh.nodes[n as usize])).collect()
+}
+
+/// Whether any of the body is so near to a point. Where two of its parts share a face, levels vanish although there is
+/// nothing: a bore that ends at the surface has such a disc at its mouth.
+fn has_inside(body: &dyn Implicit, x: &Point<3>, distance: f64) -> bool {
+    (0..6).any(|i| {
+        let mut beside = *x;
+        beside[i / 2] += if i % 2 == 0 { distance } else { -distance };
+        body.level(&beside) < -LEAST * distance
+    })
 }
 
 /// Whether an inclusion has a volume that no later one takes.

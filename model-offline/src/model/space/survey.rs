@@ -1,6 +1,7 @@
 //! What can be known of a scene in space without solving: its numbers, its mesh, and what of it is seldom meant.
 
 use super::patches::Surface;
+use super::seen::BodySurface;
 use super::{loose_part, overlapping, patches_of};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::mesh::Element;
@@ -13,6 +14,8 @@ use serde::Serialize;
 
 /// So many of the worst elements are named.
 const NAMED: usize = 5;
+/// Points of the body's surface are so far apart, over the size of the body.
+const SAMPLED: f64 = 0.05;
 /// The needle's way is followed in so many steps over the size of the body.
 const STEPS: i32 = 1000;
 
@@ -119,6 +122,8 @@ pub struct MeshSurvey {
     pub volume: [f64; 2],
     /// The tetrahedra with the smallest angles, the worst first.
     pub worst: Vec<Element>,
+    /// The longest way from a point of the body's surface to that of the mesh, of points a twentieth of the body apart.
+    pub off_surface: f64,
 }
 
 impl Survey {
@@ -152,7 +157,7 @@ impl Survey {
             needle,
             inclusions: inclusions.collect(),
             paddles: paddles.map(|(p, patch)| PaddleSurvey { index: p.index, patch: patch.clone() }).collect(),
-            mesh: MeshSurvey::of(mesh, &volumes),
+            mesh: MeshSurvey::of(scene, mesh, &volumes),
             overlapping: overlapping.iter().map(|pair| pair.map(|p| scene.paddles[p].index)).collect(),
             warnings: Vec::new(),
         };
@@ -217,7 +222,7 @@ impl TargetSurvey {
 }
 
 impl MeshSurvey {
-    fn of(mesh: &TetMesh, volumes: &[f64]) -> Self {
+    fn of(scene: &SpaceScene, mesh: &TetMesh, volumes: &[f64]) -> Self {
         let quality = mesh.quality();
         Self {
             nodes: mesh.nodes.len(),
@@ -225,6 +230,7 @@ impl MeshSurvey {
             dihedral: [quality.min_dihedral, quality.max_dihedral],
             volume: [quality.min_volume, volumes.iter().copied().fold(0.0, f64::max)],
             worst: mesh.worst(NAMED),
+            off_surface: BodySurface::new(scene, &|_| SAMPLED * scene.size()).farthest(mesh),
         }
     }
 }

@@ -16,6 +16,8 @@ use crate::scene::space::SpaceScene;
 use serde::Serialize;
 use std::time::Instant;
 
+/// A mesh is finer than another where every patch has so many times its nodes.
+const GROWN: f64 = 1.3;
 /// What a difference of two meshes is multiplied by.
 pub const SAFETY: f64 = 1.5;
 /// Share of the tolerance that the reference of another method may leave open.
@@ -183,7 +185,7 @@ impl Reference {
     fn within(scene: &SpaceScene, open: f64) -> Result<Self, ModelError> {
         let scene = scene.with_method(Method::new(Integration::FemT10));
         let mut reached = f64::INFINITY;
-        let mut coarser: Option<(usize, Vec<SpaceResponse>)> = None;
+        let mut coarser: Option<(Vec<usize>, Vec<SpaceResponse>)> = None;
         for level in *LEVELS.start() - 1..=*LEVELS.end() {
             let (model, rest) = match at_level(&scene, level) {
                 Ok(found) => found,
@@ -192,9 +194,11 @@ impl Reference {
                 Err(_) if coarser.is_none() && level <= *LEVELS.start() => continue,
                 Err(error) => return Err(error),
             };
-            if let Some((nodes, coarser)) = &coarser {
-                // Where a body is too thin for a level's sizes to change anything, nothing is learnt from it.
-                if *nodes == model.nodes() {
+            let on_patches = model.nodes_on_patches();
+            if let Some((before, coarser)) = &coarser {
+                // Where a level's sizes change nothing on a patch, nothing is learnt of it: two answers with one error
+                // agree.
+                if before.iter().zip(&on_patches).any(|(before, now)| (*now as f64) < GROWN * *before as f64) {
                     continue;
                 }
                 let errors = estimates(distances(coarser, &rest));
@@ -204,7 +208,7 @@ impl Reference {
                 }
                 reached = reached.min(estimate);
             }
-            coarser = Some((model.nodes(), rest));
+            coarser = Some((on_patches, rest));
         }
         Err(ModelError::ToleranceNotReached { tolerance: open, reached })
     }

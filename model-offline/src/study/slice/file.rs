@@ -77,9 +77,10 @@ fn needle(scene: &SpaceScene, cut: &Cut, number: &Numbers) -> Value {
     ])
 }
 
-/// The same resolution, by the same rule: for tetrahedra, triangles of the same order.
+/// The same resolution, by the same rule and support: for tetrahedra, triangles of the same order.
 fn discretization(scene: &SpaceScene) -> Value {
-    let integration = match scene.discretization.method.integration {
+    let method = scene.discretization.method;
+    let integration = match method.integration {
         Integration::FemT4 => Integration::FemT3,
         Integration::FemT10 => Integration::FemT6,
         nodal => nodal,
@@ -89,7 +90,8 @@ fn discretization(scene: &SpaceScene) -> Value {
         Resolution::Tolerance(tolerance) => ("tolerance", tolerance.into()),
         Resolution::Level(level) => ("level", i64::from(level).into()),
     };
-    table([resolution, ("integration", integration.name().into())])
+    let support = (!integration.is_element()).then(|| ("support", method.support.into()));
+    table([resolution, ("integration", integration.name().into())].into_iter().chain(support))
 }
 
 fn table<'k>(entries: impl IntoIterator<Item = (&'k str, Value)>) -> Value {

@@ -85,8 +85,8 @@ fn the_mound_with_its_paddles() {
         .with(&rims(&case.patches[..6], 1.4), 1.4)
         .with(&rims(&case.patches[6..7], 0.8), 0.8)
         .with(&base, 4.0)
-        .with(&surface_points(&case.body, &case.interfaces[0], 1.5), 1.5)
-        .with(&surface_points(&case.body, &case.interfaces[1], 1.0), 1.0);
+        .with(&surface_points(&case.body, &case.interfaces[0], &|_| 1.5), 1.5)
+        .with(&surface_points(&case.body, &case.interfaces[1], &|_| 1.0), 1.0);
     let mesh = case.mesh(&|x| sizes.size(x));
     assert_close("volume", volume(&mesh, None), 0.5 * SPHERE * 60.0 * 60.0 * 50.0, 0.01);
     assert_close("inclusion", volume(&mesh, Some(1)), SPHERE * 216.0, 0.05);

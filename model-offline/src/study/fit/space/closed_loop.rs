@@ -54,7 +54,7 @@ pub(super) fn follow(
     };
     let scene = study.model.scene();
     let insertions = InsertionModel::new(scene, coarse(scene)?, study.model.clone(), rest(study));
-    let place = scene.paddle_position(index)?;
+    let (place, limit) = (scene.paddle_position(index)?, scene.actuator.max_displacement);
     let settings = NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() };
     let (mut alone, mut fed) = (insertions.body(&[place], settings)?, insertions.body(&[place], settings)?);
     let frame = Frame::new(slice);
@@ -67,7 +67,7 @@ pub(super) fn follow(
         if alone.drive(depth, &[forward]).is_err() {
             break;
         }
-        let mut corrections = 0;
+        let (mut corrections, mut last) = (0, f64::INFINITY);
         let converges = loop {
             if fed.drive(depth, &[forward + offset]).is_err() {
                 break None;
@@ -76,9 +76,12 @@ pub(super) fn follow(
             if error.abs() <= enough {
                 break Some(true);
             }
-            if corrections == MOST_CORRECTIONS {
+            // A loop that is led away may still end up somewhere: not here, where its paddle would be at its limit.
+            let is_away = error.abs() >= last || offset.norm() > limit;
+            if corrections == MOST_CORRECTIONS || is_away {
                 break Some(false);
             }
+            last = error.abs();
             corrections += 1;
             offset -= unit * error;
         };

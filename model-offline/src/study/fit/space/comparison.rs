@@ -2,7 +2,7 @@
 
 use crate::placement::PlacementStudy;
 use crate::placement::space::SpaceStudy;
-use crate::placement::space::study::{SpaceAnswer, SpaceStatic};
+use crate::placement::space::study::{SpaceAnswer, SpacePaddleResult, SpaceStatic};
 use crate::placement::study::{PaddleResult, StaticStudy};
 use crate::study::slice::Slice;
 use nalgebra::{Matrix3, Vector2, Vector3};
@@ -35,6 +35,8 @@ pub struct PaddleInBoth {
     pub index: u32,
     /// In the body, the worst direction: 1/σ_min(NᵀJ).
     pub body: f64,
+    /// The estimated relative error of that; none where the scene gives its spacing or level.
+    pub body_error: Option<f64>,
     /// In the body, the direction that the slice has, and the target nowhere else: ‖J⁻¹n‖. None without a slice.
     pub body_in_plane: Option<f64>,
     /// In the slice: ‖J⁻¹n‖. None where the slice does not have it.
@@ -146,12 +148,14 @@ pub(super) fn without_help(study: &SpaceStudy, slice: &Slice, planar: &Placement
 
 /// Every paddle of the body, beside what the slice says of it.
 pub(super) fn paddles(study: &SpaceStudy, planar: Option<(&Slice, &PlacementStudy)>) -> Vec<PaddleInBoth> {
-    let one = |result: &crate::placement::space::study::SpacePaddleResult| {
-        let body = result.answer.controllability_measure;
+    let error = |place: usize| study.error_estimate.as_ref().and_then(|estimate| estimate.by_set.get(place).copied());
+    let one = |(place, result): (usize, &SpacePaddleResult)| {
+        let (body, body_error) = (result.answer.controllability_measure, error(place));
         let Some((slice, planar)) = planar else {
             return PaddleInBoth {
                 index: result.index,
                 body,
+                body_error,
                 body_in_plane: None,
                 slice: None,
                 ratio: None,
@@ -165,13 +169,14 @@ pub(super) fn paddles(study: &SpaceStudy, planar: Option<(&Slice, &PlacementStud
         PaddleInBoth {
             index: result.index,
             body,
+            body_error,
             body_in_plane: Some(in_plane),
             slice: measure,
             ratio: measure.map(|measure| in_plane / measure),
             feedback: found.and_then(|paddle| feedback(&frame, &result.answer, paddle)),
         }
     };
-    study.placement.paddles.iter().map(one).collect()
+    study.placement.paddles.iter().enumerate().map(one).collect()
 }
 
 fn jacobian(answer: &SpaceAnswer) -> Matrix3<f64> {

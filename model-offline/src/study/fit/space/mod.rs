@@ -3,9 +3,10 @@
 //!
 //! 1. **Body**: quadratic tetrahedra within the tolerance (or the scene's own spacing or level), every paddle and pair.
 //! 2. **Slice**: the plane through needle, target and the best single paddle of the body, or the next best that makes a
-//!    slice with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within the same tolerance.
+//!    slice with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within a quarter of the tolerance.
 //! 3. **Dimension**: the slice will do where all that it says of the best paddle is within the tolerance of the body:
-//!    how far a correction from its Jacobian moves the target (λ, which should be 1), what that moves across the plane,
+//!    how far a correction from its Jacobian moves the target (λ, which should be 1; the estimates of both models come
+//!    on top), what that moves across the plane,
 //!    what the insertion moves across the plane, what a loop by its table leaves there, and which paddle is the best.
 //! 4. **Paddles**: one will do where, within its limits, it leaves no more than the tolerance of what the target moves
 //!    by without help, and a table that knows of no inclusions still leads to the right side.
@@ -34,6 +35,9 @@ use crate::scene::space::SpaceScene;
 use crate::study::slice::{LeftOut, Slice, SliceError, Through};
 use serde::Serialize;
 use std::time::Instant;
+
+/// What the slice may be wrong by, of the tolerance: it costs next to nothing, and what it leaves open counts against it.
+const SLICE_SHARE: f64 = 0.25;
 
 /// What one of the two models is, and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -136,13 +140,17 @@ pub fn fit_in_space(
     progress: (&dyn Fn(u64), &(dyn Fn() + Sync)),
 ) -> Result<SpaceFit, FitError> {
     let start = Instant::now();
-    let quadratic = Discretization::new(Resolution::Tolerance(tolerance), Method::new(Integration::FemT10));
-    let mut wanted = scene.clone();
-    wanted.discretization = quadratic;
-    let study = match scene.discretization.resolution {
-        Resolution::Tolerance(_) => SpaceStudy::run(&wanted, threads, progress.0, progress.1)?,
-        Resolution::Spacing(_) | Resolution::Level(_) => SpaceStudy::run(scene, threads, progress.0, progress.1)?,
+    let quadratic = |tolerance: f64| {
+        let mut wanted = scene.clone();
+        wanted.discretization = Discretization::new(Resolution::Tolerance(tolerance), Method::new(Integration::FemT10));
+        wanted
     };
+    let run = |scene: &SpaceScene| SpaceStudy::run(scene, threads, progress.0, progress.1);
+    let study = match scene.discretization.resolution {
+        Resolution::Tolerance(_) => run(&quadratic(tolerance))?,
+        Resolution::Spacing(_) | Resolution::Level(_) => run(scene)?,
+    };
+    let wanted = quadratic(SLICE_SHARE * tolerance);
     let best = |all: &[u32]| all.first().copied();
     let single = &study.placement.optimum_single;
     let optimum = BestPaddles { dynamic: best(&single.dynamic), fixture: best(&single.fixture) };

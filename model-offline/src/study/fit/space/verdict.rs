@@ -4,6 +4,9 @@ use super::{PaddleSet, SliceInBody, SpaceFit};
 use serde::{Serialize, Serializer};
 use std::fmt;
 
+/// A way orthogonal to the needle below this part of the whole is none.
+const NEGLIGIBLE: f64 = 1e-3;
+
 /// What is needed at the tolerance.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SpaceVerdict {
@@ -63,6 +66,19 @@ pub enum ReasonInSpace {
         /// |1 − λ|.
         mismatch: f64,
     },
+    /// The best paddle's corrections may come out otherwise, for what the two models know.
+    #[error(
+        "|1 − λ| of paddle {paddle} is below the tolerance, but not with {:.3} % that the estimates of the two models leave open",
+        100.0 * open
+    )]
+    Unsure {
+        /// The paddle.
+        paddle: u32,
+        /// |1 − λ|.
+        mismatch: f64,
+        /// What both estimates leave open.
+        open: f64,
+    },
     /// What a correction does across the plane.
     #[error("of a correction by paddle {paddle} goes across the plane, which the slice cannot see")]
     Across {
@@ -72,10 +88,10 @@ pub enum ReasonInSpace {
         part: f64,
     },
     /// The way of the target without help.
-    #[error("of the target's displacement without help: by so much the slice is off")]
+    #[error("of the way orthogonal to the needle without help: by so much the slice is off")]
     WithoutHelp(f64),
-    /// What the slice's controller leaves across the plane.
-    #[error("of the target's displacement without help is left by the slice's table with feedback")]
+    /// What the slice's controller leaves.
+    #[error("of the way orthogonal to the needle without help is left by the slice's table with feedback")]
     ClosedLoop(f64),
     /// Corrections by the slice's table do not end.
     #[error("corrections by the slice's table do not converge in the body")]
@@ -96,7 +112,11 @@ pub enum ReasonInSpace {
     #[error("|1 − λ| of a table that knows of no inclusions: corrections may lead to the wrong side")]
     WrongSide(f64),
     /// A second paddle is not needed.
-    #[error("of the way in the worst direction is saved: not needed, since one paddle takes {:.3} % of its limit", 100.0 * stroke)]
+    #[error(
+        "of the way in the worst direction is {}: not needed, since one paddle takes {:.3} % of its limit",
+        if *shorter < 0.0 { "lost (the pair's is longer)" } else { "saved" },
+        100.0 * stroke
+    )]
     NotNeeded {
         /// By which part the way is shorter.
         shorter: f64,
@@ -114,6 +134,7 @@ impl ReasonInSpace {
         match *self {
             Self::NoSlice(_) | Self::BestMissing(_) | Self::Diverges => None,
             Self::Gain { mismatch: number, .. }
+            | Self::Unsure { mismatch: number, .. }
             | Self::Across { part: number, .. }
             | Self::NotNeeded { shorter: number, .. }
             | Self::OtherOptimum(_, number)
@@ -223,10 +244,14 @@ fn against_slice(fit: &SpaceFit) -> Vec<ReasonInSpace> {
     let best = fit.optimum.dynamic;
     let mut against = Vec::new();
     let found = fit.paddles.iter().find(|paddle| Some(paddle.index) == best);
-    match found.and_then(|paddle| Some((paddle.index, paddle.feedback?))) {
-        Some((paddle, feedback)) => {
-            if is_wrong(feedback.gain_mismatch) {
-                against.push(ReasonInSpace::Gain { paddle, mismatch: feedback.gain_mismatch });
+    match found.and_then(|paddle| Some((paddle.index, paddle.feedback?, paddle.body_error))) {
+        Some((paddle, feedback, body_error)) => {
+            let open = body_error.unwrap_or(0.0) + slice.model.error_estimate.unwrap_or(0.0);
+            let mismatch = feedback.gain_mismatch;
+            if is_wrong(mismatch) {
+                against.push(ReasonInSpace::Gain { paddle, mismatch });
+            } else if is_wrong(mismatch + open) {
+                against.push(ReasonInSpace::Unsure { paddle, mismatch, open });
             }
             if is_wrong(feedback.across.abs()) {
                 against.push(ReasonInSpace::Across { paddle, part: feedback.across.abs() });
@@ -241,7 +266,7 @@ fn against_slice(fit: &SpaceFit) -> Vec<ReasonInSpace> {
     match &slice.closed_loop {
         Some(followed) if !followed.converges => against.push(ReasonInSpace::Diverges),
         Some(followed) => {
-            let left = followed.with_feedback.whole() / largest_way(slice);
+            let left = followed.with_feedback.whole() / orthogonal_way(slice);
             against.extend(is_wrong(left).then_some(ReasonInSpace::ClosedLoop(left)));
         }
         None => {}
@@ -256,15 +281,19 @@ fn against_slice(fit: &SpaceFit) -> Vec<ReasonInSpace> {
     against
 }
 
-/// How far the slice is off the target's displacement without help, over the largest of its parts.
+/// How far the slice is off the target's displacement without help: orthogonal to the needle, which is what paddles are
+/// for, over the way there; along it, over the whole way.
 fn off_without_help(slice: &SliceInBody) -> f64 {
     let way = slice.without_help;
-    let apart = [way.body_in_plane - way.slice_in_plane, way.body_across_plane, way.body_axial - way.slice_axial];
-    apart.map(f64::abs).into_iter().fold(0.0, f64::max) / largest_way(slice)
+    let apart = (way.body_in_plane - way.slice_in_plane).hypot(way.body_across_plane);
+    let whole = way.body_in_plane.hypot(way.body_across_plane).hypot(way.body_axial);
+    (apart / orthogonal_way(slice)).max((way.body_axial - way.slice_axial).abs() / whole)
 }
 
-/// The largest part of the target's displacement without help in the body.
-fn largest_way(slice: &SliceInBody) -> f64 {
+/// The target's displacement in the body orthogonal to the needle, without help; not less than what of the whole way
+/// nobody would take care of.
+fn orthogonal_way(slice: &SliceInBody) -> f64 {
     let way = slice.without_help;
-    [way.body_in_plane, way.body_across_plane, way.body_axial].map(f64::abs).into_iter().fold(0.0, f64::max)
+    let orthogonal = way.body_in_plane.hypot(way.body_across_plane);
+    orthogonal.max(NEGLIGIBLE * orthogonal.hypot(way.body_axial))
 }

@@ -3,6 +3,7 @@
 use super::{FittedModel, PaddleSet, SliceInBody, SpaceFit};
 use crate::discretization::Discretization;
 use crate::number::{in_unit, short};
+use crate::scene::TissueVariant;
 use crate::scene::space::SpaceScene;
 use std::fmt::Write as _;
 
@@ -20,6 +21,9 @@ impl SpaceFit {
             return Ok(slice.clone());
         }
         let mut document: toml_edit::DocumentMut = text.parse()?;
+        if scene.tissue() == TissueVariant::Homogeneous {
+            document.remove("inclusion");
+        }
         if let Some(level) = self.body.level {
             let section = &mut document["discretization"];
             if let Some(table) = section.as_table_like_mut() {
