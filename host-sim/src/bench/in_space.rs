@@ -17,18 +17,19 @@ use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
 use model_offline::table::{TableBuildError, TableOptions};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::error::SimError;
-use super::insertion::Label;
 use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
-use super::result::RecordingResult;
+use super::insertion::{Extras, Label};
+use super::result::{FORMAT, RecordingResult};
 use super::space_bodies::{self, CaseBodies, SpaceBodies};
 use super::strategy::Strategy;
-use crate::record::export::{csv, mcap};
+use crate::record::export::foxglove::{Scenery as _, SpaceStage};
+use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
-use crate::record::recording::Record;
+use crate::record::recording::{Record, Recording};
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::executor::{AnyTable, Hardware};
 use crate::runtime::names;
@@ -37,6 +38,7 @@ use crate::runtime::plant::rehearsal::space_in_time;
 use crate::runtime::signals;
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
+use crate::world::retrace::solved_bodies;
 use crate::world::simulation::Simulation;
 use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::truth::{Truth, from_frame};
@@ -47,8 +49,10 @@ const SERIES_POINTS: usize = 500;
 const CHECKS: usize = 20;
 
 /// A run on a body in space.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceRun {
+    /// [`FORMAT`](super::result::FORMAT).
+    pub format: u32,
     /// Version of host-sim.
     pub version: String,
     /// Name of the scene.
@@ -80,12 +84,21 @@ pub struct SpaceRun {
     /// Duration of the whole, s.
     pub wall_s: f64,
     /// The bodies at the end, for pictures.
-    #[serde(skip)]
     pub bodies: SpaceBodies,
 }
 
+impl SpaceRun {
+    /// What is wrong with a run that was read from a file; nothing that could not be drawn passes.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        if self.bodies.are_of(self.cases.len()) { Ok(()) } else { Err("its bodies are not whole".to_owned()) }
+    }
+}
+
 /// Strategies on one tissue with one table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceCase {
     /// Tissue of the simulation.
     pub tissue: TissueVariant,
@@ -101,7 +114,7 @@ pub struct SpaceCase {
     /// The table's paddles, controlled.
     pub dynamic: SpaceStrategyResult,
     /// The same once more on the machine's clock, where that was not asked for alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dynamic_free_run: Option<SpaceStrategyResult>,
     /// Largest error of `static` over that of `dynamic`.
     pub improvement: f64,
@@ -110,7 +123,7 @@ pub struct SpaceCase {
 }
 
 /// A table in short.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceTableResult {
     /// SHA-256 of its bytes.
     pub hash: String,
@@ -125,7 +138,7 @@ pub struct SpaceTableResult {
 }
 
 /// One simulated insertion.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceStrategyResult {
     /// What drove time.
     pub mode: RunMode,
@@ -171,7 +184,7 @@ pub struct SpaceStrategyResult {
 }
 
 /// What answered for the tissue, and how well.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpacePlantAccount {
     /// How it was tabulated.
     pub tabulation: TabulationReport,
@@ -188,7 +201,7 @@ pub struct SpacePlantAccount {
 }
 
 /// A moment of an insertion.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSeriesPoint {
     /// Time since the start of the needle, s.
     pub time_s: f64,
@@ -219,8 +232,8 @@ pub struct SpaceOptions<'a> {
     pub table_tissue: Option<TissueVariant>,
     /// What drives time; none: lockstep, then the controlled paddles once more in free-run.
     pub mode: Option<RunMode>,
-    /// Whether controlled insertions are written as MCAP, too.
-    pub mcap: bool,
+    /// Files for other tools that are not always written.
+    pub extras: Extras,
     /// Threads for placement and tabulation.
     pub threads: usize,
 }
@@ -266,6 +279,7 @@ pub fn compare(
     }
     let settings = simulation.loop_settings;
     let result = SpaceRun {
+        format: FORMAT,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         scene: scene.name.clone(),
         dimension: 3,
@@ -318,7 +332,7 @@ fn case(
     let table_options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
     let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
         let body = PreparedBody::new(&world.model, paddles, false, threads)?;
-        Insertion { body: &body, simulation, label: label(strategy), mcap: false }.uncontrolled(artifacts)
+        Insertion { body: &body, simulation, label: label(strategy), extras: options.extras }.uncontrolled(artifacts)
     };
     let (table, none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
         let table = SpaceTable::build(&believed.model, &believed.optimum.dynamic, &table_options)?;
@@ -330,7 +344,7 @@ fn case(
         let hardware = Hardware::Native;
         let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched: false };
         let label = label(Strategy::dynamic(mode));
-        Insertion { body: &body, simulation, label, mcap: options.mcap }.controlled(controller, artifacts)
+        Insertion { body: &body, simulation, label, extras: options.extras }.controlled(controller, artifacts)
     };
     let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
     // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
@@ -360,7 +374,7 @@ struct Insertion<'a, 'm> {
     body: &'a PreparedBody<'m>,
     simulation: &'a Simulation,
     label: Label,
-    mcap: bool,
+    extras: Extras,
 }
 
 impl Insertion<'_, '_> {
@@ -368,7 +382,9 @@ impl Insertion<'_, '_> {
     fn uncontrolled(&self, artifacts: &mut Vec<Artifact>) -> Result<SpaceStrategyResult, SimError> {
         let mut plant = PlantLoop::new(self.body.world(self.simulation), self.simulation);
         plant.uncontrolled(self.simulation.loop_settings.period_ns(), &|| ())?;
-        Ok(self.measured(&mut plant, RunMode::Lockstep, &[], artifacts))
+        let result = self.measured(&mut plant, RunMode::Lockstep, &[], artifacts);
+        artifacts.extend(self.extras(plant.truths(), None)?);
+        Ok(result)
     }
 
     /// Steered by a controller in a process of its own.
@@ -377,7 +393,7 @@ impl Insertion<'_, '_> {
         controller: LinkedController<'_>,
         artifacts: &mut Vec<Artifact>,
     ) -> Result<SpaceStrategyResult, SimError> {
-        let Self { body, simulation, label, mcap } = *self;
+        let Self { body, simulation, label, .. } = *self;
         let world = match controller.mode {
             RunMode::Lockstep => body.world(simulation),
             RunMode::FreeRun => signals::ends_at_once(|| space_in_time(body, simulation))?,
@@ -393,19 +409,39 @@ impl Insertion<'_, '_> {
         let file = Artifact { name: label.file("rec"), bytes: recording.encode() };
         result.recording = Some(RecordingResult::of(&file, recording.records.len() as u64));
         artifacts.push(file);
-        if mcap {
-            let scene = body.model().scene();
-            let (orthogonal, paddles) = (scene.needle.orthogonal(), body.paddles().len());
-            let series = csv::Series { orthogonal: &orthogonal, paddles, length: &scene.length_unit };
-            let bytes = mcap::encode(&recording, &series, mcap::Known::default())?;
-            artifacts.push(Artifact { name: label.file("mcap"), bytes });
-        }
+        artifacts.extend(signals::ends_at_once(|| self.extras(&recording.truths(), Some(&recording)))?);
         result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
         (result.run_share, result.outside_run_for) = (Some(share), outside);
         (result.final_state, result.faults) = (run.accounts.final_state, run.accounts.faults);
         (result.timing, result.plant_timing) = (run.accounts.timing, run.plant_timing);
         result.ledger = Some(run.ledger);
         Ok(result)
+    }
+
+    /// What an insertion is for other tools, as far as that was asked for: its bodies are solved for once more.
+    fn extras(&self, truths: &[Truth], recording: Option<&Recording>) -> Result<Vec<Artifact>, SimError> {
+        let Self { body, label, extras, .. } = *self;
+        let recording = recording.filter(|_| extras.mcap);
+        let (coarse, mut files) = (body.model().coarse(), Vec::new());
+        if recording.is_none() && !extras.vtu {
+            return Ok(files);
+        }
+        let solved = solved_bodies(coarse, body.paddles(), truths)?;
+        if let Some(recording) = recording {
+            let scene = body.model().scene();
+            let stage = SpaceStage::new(SpaceGeometry::new(coarse), body.paddles(), &solved);
+            let (orthogonal, paddles) = (scene.needle.orthogonal(), body.paddles().len());
+            let series = csv::Series { orthogonal: &orthogonal, paddles, length: &scene.length_unit };
+            let known = mcap::Known { stage: Some(&stage), ..mcap::Known::default() };
+            let bytes = mcap::encode(recording, &series, known)?;
+            files.push(Artifact { name: label.file("mcap"), bytes });
+            files.push(Artifact { name: label.file("foxglove.json"), bytes: stage.layout_file() });
+        }
+        if extras.vtu {
+            let started_ns = solved.first().map_or(0, |body| body.truth.time_ns);
+            files.extend(paraview::series_in_space(coarse, body.paddles(), &solved, started_ns, &label.stem()));
+        }
+        Ok(files)
     }
 
     /// What the true motion of the target amounts to, with its time series.

@@ -113,7 +113,6 @@ impl RunArgs {
             (self.hardware != Hardware::Native, "--controller qemu"),
             (self.scalar != TableScalar::F64, "--scalar f32"),
             (self.view, "--view"),
-            (self.vtu, "--vtu"),
             (self.causes, "--causes"),
         ];
         SpaceJob {
@@ -121,13 +120,17 @@ impl RunArgs {
             tissue: self.tissue,
             table_tissue: self.table_tissue,
             mode: self.mode,
-            mcap: self.mcap,
+            extras: self.extras(),
             out: &self.out,
             json: self.json.as_deref(),
             quiet: self.quiet,
             threads: self.threads,
             refused: given.iter().find(|(given, _)| *given).map(|(_, option)| *option),
         }
+    }
+
+    fn extras(&self) -> Extras {
+        Extras { mcap: self.mcap, vtu: self.vtu }
     }
 
     fn options(&self) -> Result<ComparisonOptions, SimError> {
@@ -140,7 +143,7 @@ impl RunArgs {
         options.mode = self.mode;
         options.hardware = self.hardware;
         options.scalar = self.scalar;
-        options.extras = Extras { mcap: self.mcap, vtu: self.vtu };
+        options.extras = self.extras();
         options.causes = self.causes;
         options.threads = parallel::threads(self.threads);
         Ok(options)

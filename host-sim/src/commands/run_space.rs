@@ -2,6 +2,7 @@
 
 use host_sim::SimError;
 use host_sim::bench::in_space::{self, SpaceOptions};
+use host_sim::bench::insertion::Extras;
 use host_sim::bench::usage::UsageError;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_space_run};
@@ -27,8 +28,8 @@ pub(super) struct SpaceJob<'a> {
     pub(super) table_tissue: Option<TissueVariant>,
     /// What drives time.
     pub(super) mode: Option<RunMode>,
-    /// Controlled insertions as MCAP, too.
-    pub(super) mcap: bool,
+    /// Files for other tools that are not always written.
+    pub(super) extras: Extras,
     /// Directory for the report.
     pub(super) out: &'a Path,
     /// File for the result.
@@ -55,8 +56,8 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     check_json_beside_report(&inputs, args.json, args.out)?;
     let threads = parallel::threads(args.threads);
     let program = std::env::current_exe().map_err(RuntimeError::Spawn)?;
-    let SpaceJob { tissue, table_tissue, mode, mcap, .. } = *args;
-    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, mcap, threads };
+    let SpaceJob { tissue, table_tissue, mode, extras, .. } = *args;
+    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, extras, threads };
     let (compared, artifacts) = in_space::compare(scene, &options, &simulation)?;
     write_space_run(args.out, &compared, artifacts)?;
     if let Some(path) = args.json {

@@ -15,7 +15,7 @@ use self::measure::measure;
 use super::result::{RecordingResult, StrategyResult};
 use super::strategy::Strategy;
 use crate::bench::error::SimError;
-use crate::record::export::foxglove::Stage;
+use crate::record::export::foxglove::{Scenery as _, Stage};
 use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
 use crate::record::recording::{Record, Recording};
@@ -62,7 +62,8 @@ impl Label {
         format!("{}.{extension}", self.stem())
     }
 
-    fn stem(&self) -> String {
+    /// What the names of its files begin with.
+    pub(super) fn stem(&self) -> String {
         let Self { tissue, table_tissue, strategy } = self;
         if tissue == table_tissue {
             format!("{tissue}-{strategy}")

@@ -6,8 +6,8 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
-use model_offline::number::length;
-use model_offline::output::chart::colour_bar;
+use model_offline::number::{in_unit, length};
+use model_offline::output::chart::{colour_bar, heading, sheet};
 use model_offline::output::field_picture::Field;
 use model_offline::output::space_picture::{
     CutPlane, Shown, SpaceGeometry, SpaceState, orthogonal, outside, planes, sections, seen_from,
@@ -151,6 +151,25 @@ pub(super) fn case_sections(run: &SpaceRun, place: usize) -> Markup {
         }
         figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place)))) }
     }
+}
+
+/// Outside and sections of a case under a strategy as a picture of its own; none where there is no body.
+pub(super) fn sections_picture(run: &SpaceRun, place: usize, strategy: usize) -> Option<String> {
+    let (case, unit) = (&run.cases[place], &run.units[0]);
+    let draw = |shown: &Shown<'_>| {
+        let mut drawings = vec![outside(shown, CHART_WIDTH)];
+        drawings.extend(sections(shown, CHART_WIDTH));
+        sheet("", &drawings, 2)
+    };
+    let all = drawn(run, place, strategy, draw).ok()?;
+    let title = format!("{}: tissue {}, {}", run.scene, case.tissue, STRATEGIES[strategy]);
+    let caption = format!(
+        "Outside and sections through the target at rest at the end of the insertion, to {}.",
+        in_unit(run.depth, unit)
+    );
+    let bar = colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place));
+    let head = heading(&title, &caption, all.size[0]);
+    Some(sheet(&title, &[head, all, bar], 1).file())
 }
 
 #[derive(Serialize)]

@@ -126,7 +126,8 @@ fn parts_and_script_show_the_scene() {
     }
     let target: [f64; 2] = scene.target.into();
     assert!(points.chunks(3).any(|x| [x[0], x[1]] == target));
-    let shown = Shown { body: "a \"b\".vtu", parts: "p.vtu", stress: true };
-    let script = script(&scene, shown);
+    let units = [&scene.length_unit[..], &scene.stress_unit];
+    let (scene, body, parts) = (&scene.name[..], "a \"b\".vtu", "p.vtu");
+    let script = script(Shown { scene, units, body, parts, stress: true, in_space: None });
     assert!(script.contains(r#"deformed("a \"b\".vtu")"#) && script.contains(r#"displacement [\"<m>&]"#), "{script}");
 }
