@@ -34,6 +34,7 @@ use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::executor::{AnyTable, Hardware};
 use crate::runtime::names;
 use crate::runtime::plant::PlantLoop;
+use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
 use crate::runtime::plant::rehearsal::space_in_time;
 use crate::runtime::signals;
 use crate::runtime::time::durations::LoopTiming;
@@ -216,6 +217,7 @@ pub struct SpaceSeriesPoint {
 }
 
 /// A tissue with what is best on it.
+#[derive(Debug)]
 struct Tissue {
     model: InsertionModel,
     optimum: SpaceOptimum,
@@ -238,8 +240,151 @@ pub struct SpaceOptions<'a> {
     pub threads: usize,
 }
 
-/// Compares strategies on a body in space: on both of its tissues, and on the one with inclusions by what homogeneous tissue
-/// says; or on one tissue alone. Recordings and time series come with the result.
+/// Strategies on a body in space that are about to be compared: on both of its tissues, and on the one with inclusions by what
+/// homogeneous tissue says; or on one tissue alone.
+#[derive(Debug)]
+pub struct SpaceComparison<'a> {
+    scene: &'a SpaceScene,
+    options: SpaceOptions<'a>,
+    simulation: &'a Simulation,
+    homogeneous: Tissue,
+    inclusion: Option<Tissue>,
+    /// Tissues of simulation and table.
+    wanted: Vec<(TissueVariant, TissueVariant)>,
+    start: Instant,
+}
+
+impl<'a> SpaceComparison<'a> {
+    /// Finds what is best on every tissue.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn prepare(
+        scene: &'a SpaceScene,
+        options: &SpaceOptions<'a>,
+        simulation: &'a Simulation,
+    ) -> Result<Self, SimError> {
+        let start = Instant::now();
+        let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
+        if scene.inclusions.is_empty() && [tissue, table_tissue].contains(&Some(TissueVariant::Inclusion)) {
+            return Err(SimError::NoInclusion { scene: scene.name.clone() });
+        }
+        let own = scene.tissue();
+        let wanted = match (tissue, table_tissue) {
+            (Some(tissue), believed) => vec![(tissue, believed.unwrap_or(tissue))],
+            (None, Some(believed)) => vec![(own, believed)],
+            (None, None) if own == TissueVariant::Homogeneous => vec![(own, own)],
+            (None, None) => vec![
+                (TissueVariant::Homogeneous, TissueVariant::Homogeneous),
+                (TissueVariant::Inclusion, TissueVariant::Inclusion),
+                (TissueVariant::Inclusion, TissueVariant::Homogeneous),
+            ],
+        };
+        let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
+        Ok(Self { scene, options: *options, simulation, homogeneous, inclusion, wanted, start })
+    }
+
+    fn of(&self, variant: TissueVariant) -> &Tissue {
+        match (variant, &self.inclusion) {
+            (TissueVariant::Inclusion, Some(tissue)) => tissue,
+            _ => &self.homogeneous,
+        }
+    }
+
+    /// The body at rest, with its inclusions.
+    pub fn geometry(&self) -> SpaceGeometry {
+        SpaceGeometry::new(self.inclusion.as_ref().unwrap_or(&self.homogeneous).model.coarse())
+    }
+
+    /// Indices of the paddles that are controlled in the last case.
+    pub fn paddles(&self) -> &[u32] {
+        self.wanted.last().map_or(&[], |(_, believed)| &self.of(*believed).optimum.dynamic)
+    }
+
+    /// Simulates everything, with somebody who looks on at what is controlled. Recordings and time series come with the result.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn run(&self, spectator: Option<&dyn Spectator>) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
+        let Self { scene, options, simulation, homogeneous, .. } = self;
+        let mut bodies = SpaceBodies { geometry: self.geometry(), cases: Vec::new() };
+        let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
+        for &(tissue, believed) in &self.wanted {
+            let (world, table) = ((tissue, self.of(tissue)), (believed, self.of(believed)));
+            let compared = case(world, table, simulation, (options, spectator), &mut artifacts)?;
+            bodies.cases.push(signals::ends_at_once(|| bodies_of(&self.of(tissue).model, &compared)));
+            cases.push(compared);
+        }
+        let settings = simulation.loop_settings;
+        let result = SpaceRun {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: scene.name.clone(),
+            dimension: 3,
+            units: [scene.length_unit.clone(), scene.stress_unit.clone()],
+            mode: options.mode.unwrap_or(RunMode::Lockstep),
+            seed: simulation.seed,
+            rate_hz: settings.rate,
+            target_rate_hz: settings.target_rate,
+            target_latency_ms: settings.latency,
+            noise: settings.noise_for(simulation.depth),
+            depth: simulation.depth,
+            insertion_s: simulation.needle.insertion_s(),
+            nodes: homogeneous.model.nodes(),
+            cases,
+            wall_s: self.start.elapsed().as_secs_f64(),
+            bodies,
+        };
+        Ok((result, artifacts))
+    }
+
+    /// The controlled insertion of the last case, to be repeated; it is tabulated again.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn last_case(&self) -> Result<Option<RepeatedCase<'_>>, SimError> {
+        let Some(&(tissue, table_tissue)) = self.wanted.last() else { return Ok(None) };
+        let (world, believed) = (self.of(tissue), self.of(table_tissue));
+        let repeated = signals::ends_at_once(|| -> Result<_, SimError> {
+            let table = table_of(believed, self.simulation)?;
+            let body = PreparedBody::new(&world.model, &table.paddles(), true, self.options.threads)?;
+            Ok((body, table.to_bytes()?))
+        });
+        let (body, table_bytes) = repeated?;
+        Ok(Some(RepeatedCase { body, table_bytes, program: self.options.program, tissue, table_tissue }))
+    }
+}
+
+/// A controlled insertion that is repeated.
+#[derive(Debug)]
+pub struct RepeatedCase<'c> {
+    body: PreparedBody<'c>,
+    table_bytes: Vec<u8>,
+    program: &'c Path,
+    tissue: TissueVariant,
+    table_tissue: TissueVariant,
+}
+
+impl RepeatedCase<'_> {
+    /// Inserts once more; nothing is recorded.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn insert(
+        &self,
+        simulation: &Simulation,
+        mode: RunMode,
+        spectator: &dyn Spectator,
+    ) -> Result<SpaceStrategyResult, SimError> {
+        let Self { body, table_bytes, program, tissue, table_tissue } = self;
+        let label = Label { tissue: *tissue, table_tissue: *table_tissue, strategy: Strategy::dynamic(mode) };
+        let controller = LinkedController { program, table_bytes, mode, hardware: Hardware::Native, is_watched: true };
+        let insertion = Insertion { body, simulation, label, extras: Extras::default(), spectator: Some(spectator) };
+        insertion.controlled(controller, &mut Vec::new())
+    }
+}
+
+/// Compares strategies without anybody who looks on.
 ///
 /// # Errors
 /// [`SimError`].
@@ -248,56 +393,7 @@ pub fn compare(
     options: &SpaceOptions<'_>,
     simulation: &Simulation,
 ) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
-    let start = Instant::now();
-    let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
-    if scene.inclusions.is_empty() && [tissue, table_tissue].contains(&Some(TissueVariant::Inclusion)) {
-        return Err(SimError::NoInclusion { scene: scene.name.clone() });
-    }
-    let own = scene.tissue();
-    let wanted: Vec<(TissueVariant, TissueVariant)> = match (tissue, table_tissue) {
-        (Some(tissue), believed) => vec![(tissue, believed.unwrap_or(tissue))],
-        (None, Some(believed)) => vec![(own, believed)],
-        (None, None) if own == TissueVariant::Homogeneous => vec![(own, own)],
-        (None, None) => vec![
-            (TissueVariant::Homogeneous, TissueVariant::Homogeneous),
-            (TissueVariant::Inclusion, TissueVariant::Inclusion),
-            (TissueVariant::Inclusion, TissueVariant::Homogeneous),
-        ],
-    };
-    let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
-    let geometry = SpaceGeometry::new(inclusion.as_ref().unwrap_or(&homogeneous).model.coarse());
-    let mut bodies = SpaceBodies { geometry, cases: Vec::new() };
-    let of = |variant| match (variant, &inclusion) {
-        (TissueVariant::Inclusion, Some(tissue)) => tissue,
-        _ => &homogeneous,
-    };
-    let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
-    for (tissue, believed) in wanted {
-        let compared = case((tissue, of(tissue)), (believed, of(believed)), simulation, options, &mut artifacts)?;
-        bodies.cases.push(signals::ends_at_once(|| bodies_of(&of(tissue).model, &compared)));
-        cases.push(compared);
-    }
-    let settings = simulation.loop_settings;
-    let result = SpaceRun {
-        format: FORMAT,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        scene: scene.name.clone(),
-        dimension: 3,
-        units: [scene.length_unit.clone(), scene.stress_unit.clone()],
-        mode: options.mode.unwrap_or(RunMode::Lockstep),
-        seed: simulation.seed,
-        rate_hz: settings.rate,
-        target_rate_hz: settings.target_rate,
-        target_latency_ms: settings.latency,
-        noise: settings.noise_for(simulation.depth),
-        depth: simulation.depth,
-        insertion_s: simulation.needle.insertion_s(),
-        nodes: homogeneous.model.nodes(),
-        cases,
-        wall_s: start.elapsed().as_secs_f64(),
-        bodies,
-    };
-    Ok((result, artifacts))
+    SpaceComparison::prepare(scene, options, simulation)?.run(None)
 }
 
 /// The homogeneous tissue of a scene, and the one with its inclusions where there are any, with what is best on them.
@@ -320,31 +416,36 @@ fn bodies_of(model: &InsertionModel, case: &SpaceCase) -> CaseBodies {
     })
 }
 
+/// The table of the paddles that control a tissue best.
+fn table_of(believed: &Tissue, simulation: &Simulation) -> Result<SpaceTable, SimError> {
+    let options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
+    Ok(SpaceTable::build(&believed.model, &believed.optimum.dynamic, &options)?)
+}
+
 fn case(
     (tissue, world): (TissueVariant, &Tissue),
     (table_tissue, believed): (TissueVariant, &Tissue),
     simulation: &Simulation,
-    options: &SpaceOptions<'_>,
+    (options, spectator): (&SpaceOptions<'_>, Option<&dyn Spectator>),
     artifacts: &mut Vec<Artifact>,
 ) -> Result<SpaceCase, SimError> {
-    let SpaceOptions { program, threads, .. } = *options;
+    let SpaceOptions { program, threads, extras, .. } = *options;
     let label = |strategy| Label { tissue, table_tissue, strategy };
-    let table_options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
     let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
         let body = PreparedBody::new(&world.model, paddles, false, threads)?;
-        Insertion { body: &body, simulation, label: label(strategy), extras: options.extras }.uncontrolled(artifacts)
+        Insertion { body: &body, simulation, label: label(strategy), extras, spectator: None }.uncontrolled(artifacts)
     };
     let (table, none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
-        let table = SpaceTable::build(&believed.model, &believed.optimum.dynamic, &table_options)?;
+        let table = table_of(believed, simulation)?;
         Ok((table, still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
     })?;
     let bytes = table.to_bytes()?;
     let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
     let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
-        let hardware = Hardware::Native;
-        let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched: false };
+        let (hardware, is_watched) = (Hardware::Native, spectator.is_some());
+        let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
         let label = label(Strategy::dynamic(mode));
-        Insertion { body: &body, simulation, label, extras: options.extras }.controlled(controller, artifacts)
+        Insertion { body: &body, simulation, label, extras, spectator }.controlled(controller, artifacts)
     };
     let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
     // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
@@ -375,6 +476,7 @@ struct Insertion<'a, 'm> {
     simulation: &'a Simulation,
     label: Label,
     extras: Extras,
+    spectator: Option<&'a dyn Spectator>,
 }
 
 impl Insertion<'_, '_> {
@@ -399,7 +501,13 @@ impl Insertion<'_, '_> {
             RunMode::FreeRun => signals::ends_at_once(|| space_in_time(body, simulation))?,
         };
         let linked = LinkedInsertion { controller, simulation, progress: &|| () };
-        let mut run = linked.run(PlantLoop::new(world, simulation), |_| ())?;
+        let mut run = linked.run(PlantLoop::new(world, simulation), |plant| {
+            if let Some(spectator) = self.spectator {
+                let (mode, period_ns) = (controller.mode, simulation.loop_settings.period_ns());
+                let insertion = ObservedInsertion { body, mode, period_ns, title: label.title() };
+                plant.observed_by(spectator.observe_in_space(insertion));
+            }
+        })?;
         let table = AnyTable::decode(controller.table_bytes).map_err(TableBuildError::Invalid)?;
         let recording = run.recording(&controller, simulation, body.model().scene().hash(), table.depth_end());
         let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);

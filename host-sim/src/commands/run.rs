@@ -14,13 +14,13 @@ use host_sim::runtime::executor::Hardware;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
-use host_sim::view::{self, InsertionBasis, Knobs, View};
-use host_sim::world::loop_settings::LoopSettings;
+use host_sim::view::{self, InsertionBasis, View};
 use model_offline::output::terminal::LongRun;
 use model_offline::parallel;
 use model_offline::scene::TableScalar;
 use model_offline::scene::TissueVariant;
 
+use super::live::{first_knobs, going_on, said, say};
 use super::outputs::check_json_beside_report;
 use super::run_space::SpaceJob;
 use super::world_args::WorldArgs;
@@ -112,7 +112,6 @@ impl RunArgs {
             (self.table.is_some(), "--table"),
             (self.hardware != Hardware::Native, "--controller qemu"),
             (self.scalar != TableScalar::F64, "--scalar f32"),
-            (self.view, "--view"),
             (self.causes, "--causes"),
         ];
         SpaceJob {
@@ -121,6 +120,7 @@ impl RunArgs {
             table_tissue: self.table_tissue,
             mode: self.mode,
             extras: self.extras(),
+            view_port: self.view.then_some(self.view_port),
             out: &self.out,
             json: self.json.as_deref(),
             quiet: self.quiet,
@@ -168,7 +168,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     let progress = if args.quiet { LongRun::hidden() } else { LongRun::new() };
     let options = args.options()?;
     let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &progress))?;
-    let view = args.view.then(|| live_view(args, &comparison.simulation().loop_settings)).transpose()?;
+    let knobs = first_knobs(&comparison.simulation().loop_settings);
+    let view = args.view.then(|| View::start(args.view_port, knobs).map(said)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
     progress.bar.finish_and_clear();
     write_run(&args.out, &compared.result, compared.artifacts)?;
@@ -179,16 +180,6 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
         print!("{}", summary(&compared.result, &args.out));
     }
     view.map_or(Ok(()), |view| go_on(args, &view, &comparison))
-}
-
-/// Starts the page and says where it is.
-fn live_view(args: &RunArgs, loop_settings: &LoopSettings) -> Result<View, SimError> {
-    let LoopSettings { target_rate, latency, .. } = *loop_settings;
-    let knobs = Knobs { needle_speed: 1.0, target_rate, latency, noise: 1.0, stiffness: 1.0 };
-    let view = View::start(args.view_port, knobs)?;
-    // The one line that even a quiet run must say: without it nobody gets in.
-    println!("Live view: {}", view.address());
-    Ok(view)
 }
 
 /// Goes on inserting under the page's knobs.
@@ -205,11 +196,7 @@ fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(),
         mode: args.mode.unwrap_or(RunMode::Lockstep),
         hardware: args.hardware,
     };
-    let say = |line: &str| {
-        if !args.quiet {
-            println!("{line}");
-        }
-    };
-    say(&format!("\nGoing on under the knobs of {} (its Finish, or Ctrl-C, ends it)", view.address()));
+    let say = say(args.quiet);
+    say(&going_on(view));
     view::insertions(view, &basis, &say)
 }

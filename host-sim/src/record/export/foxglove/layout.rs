@@ -11,6 +11,8 @@ pub(super) struct Camera {
     pub(super) middle: [f64; 3],
     /// Its longest side, length.
     pub(super) extent: f64,
+    /// How far the camera is from there, or how much it sees where far is not small, length.
+    pub(super) distance: f64,
     /// Whether what is far is small.
     pub(super) perspective: bool,
     /// Angle from z down to where it is looked at from, degrees.
@@ -19,14 +21,9 @@ pub(super) struct Camera {
     pub(super) azimuth: f64,
 }
 
-/// Distance of the camera, over the body's longest side: perspective shows as much as half of it across.
-const PARALLEL: f64 = 1.4;
-const PERSPECTIVE: f64 = 1.7;
-
 /// The scene by this camera with these topics that move, the error, these curves of paddles, the log.
 pub(super) fn layout(camera: &Camera, moving: &[&str], paddles: &[&str]) -> Value {
-    let Camera { middle, extent, perspective, polar, azimuth } = *camera;
-    let distance = extent * if perspective { PERSPECTIVE } else { PARALLEL };
+    let Camera { middle, extent, distance, perspective, polar, azimuth } = *camera;
     let topics: Map<String, Value> =
         moving.iter().chain(&["/scene/rest"]).map(|topic| ((*topic).to_owned(), json!({"visible": true}))).collect();
     let plot = |title: &str, paths: &[&str]| {

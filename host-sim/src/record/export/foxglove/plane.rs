@@ -13,6 +13,8 @@ use crate::world::truth::Truth;
 /// Thickness of lines, px.
 const LINE: f64 = 2.0;
 const TOOL: f64 = 5.0;
+/// How much is seen, over the body's longer side.
+const AROUND: f64 = 1.4;
 
 /// A planar scene with one of its paddles.
 #[derive(Clone, Debug)]
@@ -79,7 +81,7 @@ impl Scenery for Stage {
     fn layout(&self) -> Value {
         let ([low, high], extent) = (self.bounds(), self.tools().extent);
         let middle = [0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.0];
-        let camera = Camera { middle, extent, perspective: false, polar: 0.0, azimuth: 0.0 };
+        let camera = Camera { middle, extent, distance: AROUND * extent, perspective: false, polar: 0.0, azimuth: 0.0 };
         layout(&camera, &["/scene"], &["/paddle.x", "/paddle.y", "/command.x", "/command.y"])
     }
 }

@@ -16,6 +16,8 @@ use crate::world::truth::Truth;
 
 /// How far paddles are drawn off the surface, part of the body's longest side: what is drawn in one place flickers.
 const OFF: f64 = 0.004;
+/// Distance of the camera, over the body's diagonal: half of it is in sight on either side, and some room.
+const AWAY: f64 = 1.5;
 /// What is inside can be seen.
 const SKIN: f64 = 0.5;
 const HELD: f64 = 0.7;
@@ -146,6 +148,7 @@ impl Scenery for SpaceStage<'_> {
         let camera = Camera {
             middle: ((low + high) * 0.5).into(),
             extent: (high - low).max(),
+            distance: AWAY * self.geometry.extent(),
             perspective: true,
             polar: view.z.acos().to_degrees(),
             azimuth: (-view.x).atan2(-view.y).to_degrees(),
