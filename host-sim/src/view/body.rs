@@ -49,3 +49,46 @@ impl SpaceShown {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use model_offline::discretization::{Integration, Method, Resolution};
+    use model_offline::placement::space::workflow::insertion_model;
+    use model_offline::scene::space::SpaceScene;
+    use model_offline::solver::equilibrium::NewtonSettings;
+    use nalgebra::Vector3;
+
+    /// Beside the way the body is the model's to first order, and what is held is where it is held.
+    #[test]
+    fn the_body_that_is_shown_is_nearly_the_models() {
+        let mut scene = SpaceScene::bundled("block").unwrap().with_method(Method::new(Integration::FemT4));
+        scene.discretization.resolution = Resolution::Level(0);
+        let model = insertion_model(&scene).unwrap();
+        let body = PreparedBody::new(&model, &[3, 6], true, 2).unwrap();
+        let shown = SpaceShown::new(&body);
+        let way = body.table().way(0.037);
+        let beside = [Vector3::new(0.001, 0.0, -0.0005), Vector3::new(0.0, -0.001, 0.0005)];
+        let places: Vec<Vector3<f64>> = way.iter().zip(beside).map(|(on_way, by)| on_way + by).collect();
+        let paddles = [places[0].into(), places[1].into()];
+        let truth = Truth { depth: 0.037, paddles, target: [1.0, 2.0, 3.0], ..Truth::default() };
+        let state = shown.state(&truth).unwrap();
+        assert_eq!((state.depth, &state.paddles[..], state.target), (0.037, &[3, 6][..], truth.target));
+        assert_eq!(state.paddle_displacements, paddles);
+        let attached = [3, 6].map(|index| scene.paddle_position(index).unwrap());
+        let mut full = model.coarse().body(&attached, NewtonSettings::default()).unwrap();
+        full.drive(0.037, &places).unwrap();
+        let expected = model.coarse().nodal_displacements(full.equilibrium().coefficients());
+        let far = |(shown, full): (&[f64; 3], &Vector3<f64>)| (Vector3::from(*shown) - full).norm();
+        let apart = state.displacements.iter().zip(&expected).map(far).fold(0.0, f64::max);
+        assert!(state.displacements.len() == expected.len() && apart < 0.05 * 0.037, "{apart}");
+        for (place, moved) in attached.iter().zip(&places) {
+            for node in model.coarse().paddle_nodes(*place) {
+                let shown = Vector3::from(state.displacements[*node as usize]);
+                assert!((shown - moved).norm() < 1e-10, "{shown} {moved}");
+            }
+        }
+        let beyond = Truth { depth: 1.0, ..truth };
+        assert!(shown.state(&beyond).is_none(), "the table does not reach");
+    }
+}
