@@ -162,6 +162,15 @@ fn mcap_shows_the_body_where_the_recording_and_the_model_have_it(
     }
 }
 
+/// Corners of triangles, one after the other, moved alike from where these nodes are.
+fn corners_at<'a>(
+    triangles: &'a [[u32; 3]],
+    nodes: &'a [Point<3>],
+    by: Point<3>,
+) -> impl Iterator<Item = Point<3>> + 'a {
+    triangles.iter().flatten().map(move |node| nodes[*node as usize] + by)
+}
+
 fn the_body_is_the_models(model: &SpaceModel, bodies: &[(u64, Value)], truths: &BTreeMap<u64, Truth>) {
     let (rest, surfaces) = (model.spatial().positions(), Surfaces::new(model));
     let size = model.scene().size();
@@ -173,8 +182,8 @@ fn the_body_is_the_models(model: &SpaceModel, bodies: &[(u64, Value)], truths: &
         let (found, expected) = (enclosed(&surface), volume(model, &nodes));
         assert!(found > 0.0 && (found / expected - 1.0).abs() < 1e-6, "{i}: {found} {expected}");
         let inclusion = corners(&entity(update, "inclusion 1"));
-        let at = |triangles: &[[u32; 3]]| triangles.to_vec().into_iter().flatten().map(|node| nodes[node as usize]);
-        assert!(apart(&inclusion, at(&surfaces.inclusions[0])) < 1e-6 * size && enclosed(&inclusion) > 0.0);
+        let lesion = corners_at(&surfaces.inclusions[0], &nodes, Point::zeros());
+        assert!(apart(&inclusion, lesion) < 1e-6 * size && enclosed(&inclusion) > 0.0);
         // What is held is where it is held, exactly.
         let only = |place: usize| {
             let mut part = body.clone();
@@ -182,14 +191,11 @@ fn the_body_is_the_models(model: &SpaceModel, bodies: &[(u64, Value)], truths: &
             corners(&part)
         };
         let by = model.scene().needle.axis * truth.depth;
-        let held = |triangles: &[[u32; 3]], by: Point<3>| {
-            triangles.to_vec().into_iter().flatten().map(move |node| rest[node as usize] + by)
-        };
-        assert!(apart(&only(1), held(&surfaces.immobile, Point::zeros())) < 1e-9 * size);
-        assert!(apart(&only(2), held(&surfaces.needle, by)) < 1e-9 * size);
+        assert!(apart(&only(1), corners_at(&surfaces.immobile, rest, Point::zeros())) < 1e-9 * size);
+        assert!(apart(&only(2), corners_at(&surfaces.needle, rest, by)) < 1e-9 * size);
         for (index, moved) in PAIR.iter().zip(truth.paddles) {
             let place = model.scene().paddle_position(*index).unwrap();
-            for node in held(&surfaces.paddles[place], from_frame(moved)) {
+            for node in corners_at(&surfaces.paddles[place], rest, from_frame(moved)) {
                 let nearest = surface.iter().map(|x| (x - node).norm()).fold(f64::INFINITY, f64::min);
                 assert!(nearest < 1e-9 * size, "{i}: paddle {index} is {nearest} off its patch");
             }

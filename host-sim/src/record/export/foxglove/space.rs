@@ -66,7 +66,7 @@ impl<'b> SpaceStage<'b> {
         let patches = [(&geometry.immobile, Color { a: HELD, ..BLACK }), (&geometry.needle, GREY)];
         let of_patches: BTreeSet<&[u32; 3]> = patches.iter().flat_map(|(patch, _)| patch.iter()).collect();
         let free: Vec<[u32; 3]> = geometry.outside.iter().filter(|t| !of_patches.contains(t)).copied().collect();
-        let (mut skin, nodes) = TriangleListPrimitive::of(&free, &now, Color { a: SKIN, ..GREY });
+        let (mut skin, nodes) = TriangleListPrimitive::of(&free, now, Color { a: SKIN, ..GREY });
         skin.colors =
             nodes.iter().map(|node| self.colour(values.get(*node as usize).copied().unwrap_or(0.0))).collect();
         let mut body = SceneEntity::new("body", time_ns);
@@ -74,7 +74,7 @@ impl<'b> SpaceStage<'b> {
         let range = format!("0 to {}", in_unit(self.scale, &geometry.units[0]));
         body.metadata.push(KeyValuePair { key: field.to_owned(), value: range });
         body.triangles.push(skin);
-        body.triangles.extend(patches.map(|(patch, color)| TriangleListPrimitive::of(patch, &now, color).0));
+        body.triangles.extend(patches.map(|(patch, color)| TriangleListPrimitive::of(patch, now, color).0));
         body
     }
 
