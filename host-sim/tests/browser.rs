@@ -206,8 +206,17 @@ impl Drop for RunningProgram {
 }
 
 fn live(folder: &std::path::Path) -> (RunningProgram, String, BufReader<std::process::ChildStdout>) {
+    live_of(std::path::Path::new("paper"), folder)
+}
+
+fn live_of(
+    scene: &std::path::Path,
+    folder: &std::path::Path,
+) -> (RunningProgram, String, BufReader<std::process::ChildStdout>) {
     let mut child = Command::new(PROGRAM)
-        .args(["run", "--view", "--tissue", "inclusion", "--mode", "lockstep", "--insertion-time", "2", "--out"])
+        .args(["run", "--view", "--tissue", "inclusion", "--mode", "lockstep", "--insertion-time", "2", "--scene"])
+        .arg(scene)
+        .arg("--out")
         .arg(folder.join("report"))
         .stdout(Stdio::piped())
         .spawn()
@@ -276,6 +285,77 @@ fn the_live_view_shows_pauses_steps_and_obeys_its_knobs() {
     let mut rest = String::new();
     std::io::Read::read_to_string(&mut said, &mut rest).unwrap();
     assert!(rest.contains("stiffness × 0.01"), "{rest}");
+    assert!(folder.path().join("report/report.html").is_file());
+}
+
+/// In space: the body moves in its view, which is turned while it does; pause, knobs and the end are as in the plane.
+#[test]
+fn the_live_view_of_a_body_in_space_moves_and_is_turned() {
+    let Some(browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scenes::with_pairs(folder.path(), "[[5, 6]]");
+    let (mut simulation, address, mut said) = live_of(&scene, folder.path());
+    browser.look(1280, 1000, "light");
+    browser.open(&address);
+    browser.wait_for("return window.stillpoint.frames > 20 && document.querySelector('#depth').textContent !== '–'");
+    let hidden = "return getComputedStyle(document.querySelector('#knob-stiffness').parentNode).display";
+    assert_eq!(browser.run(hidden), json!("none"));
+    browser.wait_for("return !document.querySelector('#time').textContent.startsWith('before')");
+    let shown = || browser.run("return document.querySelector('#view-reading').textContent");
+    let has_webgl = browser.run("return !document.querySelector('#view').hidden") == json!(true);
+    let stands = "return getComputedStyle(document.querySelector('.stand-in')).display !== 'none'";
+    assert_eq!(browser.run(stands), json!(!has_webgl));
+    if has_webgl {
+        browser.wait_for("return document.querySelector('#view-reading').textContent.includes('paddle 5 moved')");
+        browser.wait_for("return window.stillpoint.tick > 1200");
+    }
+    browser.run("document.querySelector('#pause').click()");
+    browser.wait_for("return window.stillpoint.paused === true");
+    let tick = browser.run("return window.stillpoint.tick");
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert_eq!(browser.run("return window.stillpoint.tick"), tick, "time is held");
+    if has_webgl {
+        // What the view says is what the readings say: they come to it in other ways.
+        let (told, [error, paddle]) = (
+            shown(),
+            ["error", "paddle"].map(|id| browser.run(&format!("return document.querySelector('#{id}').textContent"))),
+        );
+        let numbers = |text: &Value| -> Vec<f64> {
+            let words = text.as_str().unwrap().split([' ', ',', '\u{a0}']);
+            words.filter_map(|word| word.trim_end_matches('.').parse().ok()).collect()
+        };
+        let (told, error, paddles) = (numbers(&told), numbers(&error), numbers(&paddle));
+        let near = |a: f64, b: f64| (a - b).abs() <= 0.006 * b.abs() + 0.001;
+        assert!(near(told[0], error[0]) && paddles.len() == 2, "{told:?} {error:?} {paddles:?}");
+        // Paddle, its index and how far; then the other's.
+        assert!(told[2] == 5.0 && near(told[3], paddles[0]) && told[4] == 6.0 && near(told[5], paddles[1]), "{told:?}");
+        let picture = "return new Promise((done) => { const c = document.querySelector('#view canvas'); \
+             c.dispatchEvent(new KeyboardEvent('keydown', { key: 'KEY' })); requestAnimationFrame(() => { \
+             const copy = document.createElement('canvas'); [copy.width, copy.height] = [200, 100]; \
+             const g = copy.getContext('2d'); g.drawImage(c, 0, 0, 200, 100); \
+             done([...g.getImageData(0, 0, 200, 100).data].reduce((sum, part, i) => (31 * sum + part * (i % 251)) % 1000003, 7)); }); })";
+        let drawn = |key: &str| browser.run(&picture.replace("KEY", key));
+        assert_ne!(drawn("ArrowLeft"), drawn("ArrowUp"), "it is turned while time is held");
+    }
+    for (width, scheme) in [(1280, "light"), (1280, "dark"), (390, "dark")] {
+        browser.look(width, 1000, scheme);
+        let wide = browser.run("return document.documentElement.scrollWidth - document.documentElement.clientWidth");
+        assert!(wide.as_i64().unwrap() <= 1, "{width} px: {wide} px too wide");
+        // The view is drawn anew in its own time.
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        browser.picture(&format!("live-space-{width}-{scheme}.png"));
+    }
+    browser.run("document.querySelector('#pace').value = '0'; document.querySelector('#pace').dispatchEvent(new Event('change')); document.querySelector('#pause').click()");
+    browser.wait_for("return document.querySelector('#title').textContent.includes('live')");
+    browser.run("const k = document.querySelector('#knob-noise'); k.value = 20; k.dispatchEvent(new Event('input')); k.dispatchEvent(new Event('change'))");
+    browser.wait_for("return document.querySelector('#knob-noise').nextSibling.textContent === '× 10' && window.stillpoint.scenes > 2");
+    assert_eq!(browser.run("return window.stillpoint.errors.length"), json!(0));
+    browser.run("document.querySelector('#finish').click()");
+    browser.wait_for("return window.stillpoint.finished === true");
+    assert!(simulation.0.wait().unwrap().success());
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut said, &mut rest).unwrap();
+    assert!(rest.contains("noise × 10)") && !rest.contains("stiffness"), "{rest}");
     assert!(folder.path().join("report/report.html").is_file());
 }
 

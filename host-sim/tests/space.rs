@@ -366,7 +366,7 @@ fn a_free_run_in_space_accounts_for_everything() {
 fn what_is_not_there_in_space_is_refused_by_name() {
     for (options, named) in [
         (&["--controller", "qemu"][..], "--controller qemu"),
-        (&["--view"], "--view"),
+        (&["--causes"], "--causes"),
         (&["--plant", "full"], "--plant"),
         (&["--world", "shaft"], "--world"),
     ] {

@@ -17,26 +17,29 @@ use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
 use model_offline::table::{TableBuildError, TableOptions};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::error::SimError;
-use super::insertion::Label;
 use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
-use super::result::RecordingResult;
+use super::insertion::{Extras, Label};
+use super::result::{FORMAT, RecordingResult};
 use super::space_bodies::{self, CaseBodies, SpaceBodies};
 use super::strategy::Strategy;
-use crate::record::export::{csv, mcap};
+use crate::record::export::foxglove::{Scenery as _, SpaceStage};
+use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
-use crate::record::recording::Record;
+use crate::record::recording::{Record, Recording};
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::executor::{AnyTable, Hardware};
 use crate::runtime::names;
 use crate::runtime::plant::PlantLoop;
+use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
 use crate::runtime::plant::rehearsal::space_in_time;
 use crate::runtime::signals;
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
+use crate::world::retrace::solved_bodies;
 use crate::world::simulation::Simulation;
 use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::truth::{Truth, from_frame};
@@ -47,8 +50,10 @@ const SERIES_POINTS: usize = 500;
 const CHECKS: usize = 20;
 
 /// A run on a body in space.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceRun {
+    /// [`FORMAT`](super::result::FORMAT).
+    pub format: u32,
     /// Version of host-sim.
     pub version: String,
     /// Name of the scene.
@@ -80,12 +85,21 @@ pub struct SpaceRun {
     /// Duration of the whole, s.
     pub wall_s: f64,
     /// The bodies at the end, for pictures.
-    #[serde(skip)]
     pub bodies: SpaceBodies,
 }
 
+impl SpaceRun {
+    /// What is wrong with a run that was read from a file; nothing that could not be drawn passes.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn check(&self) -> Result<(), String> {
+        if self.bodies.are_of(self.cases.len()) { Ok(()) } else { Err("its bodies are not whole".to_owned()) }
+    }
+}
+
 /// Strategies on one tissue with one table.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceCase {
     /// Tissue of the simulation.
     pub tissue: TissueVariant,
@@ -101,7 +115,7 @@ pub struct SpaceCase {
     /// The table's paddles, controlled.
     pub dynamic: SpaceStrategyResult,
     /// The same once more on the machine's clock, where that was not asked for alone.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dynamic_free_run: Option<SpaceStrategyResult>,
     /// Largest error of `static` over that of `dynamic`.
     pub improvement: f64,
@@ -110,7 +124,7 @@ pub struct SpaceCase {
 }
 
 /// A table in short.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceTableResult {
     /// SHA-256 of its bytes.
     pub hash: String,
@@ -125,7 +139,7 @@ pub struct SpaceTableResult {
 }
 
 /// One simulated insertion.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceStrategyResult {
     /// What drove time.
     pub mode: RunMode,
@@ -171,7 +185,7 @@ pub struct SpaceStrategyResult {
 }
 
 /// What answered for the tissue, and how well.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpacePlantAccount {
     /// How it was tabulated.
     pub tabulation: TabulationReport,
@@ -188,7 +202,7 @@ pub struct SpacePlantAccount {
 }
 
 /// A moment of an insertion.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceSeriesPoint {
     /// Time since the start of the needle, s.
     pub time_s: f64,
@@ -203,6 +217,7 @@ pub struct SpaceSeriesPoint {
 }
 
 /// A tissue with what is best on it.
+#[derive(Debug)]
 struct Tissue {
     model: InsertionModel,
     optimum: SpaceOptimum,
@@ -219,14 +234,157 @@ pub struct SpaceOptions<'a> {
     pub table_tissue: Option<TissueVariant>,
     /// What drives time; none: lockstep, then the controlled paddles once more in free-run.
     pub mode: Option<RunMode>,
-    /// Whether controlled insertions are written as MCAP, too.
-    pub mcap: bool,
+    /// Files for other tools that are not always written.
+    pub extras: Extras,
     /// Threads for placement and tabulation.
     pub threads: usize,
 }
 
-/// Compares strategies on a body in space: on both of its tissues, and on the one with inclusions by what homogeneous tissue
-/// says; or on one tissue alone. Recordings and time series come with the result.
+/// Strategies on a body in space that are about to be compared: on both of its tissues, and on the one with inclusions by what
+/// homogeneous tissue says; or on one tissue alone.
+#[derive(Debug)]
+pub struct SpaceComparison<'a> {
+    scene: &'a SpaceScene,
+    options: SpaceOptions<'a>,
+    simulation: &'a Simulation,
+    homogeneous: Tissue,
+    inclusion: Option<Tissue>,
+    /// Tissues of simulation and table.
+    wanted: Vec<(TissueVariant, TissueVariant)>,
+    start: Instant,
+}
+
+impl<'a> SpaceComparison<'a> {
+    /// Finds what is best on every tissue.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn prepare(
+        scene: &'a SpaceScene,
+        options: &SpaceOptions<'a>,
+        simulation: &'a Simulation,
+    ) -> Result<Self, SimError> {
+        let start = Instant::now();
+        let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
+        if scene.inclusions.is_empty() && [tissue, table_tissue].contains(&Some(TissueVariant::Inclusion)) {
+            return Err(SimError::NoInclusion { scene: scene.name.clone() });
+        }
+        let own = scene.tissue();
+        let wanted = match (tissue, table_tissue) {
+            (Some(tissue), believed) => vec![(tissue, believed.unwrap_or(tissue))],
+            (None, Some(believed)) => vec![(own, believed)],
+            (None, None) if own == TissueVariant::Homogeneous => vec![(own, own)],
+            (None, None) => vec![
+                (TissueVariant::Homogeneous, TissueVariant::Homogeneous),
+                (TissueVariant::Inclusion, TissueVariant::Inclusion),
+                (TissueVariant::Inclusion, TissueVariant::Homogeneous),
+            ],
+        };
+        let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
+        Ok(Self { scene, options: *options, simulation, homogeneous, inclusion, wanted, start })
+    }
+
+    fn of(&self, variant: TissueVariant) -> &Tissue {
+        match (variant, &self.inclusion) {
+            (TissueVariant::Inclusion, Some(tissue)) => tissue,
+            _ => &self.homogeneous,
+        }
+    }
+
+    /// The body at rest, with its inclusions.
+    pub fn geometry(&self) -> SpaceGeometry {
+        SpaceGeometry::new(self.inclusion.as_ref().unwrap_or(&self.homogeneous).model.coarse())
+    }
+
+    /// Indices of the paddles that are controlled in the last case.
+    pub fn paddles(&self) -> &[u32] {
+        self.wanted.last().map_or(&[], |(_, believed)| &self.of(*believed).optimum.dynamic)
+    }
+
+    /// Simulates everything, with somebody who looks on at what is controlled. Recordings and time series come with the result.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn run(&self, spectator: Option<&dyn Spectator>) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
+        let Self { scene, options, simulation, homogeneous, .. } = self;
+        let mut bodies = SpaceBodies { geometry: self.geometry(), cases: Vec::new() };
+        let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
+        for &(tissue, believed) in &self.wanted {
+            let (world, table) = ((tissue, self.of(tissue)), (believed, self.of(believed)));
+            let compared = case(world, table, simulation, (options, spectator), &mut artifacts)?;
+            bodies.cases.push(signals::ends_at_once(|| bodies_of(&self.of(tissue).model, &compared)));
+            cases.push(compared);
+        }
+        let settings = simulation.loop_settings;
+        let result = SpaceRun {
+            format: FORMAT,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            scene: scene.name.clone(),
+            dimension: 3,
+            units: [scene.length_unit.clone(), scene.stress_unit.clone()],
+            mode: options.mode.unwrap_or(RunMode::Lockstep),
+            seed: simulation.seed,
+            rate_hz: settings.rate,
+            target_rate_hz: settings.target_rate,
+            target_latency_ms: settings.latency,
+            noise: settings.noise_for(simulation.depth),
+            depth: simulation.depth,
+            insertion_s: simulation.needle.insertion_s(),
+            nodes: homogeneous.model.nodes(),
+            cases,
+            wall_s: self.start.elapsed().as_secs_f64(),
+            bodies,
+        };
+        Ok((result, artifacts))
+    }
+
+    /// The controlled insertion of the last case, to be repeated; it is tabulated again.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn last_case(&self) -> Result<Option<RepeatedCase<'_>>, SimError> {
+        let Some(&(tissue, table_tissue)) = self.wanted.last() else { return Ok(None) };
+        let (world, believed) = (self.of(tissue), self.of(table_tissue));
+        let repeated = signals::ends_at_once(|| -> Result<_, SimError> {
+            let table = table_of(believed, self.simulation)?;
+            let body = PreparedBody::new(&world.model, &table.paddles(), true, self.options.threads)?;
+            Ok((body, table.to_bytes()?))
+        });
+        let (body, table_bytes) = repeated?;
+        Ok(Some(RepeatedCase { body, table_bytes, program: self.options.program, tissue, table_tissue }))
+    }
+}
+
+/// A controlled insertion that is repeated.
+#[derive(Debug)]
+pub struct RepeatedCase<'c> {
+    body: PreparedBody<'c>,
+    table_bytes: Vec<u8>,
+    program: &'c Path,
+    tissue: TissueVariant,
+    table_tissue: TissueVariant,
+}
+
+impl RepeatedCase<'_> {
+    /// Inserts once more; nothing is recorded.
+    ///
+    /// # Errors
+    /// [`SimError`].
+    pub fn insert(
+        &self,
+        simulation: &Simulation,
+        mode: RunMode,
+        spectator: &dyn Spectator,
+    ) -> Result<SpaceStrategyResult, SimError> {
+        let Self { body, table_bytes, program, tissue, table_tissue } = self;
+        let label = Label { tissue: *tissue, table_tissue: *table_tissue, strategy: Strategy::dynamic(mode) };
+        let controller = LinkedController { program, table_bytes, mode, hardware: Hardware::Native, is_watched: true };
+        let insertion = Insertion { body, simulation, label, extras: Extras::default(), spectator: Some(spectator) };
+        insertion.controlled(controller, &mut Vec::new())
+    }
+}
+
+/// Compares strategies without anybody who looks on.
 ///
 /// # Errors
 /// [`SimError`].
@@ -235,55 +393,7 @@ pub fn compare(
     options: &SpaceOptions<'_>,
     simulation: &Simulation,
 ) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
-    let start = Instant::now();
-    let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
-    if scene.inclusions.is_empty() && [tissue, table_tissue].contains(&Some(TissueVariant::Inclusion)) {
-        return Err(SimError::NoInclusion { scene: scene.name.clone() });
-    }
-    let own = scene.tissue();
-    let wanted: Vec<(TissueVariant, TissueVariant)> = match (tissue, table_tissue) {
-        (Some(tissue), believed) => vec![(tissue, believed.unwrap_or(tissue))],
-        (None, Some(believed)) => vec![(own, believed)],
-        (None, None) if own == TissueVariant::Homogeneous => vec![(own, own)],
-        (None, None) => vec![
-            (TissueVariant::Homogeneous, TissueVariant::Homogeneous),
-            (TissueVariant::Inclusion, TissueVariant::Inclusion),
-            (TissueVariant::Inclusion, TissueVariant::Homogeneous),
-        ],
-    };
-    let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
-    let geometry = SpaceGeometry::new(inclusion.as_ref().unwrap_or(&homogeneous).model.coarse());
-    let mut bodies = SpaceBodies { geometry, cases: Vec::new() };
-    let of = |variant| match (variant, &inclusion) {
-        (TissueVariant::Inclusion, Some(tissue)) => tissue,
-        _ => &homogeneous,
-    };
-    let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
-    for (tissue, believed) in wanted {
-        let compared = case((tissue, of(tissue)), (believed, of(believed)), simulation, options, &mut artifacts)?;
-        bodies.cases.push(signals::ends_at_once(|| bodies_of(&of(tissue).model, &compared)));
-        cases.push(compared);
-    }
-    let settings = simulation.loop_settings;
-    let result = SpaceRun {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        scene: scene.name.clone(),
-        dimension: 3,
-        units: [scene.length_unit.clone(), scene.stress_unit.clone()],
-        mode: options.mode.unwrap_or(RunMode::Lockstep),
-        seed: simulation.seed,
-        rate_hz: settings.rate,
-        target_rate_hz: settings.target_rate,
-        target_latency_ms: settings.latency,
-        noise: settings.noise_for(simulation.depth),
-        depth: simulation.depth,
-        insertion_s: simulation.needle.insertion_s(),
-        nodes: homogeneous.model.nodes(),
-        cases,
-        wall_s: start.elapsed().as_secs_f64(),
-        bodies,
-    };
-    Ok((result, artifacts))
+    SpaceComparison::prepare(scene, options, simulation)?.run(None)
 }
 
 /// The homogeneous tissue of a scene, and the one with its inclusions where there are any, with what is best on them.
@@ -306,31 +416,36 @@ fn bodies_of(model: &InsertionModel, case: &SpaceCase) -> CaseBodies {
     })
 }
 
+/// The table of the paddles that control a tissue best.
+fn table_of(believed: &Tissue, simulation: &Simulation) -> Result<SpaceTable, SimError> {
+    let options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
+    Ok(SpaceTable::build(&believed.model, &believed.optimum.dynamic, &options)?)
+}
+
 fn case(
     (tissue, world): (TissueVariant, &Tissue),
     (table_tissue, believed): (TissueVariant, &Tissue),
     simulation: &Simulation,
-    options: &SpaceOptions<'_>,
+    (options, spectator): (&SpaceOptions<'_>, Option<&dyn Spectator>),
     artifacts: &mut Vec<Artifact>,
 ) -> Result<SpaceCase, SimError> {
-    let SpaceOptions { program, threads, .. } = *options;
+    let SpaceOptions { program, threads, extras, .. } = *options;
     let label = |strategy| Label { tissue, table_tissue, strategy };
-    let table_options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
     let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
         let body = PreparedBody::new(&world.model, paddles, false, threads)?;
-        Insertion { body: &body, simulation, label: label(strategy), mcap: false }.uncontrolled(artifacts)
+        Insertion { body: &body, simulation, label: label(strategy), extras, spectator: None }.uncontrolled(artifacts)
     };
     let (table, none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
-        let table = SpaceTable::build(&believed.model, &believed.optimum.dynamic, &table_options)?;
+        let table = table_of(believed, simulation)?;
         Ok((table, still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
     })?;
     let bytes = table.to_bytes()?;
     let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
     let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
-        let hardware = Hardware::Native;
-        let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched: false };
+        let (hardware, is_watched) = (Hardware::Native, spectator.is_some());
+        let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
         let label = label(Strategy::dynamic(mode));
-        Insertion { body: &body, simulation, label, mcap: options.mcap }.controlled(controller, artifacts)
+        Insertion { body: &body, simulation, label, extras, spectator }.controlled(controller, artifacts)
     };
     let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
     // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
@@ -360,7 +475,8 @@ struct Insertion<'a, 'm> {
     body: &'a PreparedBody<'m>,
     simulation: &'a Simulation,
     label: Label,
-    mcap: bool,
+    extras: Extras,
+    spectator: Option<&'a dyn Spectator>,
 }
 
 impl Insertion<'_, '_> {
@@ -368,7 +484,9 @@ impl Insertion<'_, '_> {
     fn uncontrolled(&self, artifacts: &mut Vec<Artifact>) -> Result<SpaceStrategyResult, SimError> {
         let mut plant = PlantLoop::new(self.body.world(self.simulation), self.simulation);
         plant.uncontrolled(self.simulation.loop_settings.period_ns(), &|| ())?;
-        Ok(self.measured(&mut plant, RunMode::Lockstep, &[], artifacts))
+        let result = self.measured(&mut plant, RunMode::Lockstep, &[], artifacts);
+        artifacts.extend(self.extras(plant.truths(), None)?);
+        Ok(result)
     }
 
     /// Steered by a controller in a process of its own.
@@ -377,13 +495,19 @@ impl Insertion<'_, '_> {
         controller: LinkedController<'_>,
         artifacts: &mut Vec<Artifact>,
     ) -> Result<SpaceStrategyResult, SimError> {
-        let Self { body, simulation, label, mcap } = *self;
+        let Self { body, simulation, label, .. } = *self;
         let world = match controller.mode {
             RunMode::Lockstep => body.world(simulation),
             RunMode::FreeRun => signals::ends_at_once(|| space_in_time(body, simulation))?,
         };
         let linked = LinkedInsertion { controller, simulation, progress: &|| () };
-        let mut run = linked.run(PlantLoop::new(world, simulation), |_| ())?;
+        let mut run = linked.run(PlantLoop::new(world, simulation), |plant| {
+            if let Some(spectator) = self.spectator {
+                let (mode, period_ns) = (controller.mode, simulation.loop_settings.period_ns());
+                let insertion = ObservedInsertion { body, mode, period_ns, title: label.title() };
+                plant.observed_by(spectator.observe_in_space(insertion));
+            }
+        })?;
         let table = AnyTable::decode(controller.table_bytes).map_err(TableBuildError::Invalid)?;
         let recording = run.recording(&controller, simulation, body.model().scene().hash(), table.depth_end());
         let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);
@@ -393,19 +517,39 @@ impl Insertion<'_, '_> {
         let file = Artifact { name: label.file("rec"), bytes: recording.encode() };
         result.recording = Some(RecordingResult::of(&file, recording.records.len() as u64));
         artifacts.push(file);
-        if mcap {
-            let scene = body.model().scene();
-            let (orthogonal, paddles) = (scene.needle.orthogonal(), body.paddles().len());
-            let series = csv::Series { orthogonal: &orthogonal, paddles, length: &scene.length_unit };
-            let bytes = mcap::encode(&recording, &series, mcap::Known::default())?;
-            artifacts.push(Artifact { name: label.file("mcap"), bytes });
-        }
+        artifacts.extend(signals::ends_at_once(|| self.extras(&recording.truths(), Some(&recording)))?);
         result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
         (result.run_share, result.outside_run_for) = (Some(share), outside);
         (result.final_state, result.faults) = (run.accounts.final_state, run.accounts.faults);
         (result.timing, result.plant_timing) = (run.accounts.timing, run.plant_timing);
         result.ledger = Some(run.ledger);
         Ok(result)
+    }
+
+    /// What an insertion is for other tools, as far as that was asked for: its bodies are solved for once more.
+    fn extras(&self, truths: &[Truth], recording: Option<&Recording>) -> Result<Vec<Artifact>, SimError> {
+        let Self { body, label, extras, .. } = *self;
+        let recording = recording.filter(|_| extras.mcap);
+        let (coarse, mut files) = (body.model().coarse(), Vec::new());
+        if recording.is_none() && !extras.vtu {
+            return Ok(files);
+        }
+        let solved = solved_bodies(coarse, body.paddles(), truths)?;
+        if let Some(recording) = recording {
+            let scene = body.model().scene();
+            let stage = SpaceStage::new(SpaceGeometry::new(coarse), body.paddles(), &solved);
+            let (orthogonal, paddles) = (scene.needle.orthogonal(), body.paddles().len());
+            let series = csv::Series { orthogonal: &orthogonal, paddles, length: &scene.length_unit };
+            let known = mcap::Known { stage: Some(&stage), ..mcap::Known::default() };
+            let bytes = mcap::encode(recording, &series, known)?;
+            files.push(Artifact { name: label.file("mcap"), bytes });
+            files.push(Artifact { name: label.file("foxglove.json"), bytes: stage.layout_file() });
+        }
+        if extras.vtu {
+            let started_ns = solved.first().map_or(0, |body| body.truth.time_ns);
+            files.extend(paraview::series_in_space(coarse, body.paddles(), &solved, started_ns, &label.stem()));
+        }
+        Ok(files)
     }
 
     /// What the true motion of the target amounts to, with its time series.

@@ -4,17 +4,34 @@ use model_offline::output::space_picture::{SpaceGeometry, SpaceState};
 use model_offline::placement::space::InsertionModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// States on the way of an insertion at which the body is solved: the path matters near the limits of stability.
 const ON_THE_WAY: usize = 5;
 
 /// Bodies of a run, and the body at rest that they have in common.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceBodies {
     /// At rest, with the scene's inclusions.
     pub geometry: SpaceGeometry,
     /// Per case: no paddle, fixture, controlled. Without inclusions where the case has homogeneous tissue.
     pub cases: Vec<CaseBodies>,
+}
+
+impl SpaceBodies {
+    /// Whether they can be drawn as those of so many cases: what is read from a file may be anything.
+    pub(super) fn are_of(&self, cases: usize) -> bool {
+        let (geometry, nodes) = (&self.geometry, self.geometry.nodes.len());
+        let known = |node: &u32| (*node as usize) < nodes;
+        let patches = geometry.paddles.iter().map(|paddle| &paddle.triangles).chain(&geometry.inclusions);
+        let mut triangles =
+            patches.chain([&geometry.outside, &geometry.immobile, &geometry.needle]).flatten().flatten();
+        self.cases.len() == cases
+            && geometry.parts.len() == geometry.tetrahedra.len()
+            && geometry.tetrahedra.iter().flatten().all(known)
+            && triangles.all(known)
+            && self.cases.iter().flatten().flatten().all(|state| state.displacements.len() == nodes)
+    }
 }
 
 /// Bodies of a case: no paddle, fixture, controlled. Why there is none where the model did not get there.

@@ -5,13 +5,17 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use firmware::contract::{Header, decode};
 use host_sim::SimError;
-use host_sim::bench::usage::UsageError;
-use host_sim::record::export::foxglove::Stage;
+use host_sim::record::export::foxglove::{Scenery, SpaceStage, Stage};
 use host_sim::record::export::{csv, mcap};
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::{Recording, Salvaged};
+use host_sim::world::retrace::solved_bodies;
 
+use model_offline::model::space::SpaceModel;
 use model_offline::output::check_outputs;
+use model_offline::output::space_picture::SpaceGeometry;
+use model_offline::placement::space::workflow::coarse;
+use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::scene::{Scene, TissueVariant};
 
 /// Options of `export`.
@@ -25,7 +29,8 @@ pub(crate) struct ExportArgs {
     /// Write a table with a time column, for PlotJuggler and spreadsheets
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
-    /// The recording's scene, a file or the name of a bundled scene: MCAP then has what is to be seen, too
+    /// The recording's scene, a file or the name of a bundled scene: MCAP then has what is to be seen, too (of a body in space
+    /// solved again at some ticks)
     #[arg(long, value_name = "FILE", requires = "mcap")]
     pub(crate) scene: Option<PathBuf>,
     /// Export the ticks before the damage of a recording that is damaged or cut off
@@ -66,12 +71,20 @@ fn files<'a, const D: usize, const N: usize, const P: usize>(
     let series = csv::Series { orthogonal: &table.orthogonal, paddles: P, length: table.units.length.as_str() };
     let mut files = Vec::new();
     if let Some(path) = &args.mcap {
-        if D > 2 && args.scene.is_some() {
-            return Err(UsageError::NotInSpace { option: "--scene".to_owned() }.into());
-        }
-        let stage = args.scene.as_deref().map(|scene| stage(scene, recording, table.paddles[0].index)).transpose()?;
-        let known = mcap::Known { stage: stage.as_ref(), ..mcap::Known::default() };
-        files.push((path.as_path(), mcap::encode(recording, &series, known)?));
+        let paddles: Vec<u32> = table.paddles.iter().map(|paddle| paddle.index).collect();
+        let encode = |stage: Option<&dyn Scenery>| {
+            mcap::encode(recording, &series, mcap::Known { stage, ..mcap::Known::default() })
+        };
+        let bytes = match args.scene.as_deref() {
+            None => encode(None),
+            Some(scene) if D == 2 => encode(Some(&stage(scene, recording, paddles[0])?)),
+            Some(scene) => {
+                let model = model_in_space(scene, recording)?;
+                let solved = solved_bodies(&model, &paddles, &recording.truths())?;
+                encode(Some(&SpaceStage::new(SpaceGeometry::new(&model), &paddles, &solved)))
+            }
+        };
+        files.push((path.as_path(), bytes?));
     }
     if let Some(path) = &args.csv {
         files.push((path.as_path(), series.recording(recording)));
@@ -79,13 +92,27 @@ fn files<'a, const D: usize, const N: usize, const P: usize>(
     Ok(files)
 }
 
-/// The scene of a recording, with or without its inclusions.
+/// The planar scene of a recording, with or without its inclusions.
 fn stage(path: &Path, recording: &Recording, paddle: u32) -> Result<Stage, SimError> {
     let scene = Scene::read(path)?;
-    let is_its = |scene: &Scene| scene.hash() == recording.header.scene_hash;
-    let simulated = TissueVariant::ALL.map(|tissue| tissue.of(&scene)).into_iter().find(is_its);
-    let simulated = simulated.ok_or_else(|| SimError::NotTheRecordings { scene: path.to_owned() })?;
-    Ok(Stage::new(&simulated, paddle))
+    let simulated = TissueVariant::ALL.map(|tissue| tissue.of(&scene)).into_iter();
+    let simulated = simulated.into_iter().find(|scene| scene.hash() == recording.header.scene_hash);
+    Ok(Stage::new(&simulated.ok_or_else(|| SimError::NotTheRecordings { scene: path.to_owned() })?, paddle))
+}
+
+/// The model that insertions into a recording's body in space were followed on, with or without its inclusions.
+fn model_in_space(path: &Path, recording: &Recording) -> Result<SpaceModel, SimError> {
+    let not_its = || SimError::NotTheRecordings { scene: path.to_owned() };
+    let AnyScene::Space(scene) = AnyScene::read(path)? else { return Err(not_its()) };
+    let is_its = |scene: &SpaceScene| scene.hash() == recording.header.scene_hash;
+    if is_its(&scene) {
+        Ok(coarse(&scene)?)
+    } else if is_its(&scene.without_inclusions()) {
+        // On the same mesh as in the run, which is that of the scene with them.
+        Ok(coarse(&scene)?.without_inclusions())
+    } else {
+        Err(not_its())
+    }
 }
 
 fn written(path: &Path, bytes: &[u8]) -> Result<String, SimError> {

@@ -4,6 +4,7 @@ mod board;
 mod controller;
 mod export;
 mod faults;
+mod live;
 mod outputs;
 mod plant;
 mod rearm;

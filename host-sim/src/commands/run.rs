@@ -14,13 +14,13 @@ use host_sim::runtime::executor::Hardware;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
-use host_sim::view::{self, InsertionBasis, Knobs, View};
-use host_sim::world::loop_settings::LoopSettings;
+use host_sim::view::{self, InsertionBasis, View};
 use model_offline::output::terminal::LongRun;
 use model_offline::parallel;
 use model_offline::scene::TableScalar;
 use model_offline::scene::TissueVariant;
 
+use super::live::{first_knobs, going_on, said, say};
 use super::outputs::check_json_beside_report;
 use super::run_space::SpaceJob;
 use super::world_args::WorldArgs;
@@ -112,8 +112,6 @@ impl RunArgs {
             (self.table.is_some(), "--table"),
             (self.hardware != Hardware::Native, "--controller qemu"),
             (self.scalar != TableScalar::F64, "--scalar f32"),
-            (self.view, "--view"),
-            (self.vtu, "--vtu"),
             (self.causes, "--causes"),
         ];
         SpaceJob {
@@ -121,13 +119,18 @@ impl RunArgs {
             tissue: self.tissue,
             table_tissue: self.table_tissue,
             mode: self.mode,
-            mcap: self.mcap,
+            extras: self.extras(),
+            view_port: self.view.then_some(self.view_port),
             out: &self.out,
             json: self.json.as_deref(),
             quiet: self.quiet,
             threads: self.threads,
             refused: given.iter().find(|(given, _)| *given).map(|(_, option)| *option),
         }
+    }
+
+    fn extras(&self) -> Extras {
+        Extras { mcap: self.mcap, vtu: self.vtu }
     }
 
     fn options(&self) -> Result<ComparisonOptions, SimError> {
@@ -140,7 +143,7 @@ impl RunArgs {
         options.mode = self.mode;
         options.hardware = self.hardware;
         options.scalar = self.scalar;
-        options.extras = Extras { mcap: self.mcap, vtu: self.vtu };
+        options.extras = self.extras();
         options.causes = self.causes;
         options.threads = parallel::threads(self.threads);
         Ok(options)
@@ -165,7 +168,8 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     let progress = if args.quiet { LongRun::hidden() } else { LongRun::new() };
     let options = args.options()?;
     let comparison = signals::ends_at_once(|| Comparison::prepare(scene, simulation, options, &progress))?;
-    let view = args.view.then(|| live_view(args, &comparison.simulation().loop_settings)).transpose()?;
+    let knobs = first_knobs(&comparison.simulation().loop_settings);
+    let view = args.view.then(|| View::start(args.view_port, knobs).map(said)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
     progress.bar.finish_and_clear();
     write_run(&args.out, &compared.result, compared.artifacts)?;
@@ -176,16 +180,6 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
         print!("{}", summary(&compared.result, &args.out));
     }
     view.map_or(Ok(()), |view| go_on(args, &view, &comparison))
-}
-
-/// Starts the page and says where it is.
-fn live_view(args: &RunArgs, loop_settings: &LoopSettings) -> Result<View, SimError> {
-    let LoopSettings { target_rate, latency, .. } = *loop_settings;
-    let knobs = Knobs { needle_speed: 1.0, target_rate, latency, noise: 1.0, stiffness: 1.0 };
-    let view = View::start(args.view_port, knobs)?;
-    // The one line that even a quiet run must say: without it nobody gets in.
-    println!("Live view: {}", view.address());
-    Ok(view)
 }
 
 /// Goes on inserting under the page's knobs.
@@ -202,11 +196,7 @@ fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(),
         mode: args.mode.unwrap_or(RunMode::Lockstep),
         hardware: args.hardware,
     };
-    let say = |line: &str| {
-        if !args.quiet {
-            println!("{line}");
-        }
-    };
-    say(&format!("\nGoing on under the knobs of {} (its Finish, or Ctrl-C, ends it)", view.address()));
+    let say = say(args.quiet);
+    say(&going_on(view));
     view::insertions(view, &basis, &say)
 }

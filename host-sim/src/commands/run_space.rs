@@ -1,18 +1,22 @@
 //! `host-sim run` of a body in space.
 
 use host_sim::SimError;
-use host_sim::bench::in_space::{self, SpaceOptions};
+use host_sim::bench::in_space::{SpaceComparison, SpaceOptions};
+use host_sim::bench::insertion::Extras;
 use host_sim::bench::usage::UsageError;
 use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_space_run};
 use host_sim::report::terminal::space_summary::summary;
 use host_sim::runtime::error::RuntimeError;
+use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::time::mode::RunMode;
+use host_sim::view::{View, insertions_in_space};
 use model_offline::parallel;
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use std::path::{Path, PathBuf};
 
+use super::live::{first_knobs, going_on, said, say};
 use super::outputs::check_json_beside_report;
 use super::world_args::WorldArgs;
 
@@ -27,8 +31,8 @@ pub(super) struct SpaceJob<'a> {
     pub(super) table_tissue: Option<TissueVariant>,
     /// What drives time.
     pub(super) mode: Option<RunMode>,
-    /// Controlled insertions as MCAP, too.
-    pub(super) mcap: bool,
+    /// Files for other tools that are not always written.
+    pub(super) extras: Extras,
     /// Directory for the report.
     pub(super) out: &'a Path,
     /// File for the result.
@@ -37,6 +41,8 @@ pub(super) struct SpaceJob<'a> {
     pub(super) quiet: bool,
     /// Threads.
     pub(super) threads: Option<usize>,
+    /// Port of the page that shows what is controlled, if one is wanted.
+    pub(super) view_port: Option<u16>,
     /// An option that no run in space has.
     pub(super) refused: Option<&'static str>,
 }
@@ -55,9 +61,16 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     check_json_beside_report(&inputs, args.json, args.out)?;
     let threads = parallel::threads(args.threads);
     let program = std::env::current_exe().map_err(RuntimeError::Spawn)?;
-    let SpaceJob { tissue, table_tissue, mode, mcap, .. } = *args;
-    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, mcap, threads };
-    let (compared, artifacts) = in_space::compare(scene, &options, &simulation)?;
+    let SpaceJob { tissue, table_tissue, mode, extras, .. } = *args;
+    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, extras, threads };
+    let comparison = SpaceComparison::prepare(scene, &options, &simulation)?;
+    let units = [scene.length_unit.clone(), scene.stress_unit.clone()];
+    let start = |port| {
+        let knobs = first_knobs(&simulation.loop_settings);
+        View::start_in_space(port, knobs, &comparison.geometry(), &units, comparison.paddles()).map(said)
+    };
+    let view = args.view_port.map(start).transpose()?;
+    let (compared, artifacts) = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
     write_space_run(args.out, &compared, artifacts)?;
     if let Some(path) = args.json {
         write_json(path, &compared)?;
@@ -66,5 +79,9 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
         scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
         print!("{}", summary(&compared, args.out));
     }
-    Ok(())
+    let Some(view) = view else { return Ok(()) };
+    let say = say(args.quiet);
+    say(&going_on(&view));
+    let mode = mode.unwrap_or(RunMode::Lockstep);
+    comparison.last_case()?.map_or(Ok(()), |case| insertions_in_space(&view, &case, &simulation, mode, &say))
 }

@@ -79,6 +79,11 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// What really happened, tick by tick, as far as it is known.
+    pub fn truths(&self) -> Vec<Truth> {
+        self.records.iter().filter_map(|record| record.truth).collect()
+    }
+
     /// Reads and checks a file.
     ///
     /// # Errors

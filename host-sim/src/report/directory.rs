@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::{Attachments, pictures, render, render_with};
 use crate::bench::error::SimError;
@@ -56,13 +56,16 @@ pub fn write_run(directory: &Path, result: &RunResult, mut artifacts: Vec<Artifa
     write_directory(directory, &artifacts)
 }
 
-/// The same of a run in space.
+/// The same of a run in space. Its page is of what the file says, whose numbers JSON's reader may take for their neighbours: `report`
+/// makes the same one again, byte by byte.
 ///
 /// # Errors
 /// As [`write_run`].
 pub fn write_space_run(directory: &Path, result: &SpaceRun, mut artifacts: Vec<Artifact>) -> Result<(), SimError> {
-    let page = Artifact { name: REPORT_FILE.to_owned(), bytes: space::render(result).into_bytes() };
-    artifacts.extend([page, encoded(directory, result)?]);
+    let file = encoded(directory, result)?;
+    let read = serde_json::from_slice(&file.bytes);
+    let page = space::render(read.as_ref().unwrap_or(result), &Attachments::default());
+    artifacts.extend([Artifact { name: REPORT_FILE.to_owned(), bytes: page.into_bytes() }, file]);
     write_directory(directory, &artifacts)
 }
 
@@ -109,38 +112,74 @@ fn sync(directory: &Path) -> std::io::Result<()> {
     File::open(directory)?.sync_all()
 }
 
-/// Reads the result of a finished run.
+/// Reads the result of a finished run in the plane.
 ///
 /// # Errors
 /// [`SimError::File`], [`SimError::NotARun`].
 pub fn read_run(directory: &Path) -> Result<RunResult, SimError> {
-    let path = directory.join(RESULT_FILE);
-    let bytes = read_bytes(&path)?;
-    let not_a_run = |reason: String| SimError::NotARun { path: path.clone(), reason };
-    let result: RunResult = serde_json::from_slice(&bytes).map_err(|error| not_a_run(error.to_string()))?;
-    if result.format != FORMAT {
-        return Err(not_a_run(format!("its format is {}, this program reads {FORMAT}", result.format)));
+    match AnyRun::read(directory)? {
+        AnyRun::Plane(result) => Ok(*result),
+        AnyRun::Space(_) => {
+            let reason = "it is in space, where a run in the plane was expected".to_owned();
+            Err(SimError::NotARun { path: directory.join(RESULT_FILE), reason })
+        }
     }
-    Ok(result)
+}
+
+/// The result of a finished run.
+enum AnyRun {
+    Plane(Box<RunResult>),
+    Space(Box<SpaceRun>),
+}
+
+impl AnyRun {
+    fn read(directory: &Path) -> Result<Self, SimError> {
+        /// What tells results apart.
+        #[derive(Deserialize)]
+        struct Kind {
+            format: u32,
+            dimension: Option<u32>,
+        }
+        let path = directory.join(RESULT_FILE);
+        let bytes = read_bytes(&path)?;
+        let not_a_run = |reason: String| SimError::NotARun { path: path.clone(), reason };
+        let failed = |error: serde_json::Error| not_a_run(error.to_string());
+        let Kind { format, dimension } = serde_json::from_slice(&bytes).map_err(failed)?;
+        if format != FORMAT {
+            return Err(not_a_run(format!("its format is {format}, this program reads {FORMAT}")));
+        }
+        if dimension == Some(3) {
+            let run: SpaceRun = serde_json::from_slice(&bytes).map_err(failed)?;
+            run.check().map_err(not_a_run)?;
+            return Ok(Self::Space(Box::new(run)));
+        }
+        Ok(Self::Plane(Box::new(serde_json::from_slice(&bytes).map_err(failed)?)))
+    }
 }
 
 /// Makes the report of a finished run again.
 ///
 /// # Errors
-/// As [`read_run`], [`SimError::File`].
+/// [`SimError::File`], [`SimError::NotARun`].
 pub fn rebuild_report(directory: &Path) -> Result<(), SimError> {
-    let result = read_run(directory)?;
-    let path = directory.join(REPORT_FILE);
-    Ok(write_bytes(&path, render_with(&result, &Attachments::find(directory)).as_bytes())?)
+    let attachments = Attachments::find(directory);
+    let page = match AnyRun::read(directory)? {
+        AnyRun::Plane(result) => render_with(&result, &attachments),
+        AnyRun::Space(result) => space::render(&result, &attachments),
+    };
+    Ok(write_bytes(&directory.join(REPORT_FILE), page.as_bytes())?)
 }
 
 /// Writes the charts of a finished run as pictures of their own; returns their paths.
 ///
 /// # Errors
-/// As [`read_run`], [`SimError::File`].
+/// [`SimError::File`], [`SimError::NotARun`].
 pub fn write_pictures(directory: &Path, into: &Path) -> Result<Vec<PathBuf>, SimError> {
-    let result = read_run(directory)?;
+    let pictures: Vec<(String, String)> = match AnyRun::read(directory)? {
+        AnyRun::Plane(result) => pictures(&result).into_iter().map(|(name, svg)| (name.to_owned(), svg)).collect(),
+        AnyRun::Space(result) => space::pictures(&result),
+    };
     std::fs::create_dir_all(into).map_err(FileError::write(into))?;
-    let pictures = pictures(&result).into_iter().map(|(name, svg)| (into.join(name), svg));
+    let pictures = pictures.into_iter().map(|(name, svg)| (into.join(name), svg));
     pictures.map(|(path, svg)| Ok(write_bytes(&path, svg.as_bytes()).map(|()| path)?)).collect()
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use firmware::Mode;
 use firmware::contract::Table;
 use model_offline::placement::discretise;
 use model_offline::scene::{Scene, TissueVariant};
@@ -9,12 +10,14 @@ use model_offline::scene::{Scene, TissueVariant};
 use super::server::View;
 use super::shared::Knobs;
 use crate::bench::error::SimError;
+use crate::bench::in_space::{RepeatedCase, SpaceStrategyResult};
 use crate::bench::insertion::{ControllerSetup, Label, SimulatedInsertion};
 use crate::bench::result::StrategyResult;
 use crate::bench::strategy::Strategy;
 use crate::runtime::error::RuntimeError;
 use crate::runtime::executor::Hardware;
 use crate::runtime::names;
+use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::error::WorldError;
 use crate::world::simulation::Simulation;
@@ -45,12 +48,8 @@ pub struct InsertionBasis<'a> {
 /// # Errors
 /// [`SimError`] of the first insertion that cannot be simulated, except for the signal.
 pub fn insertions(view: &View, basis: &InsertionBasis<'_>, say: &dyn Fn(&str)) -> Result<(), SimError> {
-    let shared = view.shared();
-    shared.allow_restarts();
-    for number in 1_u64.. {
-        shared.started();
-        let knobs = shared.knobs();
-        let (scene, simulation) = under(&knobs, basis);
+    one_after_another(view, say, &|knobs| {
+        let (scene, simulation) = under(knobs, basis);
         let (model, _) = discretise(&scene)?;
         let controller = ControllerSetup {
             program: basis.program,
@@ -62,8 +61,47 @@ pub fn insertions(view: &View, basis: &InsertionBasis<'_>, say: &dyn Fn(&str)) -
         };
         let strategy = Strategy::dynamic(basis.mode);
         let label = Label { tissue: scene.tissue(), table_tissue: basis.table_tissue, strategy };
-        match SimulatedInsertion::new(&model, &simulation, label).controlled(&controller) {
-            Ok(measured) => say(&line(number, &knobs, &measured.result)),
+        let insertion = SimulatedInsertion::new(&model, &simulation, label);
+        let result = insertion.controlled(&controller)?.result;
+        Ok(format!(", stiffness × {}){}", knobs.stiffness, Outcome::from(&result)))
+    })
+}
+
+/// The same of a body in space, whose inclusions keep their stiffness.
+///
+/// # Errors
+/// As [`insertions`].
+pub fn insertions_in_space(
+    view: &View,
+    case: &RepeatedCase<'_>,
+    simulation: &Simulation,
+    mode: RunMode,
+    say: &dyn Fn(&str),
+) -> Result<(), SimError> {
+    one_after_another(view, say, &|knobs| {
+        let result = case.insert(&simulation_under(knobs, simulation), mode, view)?;
+        Ok(format!("){}", Outcome::from(&result)))
+    })
+}
+
+/// Inserts under the knobs until the page says finish; what an insertion says ends its line.
+fn one_after_another(
+    view: &View,
+    say: &dyn Fn(&str),
+    insert: &dyn Fn(&Knobs) -> Result<String, SimError>,
+) -> Result<(), SimError> {
+    let shared = view.shared();
+    shared.allow_restarts();
+    for number in 1_u64.. {
+        shared.started();
+        let knobs = shared.knobs();
+        match insert(&knobs) {
+            Ok(outcome) => {
+                let Knobs { needle_speed, target_rate, latency, noise, .. } = knobs;
+                say(&format!(
+                    "insertion {number} (needle × {needle_speed}, sensor {target_rate} Hz, {latency} ms, noise × {noise}{outcome}"
+                ));
+            }
             Err(SimError::Runtime(RuntimeError::Interrupted { .. })) => return Ok(()),
             // A tissue that has no equilibrium any more is something to see, not the end of the view.
             Err(error @ SimError::Runtime(RuntimeError::World(WorldError::Tissue { .. }))) => {
@@ -85,7 +123,12 @@ fn under(knobs: &Knobs, basis: &InsertionBasis<'_>) -> (Scene, Simulation) {
     for inclusion in &mut scene.inclusions {
         inclusion.stiffness *= knobs.stiffness;
     }
-    let mut simulation = basis.simulation.clone();
+    (scene, simulation_under(knobs, &basis.simulation))
+}
+
+/// A simulation as the knobs want it.
+fn simulation_under(knobs: &Knobs, simulation: &Simulation) -> Simulation {
+    let mut simulation = simulation.clone();
     let settle_s = simulation.duration_s - simulation.needle.end_s();
     simulation.needle = simulation.needle.faster(knobs.needle_speed);
     simulation.duration_s = simulation.needle.end_s() + settle_s;
@@ -94,24 +137,40 @@ fn under(knobs: &Knobs, basis: &InsertionBasis<'_>) -> (Scene, Simulation) {
     // The target sensor is never faster than the loop.
     loop_settings.target_rate = knobs.target_rate.min(loop_settings.rate);
     loop_settings.latency = knobs.latency;
-    (scene, simulation)
+    simulation
 }
 
-fn line(number: u64, knobs: &Knobs, result: &StrategyResult) -> String {
-    let Knobs { needle_speed, target_rate, latency, noise, stiffness } = knobs;
-    let mut text = format!(
-        "insertion {number} (needle × {needle_speed}, sensor {target_rate} Hz, {latency} ms, noise × {noise}, \
-         stiffness × {stiffness}): largest error {:.3e}, {}",
-        result.max_orthogonal_error,
-        names::mode::name(result.final_state)
-    );
-    if let Some(timing) = &result.plant_timing {
-        text += &format!(
+/// What an insertion came to, in words.
+struct Outcome<'r> {
+    error: f64,
+    state: Option<Mode>,
+    timing: Option<&'r LoopTiming>,
+}
+
+impl<'r> From<&'r StrategyResult> for Outcome<'r> {
+    fn from(result: &'r StrategyResult) -> Self {
+        let StrategyResult { max_orthogonal_error, final_state, plant_timing, .. } = result;
+        Self { error: *max_orthogonal_error, state: *final_state, timing: plant_timing.as_ref() }
+    }
+}
+
+impl<'r> From<&'r SpaceStrategyResult> for Outcome<'r> {
+    fn from(result: &'r SpaceStrategyResult) -> Self {
+        let SpaceStrategyResult { max_orthogonal_error, final_state, plant_timing, .. } = result;
+        Self { error: *max_orthogonal_error, state: *final_state, timing: plant_timing.as_ref() }
+    }
+}
+
+impl std::fmt::Display for Outcome<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, ": largest error {:.3e}, {}", self.error, names::mode::name(self.state))?;
+        let Some(timing) = self.timing else { return Ok(()) };
+        write!(
+            f,
             ", plant step p50 {:.1} µs, p99 {:.1} µs, {} skipped",
             timing.execution_time.p50_ns as f64 * 1e-3,
             timing.execution_time.p99_ns as f64 * 1e-3,
             timing.skipped
-        );
+        )
     }
-    text
 }

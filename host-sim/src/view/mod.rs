@@ -11,6 +11,7 @@
 
 #[cfg(test)]
 mod attacks;
+mod body;
 mod events;
 mod insertions;
 mod limits;
@@ -20,6 +21,6 @@ mod server;
 mod shared;
 mod watch;
 
-pub use insertions::{InsertionBasis, insertions};
+pub use insertions::{InsertionBasis, insertions, insertions_in_space};
 pub use server::View;
 pub use shared::{KnobOutOfRange, Knobs};

@@ -12,7 +12,6 @@ use serde::Deserialize;
 
 use super::events::Events;
 use super::limits::{Deadline, Gate};
-use super::page;
 use super::shared::{KnobOutOfRange, Knobs, Shared};
 
 /// No button sends more than this, bytes.
@@ -116,7 +115,7 @@ pub(super) async fn answer(
         return Ok(plain(StatusCode::FORBIDDEN, text));
     };
     Ok(match (request.method(), path) {
-        (&Method::GET, "") => whole(StatusCode::OK, "text/html; charset=utf-8", page::PAGE),
+        (&Method::GET, "") => whole(StatusCode::OK, "text/html; charset=utf-8", shared.page()),
         (&Method::GET, "events") => match gate.look_on() {
             None => plain(StatusCode::SERVICE_UNAVAILABLE, "too many pages look on already: close one\n"),
             Some(place) => {

@@ -13,16 +13,19 @@ use std::time::Duration;
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
+use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
 use tokio::net::TcpStream;
 
 use super::limits::{Deadline, Gate, Slot};
+use super::page::page_in_space;
 use super::requests::answer;
 use super::shared::{Knobs, Shared};
 use super::watch::Watch;
 use crate::bench::error::SimError;
 use crate::runtime::error::RuntimeError;
-use crate::runtime::plant::observer::{ObservedInsertion, Observer, Spectator};
+use crate::runtime::plant::observer::{ObservedInsertion, Observer, PlanarBody, Spectator};
+use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::tissue::TissuePlant;
 
 /// Header lines, and bytes of all of them together with the request line.
@@ -47,13 +50,33 @@ impl View {
     /// # Errors
     /// [`SimError::ViewPort`] when the port is taken, [`SimError::ViewToken`] without randomness for the token.
     pub fn start(port: u16, knobs: Knobs) -> Result<Self, SimError> {
+        Self::start_with(port, Shared::new(knobs))
+    }
+
+    /// The same for a body in space with these labels of length and stress, which its page is made for; seen from where these
+    /// paddles are.
+    ///
+    /// # Errors
+    /// As [`View::start`].
+    pub fn start_in_space(
+        port: u16,
+        knobs: Knobs,
+        geometry: &SpaceGeometry,
+        units: &[String; 2],
+        paddles: &[u32],
+    ) -> Result<Self, SimError> {
+        let page = page_in_space(geometry, units, paddles);
+        Self::start_with(port, Shared::showing(knobs, page.into()))
+    }
+
+    fn start_with(port: u16, shared: Shared) -> Result<Self, SimError> {
         let token = token().map_err(|source| SimError::ViewToken { source })?;
         let failed = |source| SimError::ViewPort { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
         let port = listener.local_addr().map_err(failed)?.port();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
-        let shared = Arc::new(Shared::new(knobs));
+        let shared = Arc::new(shared);
         let address = format!("http://127.0.0.1:{port}/{token}/");
         let gate = Arc::new(Gate::new(token, port));
         let for_thread = Arc::clone(&shared);
@@ -84,8 +107,15 @@ impl Drop for View {
 }
 
 impl Spectator for View {
-    fn observe<'m>(&self, insertion: ObservedInsertion<'m>) -> Box<dyn Observer<TissuePlant<'m>>> {
+    fn observe<'m>(&self, insertion: ObservedInsertion<PlanarBody<'m>>) -> Box<dyn Observer<TissuePlant<'m>>> {
         Box::new(Watch::new(&self.shared, insertion))
+    }
+
+    fn observe_in_space<'m>(
+        &self,
+        insertion: ObservedInsertion<&PreparedBody<'m>>,
+    ) -> Box<dyn Observer<SpaceTissue<'m>>> {
+        Box::new(Watch::in_space(&self.shared, insertion))
     }
 }
 

@@ -1,13 +1,18 @@
 //! What the loop and the view share.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use model_offline::model::TissueModel;
+use hyper::body::Bytes;
 use serde::{Deserialize, Serialize};
 
+use super::body::ShownBody;
 use crate::runtime::plant::observer::Answer;
 use crate::runtime::time::mode::RunMode;
+use crate::world::truth::Truth;
+
+/// One file: no network but the events of its own address.
+pub(super) const PAGE: &str = include_str!("page.html");
 
 /// Time between two pictures: 30 a second.
 pub(super) const FRAME_NS: u64 = 33_333_333;
@@ -75,19 +80,18 @@ pub(super) struct ViewState {
     /// Whether it is one of the view's own, under its knobs, and no part of the comparison of strategies.
     pub(super) live: bool,
     pub(super) mode: Option<RunMode>,
-    pub(super) model: Option<Arc<TissueModel>>,
-    pub(super) paddle_index: u32,
+    pub(super) body: Option<ShownBody>,
+    /// Of the plane; in space what is true tells the body.
     pub(super) coefficients: Vec<f64>,
     pub(super) time_s: f64,
-    pub(super) tick: u64,
-    pub(super) depth: f64,
+    pub(super) truth: Truth,
+    /// Target displacement orthogonal to the needle, length: with a sign in the plane.
+    pub(super) error: f64,
     pub(super) answer: Option<Answer>,
     /// Largest orthogonal error of every tick since the needle moves, length: a page that comes late knows it, too.
     pub(super) largest: f64,
     /// What a page that comes late has missed.
     pub(super) history: History,
-    pub(super) target: [f64; 2],
-    pub(super) paddle: [f64; 2],
     /// Longest solve since the state before, ns.
     pub(super) solve_ns: u64,
     /// Latest start of a tick after its release since the state before, ns; free-run only.
@@ -99,7 +103,7 @@ pub(super) struct ViewState {
 #[derive(Clone, Debug)]
 pub(super) struct History {
     pub(super) rows: Vec<[f64; 4]>,
-    pub(super) trail: Vec<[f64; 2]>,
+    pub(super) trail: Vec<[f64; 3]>,
     stride: u64,
     seen: u64,
 }
@@ -115,7 +119,7 @@ impl Default for History {
 
 impl History {
     /// Adds a state. Allocates nothing.
-    pub(super) fn push(&mut self, row: [f64; 4], target: [f64; 2]) {
+    pub(super) fn push(&mut self, row: [f64; 4], target: [f64; 3]) {
         if self.seen.is_multiple_of(self.stride) {
             if self.rows.len() == HISTORY {
                 self.stride *= 2;
@@ -136,6 +140,8 @@ impl History {
 /// Everything that the loop and the view's threads share.
 #[derive(Debug)]
 pub(super) struct Shared {
+    /// The page's own text.
+    page: Bytes,
     state: Mutex<ViewState>,
     knobs: Mutex<Knobs>,
     paused: AtomicBool,
@@ -158,8 +164,15 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Shared {
+    /// Of the plane.
     pub(super) fn new(knobs: Knobs) -> Self {
+        Self::showing(knobs, Bytes::from_static(PAGE.as_bytes()))
+    }
+
+    /// With another page.
+    pub(super) fn showing(knobs: Knobs, page: Bytes) -> Self {
         Self {
+            page,
             state: Mutex::default(),
             knobs: Mutex::new(knobs),
             paused: AtomicBool::new(false),
@@ -171,6 +184,11 @@ impl Shared {
             may_restart: AtomicBool::new(false),
             dropped: AtomicU64::new(0),
         }
+    }
+
+    /// The page's own text.
+    pub(super) fn page(&self) -> Bytes {
+        self.page.clone()
     }
 
     /// The knobs as they are now.
@@ -304,7 +322,7 @@ mod tests {
         let mut history = History::default();
         let room = history.rows.capacity();
         for i in 0..100_000_u32 {
-            history.push([f64::from(i), 0.0, 0.0, 0.0], [f64::from(i), 0.0]);
+            history.push([f64::from(i), 0.0, 0.0, 0.0], [f64::from(i), 0.0, 0.0]);
             assert!(history.rows.len() == history.trail.len() && history.rows.capacity() == room);
         }
         let gaps: Vec<f64> = history.rows.windows(2).map(|pair| pair[1][0] - pair[0][0]).collect();

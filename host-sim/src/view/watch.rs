@@ -3,12 +3,17 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use nalgebra::Vector3;
+
+use super::body::{ShownBody, SpaceShown};
 use super::shared::{FRAME_NS, Shared, ViewState};
-use crate::runtime::plant::observer::{Moment, ObservedInsertion, Observer};
+use crate::runtime::plant::observer::{Moment, ObservedInsertion, Observer, PlanarBody};
 use crate::runtime::signals;
 use crate::runtime::time::clock::{now_ns, sleep_until};
 use crate::runtime::time::mode::RunMode;
+use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::tissue::TissuePlant;
+use crate::world::truth::Truth;
 
 /// How long a paused loop sleeps between two looks.
 const PAUSE: Duration = Duration::from_millis(5);
@@ -57,8 +62,9 @@ pub(super) struct Watch {
     due_ns: u64,
     solve_ns: u64,
     late_ns: u64,
-    /// Direction in which the target is to stay, and its largest displacement along that, length.
-    normal: [f64; 2],
+    /// Directions in which the target is to stay, one in the plane and two in space.
+    orthogonal: Vec<Vector3<f64>>,
+    /// Its largest displacement in them, length.
     largest: f64,
     /// When the next tick of free-run is due, ns.
     expected_ns: Option<u64>,
@@ -67,9 +73,30 @@ pub(super) struct Watch {
 }
 
 impl Watch {
-    /// Begins an insertion.
-    pub(super) fn new(shared: &Arc<Shared>, insertion: ObservedInsertion<'_>) -> Self {
-        let ObservedInsertion { model, paddle, mode, period_ns, title } = insertion;
+    /// Begins an insertion in the plane.
+    pub(super) fn new(shared: &Arc<Shared>, insertion: ObservedInsertion<PlanarBody<'_>>) -> Self {
+        let PlanarBody { model, paddle } = insertion.body;
+        let [x, y] = model.scene().needle.orthogonal().into();
+        let body = ShownBody::Plane(Arc::new(model.clone()), paddle);
+        Self::of(shared, insertion, body, vec![0.0; model.dofs()], vec![Vector3::new(x, y, 0.0)])
+    }
+
+    /// Begins an insertion in space.
+    pub(super) fn in_space(shared: &Arc<Shared>, insertion: ObservedInsertion<&PreparedBody<'_>>) -> Self {
+        let orthogonal = insertion.body.model().scene().needle.orthogonal();
+        let body = ShownBody::Space(Arc::new(SpaceShown::new(insertion.body)));
+        let orthogonal = orthogonal.column_iter().map(|direction| direction.into_owned()).collect();
+        Self::of(shared, insertion, body, Vec::new(), orthogonal)
+    }
+
+    fn of<B>(
+        shared: &Arc<Shared>,
+        insertion: ObservedInsertion<B>,
+        body: ShownBody,
+        coefficients: Vec<f64>,
+        orthogonal: Vec<Vector3<f64>>,
+    ) -> Self {
+        let ObservedInsertion { mode, period_ns, title, .. } = insertion;
         {
             let mut state = shared.state();
             *state = ViewState {
@@ -78,33 +105,37 @@ impl Watch {
                 title,
                 live: shared.restarts_are_allowed(),
                 mode: Some(mode),
-                model: Some(Arc::new(model.clone())),
-                paddle_index: paddle,
-                coefficients: vec![0.0; model.dofs()],
+                body: Some(body),
+                coefficients,
                 ..ViewState::default()
             };
         }
-        let pacing = Pacing::new(period_ns);
-        let normal = model.scene().needle.orthogonal().into();
         Self {
             shared: Arc::clone(shared),
             mode,
-            pacing,
+            pacing: Pacing::new(period_ns),
             due_ns: 0,
             solve_ns: 0,
             late_ns: 0,
-            normal,
+            orthogonal,
             largest: 0.0,
             expected_ns: None,
             held: false,
         }
     }
-}
 
-impl<'m> Observer<TissuePlant<'m>> for Watch {
-    /// Leaves a state if one is due and nobody reads the last one. Waits for nobody, unless time is held after this tick:
-    /// then the page is to show this one, and no earlier one.
-    fn offer(&mut self, tissue: &TissuePlant<'m>, moment: &Moment) {
+    /// The target's displacement in the directions in which it is to stay: with a sign where there is one.
+    fn error(&self, truth: &Truth) -> f64 {
+        let target = Vector3::from(truth.target);
+        match &self.orthogonal[..] {
+            [one] => one.dot(&target),
+            all => all.iter().map(|one| one.dot(&target).powi(2)).sum::<f64>().sqrt(),
+        }
+    }
+
+    /// Leaves a state if one is due and nobody reads the last one, with what is copied into it. Waits for nobody, unless time is
+    /// held after this tick: then the page is to show this one, and no earlier one.
+    fn leave(&mut self, moment: &Moment, copy: impl FnOnce(&mut Vec<f64>)) {
         let now = now_ns();
         self.solve_ns = self.solve_ns.max(now.saturating_sub(moment.began_ns));
         if self.mode == RunMode::FreeRun {
@@ -114,9 +145,7 @@ impl<'m> Observer<TissuePlant<'m>> for Watch {
             self.late_ns = self.late_ns.max(moment.began_ns.saturating_sub(due_ns));
             self.expected_ns = Some(time_ns + self.pacing.period_ns);
         }
-        let target: [f64; 2] = moment.truth.target::<2>().into();
-        let [x, y] = target;
-        let error = self.normal[0] * x + self.normal[1] * y;
+        let error = self.error(&moment.truth);
         if moment.is_counted {
             self.largest = self.largest.max(error.abs());
         }
@@ -127,16 +156,14 @@ impl<'m> Observer<TissuePlant<'m>> for Watch {
         let free = if self.held { Some(self.shared.state()) } else { self.shared.try_state() };
         let Some(mut state) = free else { return };
         self.due_ns = now + FRAME_NS;
-        tissue.copy_coefficients(&mut state.coefficients);
+        copy(&mut state.coefficients);
         state.number += 1;
         state.held = self.held;
         state.time_s = moment.time_s;
-        state.tick = moment.truth.tick;
-        state.depth = moment.truth.depth;
+        state.truth = moment.truth;
+        state.error = error;
         state.answer = moment.answer;
         state.largest = self.largest;
-        state.target = target;
-        state.paddle = moment.truth.paddle::<2>().into();
         state.solve_ns = std::mem::take(&mut self.solve_ns);
         state.late_ns = std::mem::take(&mut self.late_ns);
         let [solve_us, late_us] = [state.solve_ns, state.late_ns].map(|ns| ns as f64 * 1e-3);
@@ -144,17 +171,12 @@ impl<'m> Observer<TissuePlant<'m>> for Watch {
         if moment.time_s < 0.0 {
             return;
         }
-        state.history.push([moment.time_s, error, solve_us, late_us], target);
-    }
-
-    /// Whether the page wants the insertion to end now.
-    fn ends_early(&self) -> bool {
-        self.shared.ends_early()
+        state.history.push([moment.time_s, error, solve_us, late_us], moment.truth.target);
     }
 
     /// Holds time while paused, and to keep pace with the clock on the wall. A pause that was asked for since the last offer
     /// begins with the next tick: the tick that is held is the one that is shown.
-    fn hold(&mut self) {
+    fn wait(&mut self) {
         while self.held && self.shared.is_paused() && !self.shared.ends_early() && signals::check().is_ok() {
             let step = self.shared.take_step();
             self.pacing.restart();
@@ -167,12 +189,39 @@ impl<'m> Observer<TissuePlant<'m>> for Watch {
     }
 }
 
+impl<'m> Observer<TissuePlant<'m>> for Watch {
+    fn offer(&mut self, tissue: &TissuePlant<'m>, moment: &Moment) {
+        self.leave(moment, |coefficients| tissue.copy_coefficients(coefficients));
+    }
+
+    fn ends_early(&self) -> bool {
+        self.shared.ends_early()
+    }
+
+    fn hold(&mut self) {
+        self.wait();
+    }
+}
+
+impl<'m> Observer<SpaceTissue<'m>> for Watch {
+    fn offer(&mut self, _: &SpaceTissue<'m>, moment: &Moment) {
+        self.leave(moment, |_| ());
+    }
+
+    fn ends_early(&self) -> bool {
+        self.shared.ends_early()
+    }
+
+    fn hold(&mut self) {
+        self.wait();
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::view::Knobs;
     use crate::world::tissue::WantedPlant;
-    use crate::world::truth::Truth;
     use model_offline::model::TissueModel;
     use model_offline::scene::Scene;
 
@@ -183,8 +232,7 @@ mod tests {
         let knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
         let shared = Arc::new(Shared::new(knobs));
         let insertion = ObservedInsertion {
-            model: &model,
-            paddle: 0,
+            body: PlanarBody { model: &model, paddle: 0 },
             mode: RunMode::Lockstep,
             period_ns: 1_000_000,
             title: String::new(),
@@ -198,7 +246,7 @@ mod tests {
         drop(reader);
         watch.offer(&tissue, &moment);
         let state = shared.newer(0, 0).unwrap();
-        assert_eq!((state.number, state.tick, state.coefficients.len()), (1, 1, model.dofs()));
+        assert_eq!((state.number, state.truth.tick, state.coefficients.len()), (1, 1, model.dofs()));
         assert!(shared.newer(state.insertion, state.number).is_none());
     }
 }

@@ -331,8 +331,11 @@ fn beside(vtu: &Path) -> [PathBuf; 2] {
 fn write_for_paraview(model: &TissueModel, state: State<'_>, file: &Path) -> Result<(), CliError> {
     let [parts, script] = beside(file);
     let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let shown = Shown { body: &name(file), parts: &name(&parts), stress: has_stress(model) };
+    let scene = model.scene();
+    let (units, stress) = ([&scene.length_unit[..], &scene.stress_unit], has_stress(model));
+    let (body, beside) = (name(file), name(&parts));
+    let shown = Shown { scene: &scene.name, units, body: &body, parts: &beside, stress, in_space: None };
     output::write_whole(file, vtu::vtu(model, state.coefficients).as_bytes())?;
     output::write_whole(&parts, vtu::parts(model, state).as_bytes())?;
-    Ok(output::write_whole(&script, vtu::script(model.scene(), shown).as_bytes())?)
+    Ok(output::write_whole(&script, vtu::script(shown).as_bytes())?)
 }

@@ -26,7 +26,7 @@ use crate::placement::space::insertion::InsertionModel;
 use crate::random::SplitMix64;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::{DVector, Vector3};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Intervals between tabulated depths, and shares of the room beside the way, that are tried until the error is within the
@@ -57,7 +57,7 @@ pub struct TabulationOptions {
 }
 
 /// How tabulating went.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TabulationReport {
     /// Tabulated depths.
     pub knots: usize,

@@ -15,13 +15,13 @@ use self::measure::measure;
 use super::result::{RecordingResult, StrategyResult};
 use super::strategy::Strategy;
 use crate::bench::error::SimError;
-use crate::record::export::foxglove::Stage;
+use crate::record::export::foxglove::{Scenery as _, Stage};
 use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
 use crate::record::recording::{Record, Recording};
 use crate::runtime::executor::Hardware;
 use crate::runtime::plant::PlantLoop;
-use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
+use crate::runtime::plant::observer::{ObservedInsertion, PlanarBody, Spectator};
 use crate::runtime::plant::rehearsal::world_in_time;
 use crate::runtime::signals;
 use crate::runtime::time::mode::RunMode;
@@ -62,7 +62,8 @@ impl Label {
         format!("{}.{extension}", self.stem())
     }
 
-    fn stem(&self) -> String {
+    /// What the names of its files begin with.
+    pub(super) fn stem(&self) -> String {
         let Self { tissue, table_tissue, strategy } = self;
         if tissue == table_tissue {
             format!("{tissue}-{strategy}")
@@ -71,7 +72,8 @@ impl Label {
         }
     }
 
-    fn title(&self) -> String {
+    /// What it is, in words.
+    pub(super) fn title(&self) -> String {
         format!("{}, table of {}: {}", self.tissue, self.table_tissue, self.strategy)
     }
 }
@@ -207,9 +209,10 @@ impl<'a> SimulatedInsertion<'a> {
         let linked = LinkedInsertion { controller: controller.linked(), simulation, progress };
         linked.run(plant, |plant| {
             if let Some(spectator) = controller.spectator {
-                let (paddle, period_ns) = (controller.table.paddles[0].index, simulation.loop_settings.period_ns());
-                let (mode, title) = (controller.mode, self.label.title());
-                plant.observed_by(spectator.observe(ObservedInsertion { model, paddle, mode, period_ns, title }));
+                let body = PlanarBody { model, paddle: controller.table.paddles[0].index };
+                let (period_ns, title) = (simulation.loop_settings.period_ns(), self.label.title());
+                let mode = controller.mode;
+                plant.observed_by(spectator.observe(ObservedInsertion { body, mode, period_ns, title }));
             }
         })
     }

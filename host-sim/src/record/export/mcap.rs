@@ -1,4 +1,4 @@
-//! A recording as [MCAP](https://mcap.dev): eleven topics of JSON messages, each with its JSON Schema, compressed.
+//! A recording as [MCAP](https://mcap.dev): twelve topics of JSON messages, each with its JSON Schema, compressed.
 //!
 //! | topic | one message per | log time |
 //! |---|---|---|
@@ -7,6 +7,7 @@
 //! | `/truth` | tick of the plant | tick |
 //! | `/needle_forces` | moment of a needle that slips; of a run, not of a recording alone | that moment |
 //! | `/scene/rest`, `/scene`, `/tf` | what is to be seen, in [Foxglove's schemas](super::foxglove): at rest once, what moves 30 times a second; where the scene is known | tick of the plant |
+//! | `/scene/body` | in space the deformed body, at some ticks | tick of the plant |
 //! | `/log` | change of the controller's mode or faults, in Foxglove's schema | tick |
 //!
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
@@ -29,7 +30,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::csv::Series;
-use super::foxglove::{self, FrameTransform, Log, SceneUpdate, Stage};
+use super::foxglove::{self, FrameTransform, Log, SceneUpdate, Scenery};
 use crate::record::recording::Recording;
 use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::time::mode::RunMode;
@@ -169,7 +170,7 @@ pub struct Known<'k> {
     /// What its needle met on its way.
     pub needle: NeedleForces<'k>,
     /// Its scene.
-    pub stage: Option<&'k Stage>,
+    pub stage: Option<&'k dyn Scenery>,
 }
 
 /// What a needle met on its way.
@@ -208,7 +209,7 @@ fn schema_of<T: JsonSchema>() -> schemars::Schema {
 }
 
 /// Topic, name of the schema and schema of every kind of message.
-pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 11] {
+pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 12] {
     [
         ("/needle", "stillpoint.NeedleMessage", schema_of::<NeedleMessage>()),
         ("/target", "stillpoint.TargetMessage", schema_of::<TargetMessage>()),
@@ -221,6 +222,7 @@ pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 11] {
         ("/scene", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
         ("/tf", "foxglove.FrameTransform", schema_of::<FrameTransform>()),
         ("/log", "foxglove.Log", schema_of::<Log>()),
+        ("/scene/body", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
     ]
 }
 
@@ -387,11 +389,14 @@ impl Topics {
     fn write_picture(
         &mut self,
         writer: &mut Output,
-        stage: &Stage,
+        stage: &dyn Scenery,
         shown: &mut Option<u64>,
         truth: &Truth,
     ) -> Result<(), McapError> {
         let time_ns = truth.time_ns;
+        if let Some(body) = stage.body_at(truth) {
+            self.write(writer, "/scene/body", [time_ns; 2], &body)?;
+        }
         match *shown {
             None => {
                 self.write(writer, "/tf", [time_ns; 2], &foxglove::frame(time_ns))?;

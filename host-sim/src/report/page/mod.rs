@@ -13,7 +13,7 @@ mod scene;
 mod settings;
 mod slider;
 pub(super) mod space;
-mod space_view;
+pub(crate) mod space_view;
 mod style;
 mod timing;
 mod view;

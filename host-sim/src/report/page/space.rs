@@ -3,8 +3,9 @@
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use model_offline::number::{in_unit, length};
 use model_offline::output::chart::number::number;
-use model_offline::output::chart::{Axis, Colour, Dash, Panel, Place, ReferenceLine, Series};
+use model_offline::output::chart::{Axis, Colour, Dash, Figure, Panel, Place, ReferenceLine, Series};
 
+use super::attachments::Attachments;
 use super::embed::{head_of, panels};
 use super::space_view::{self, STRATEGIES};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
@@ -13,8 +14,8 @@ use crate::runtime::time::mode::RunMode;
 /// Numbers under the pointer, pictures to keep.
 const SCRIPT: &str = concat!(include_str!("common.js"), include_str!("charts.js"));
 
-/// The whole page; it needs nothing else.
-pub(in crate::report) fn render(run: &SpaceRun) -> String {
+/// The whole page, with what other commands have left beside it; it needs nothing else.
+pub(in crate::report) fn render(run: &SpaceRun, attachments: &Attachments) -> String {
     let unit = &run.units[0];
     html! {
         (DOCTYPE)
@@ -35,6 +36,9 @@ pub(in crate::report) fn render(run: &SpaceRun) -> String {
                     }
                     (space_view::section(run))
                     @for (place, case) in run.cases.iter().enumerate() { (of_case(run, place, case)) }
+                    @if let Some(attached) = attachments.section() {
+                        section #attached { h2 { "From other commands" } (attached) }
+                    }
                 }
                 div #tip.on-screen hidden {}
                 script { (PreEscaped(SCRIPT)) }
@@ -43,6 +47,32 @@ pub(in crate::report) fn render(run: &SpaceRun) -> String {
         }
     }
     .into_string()
+}
+
+/// Pictures for use elsewhere, on a white ground: file name and SVG. Of every case the charts, and the sections of every strategy.
+pub(in crate::report) fn pictures(run: &SpaceRun) -> Vec<(String, String)> {
+    let mut pictures = Vec::new();
+    for (place, case) in run.cases.iter().enumerate() {
+        let name = match case.tissue == case.table_tissue {
+            true => case.tissue.to_string(),
+            false => format!("{}-with-{}-table", case.tissue, case.table_tissue),
+        };
+        let factor = number(case.improvement, 2);
+        let title =
+            format!("Tissue {}: controlled paddles leave {factor} times less than the best fixture", case.tissue);
+        let panels = charts_of(run, case).to_vec();
+        let errors = Figure { title, caption: String::new(), panels, columns: 3 }.svg();
+        pictures.push((format!("{name}-error.svg"), errors));
+        for (strategy, called) in STRATEGIES.iter().enumerate() {
+            let sections = space_view::sections_picture(run, place, strategy);
+            pictures.extend(sections.map(|svg| (format!("{name}-{}.svg", called.replace(' ', "-")), svg)));
+        }
+    }
+    pictures
+}
+
+fn charts_of(run: &SpaceRun, case: &SpaceCase) -> [Panel; 3] {
+    [error_panel(run, case), enlarged_panel(run, case), paddle_panel(run, case)]
 }
 
 fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
@@ -72,7 +102,7 @@ fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
                     }
                 }
             } }
-            (panels(&[error_panel(run, case), enlarged_panel(run, case), paddle_panel(run, case)]))
+            (panels(&charts_of(run, case)))
             (space_view::case_sections(run, place))
         }
     }

@@ -20,8 +20,9 @@
   const vector = (numbers) => new THREE.Vector3(...numbers);
   const rest = new Float32Array(bytes(data.nodes).buffer), tetrahedra = indices(data.tetrahedra), parts = bytes(data.parts);
   const [axis, target, contact] = [data.axis, data.target, data.contact].map(vector);
-  const bodies = data.cases.map((one) => one.strategies.map((body) => body && { ...body,
-    moved_nodes: Float32Array.from(new Int16Array(bytes(body.displacements).buffer), (part) => part * body.step) }));
+  const decoded = (body) => body && { ...body,
+    moved_nodes: Float32Array.from(new Int16Array(bytes(body.displacements).buffer), (part) => part * body.step) };
+  const bodies = data.cases.map((one) => one.strategies.map(decoded));
   const valuesOf = (body, field) => {
     const u = body.moved_nodes;
     return Float32Array.from({ length: u.length / 3 }, (_, i) => {
@@ -199,7 +200,13 @@
   };
   renderer.localClippingEnabled = true;
 
-  const largestOf = (place, field) => Math.max(Number.MIN_VALUE, ...bodies[place].filter(Boolean).map((body) => valuesOf(body, field).reduce((a, b) => Math.max(a, b), 0)));
+  // Of a body that lives it is the largest that was, so that colours keep what they mean for longer.
+  let grown = {};
+  const largestOf = (place, field) => {
+    const now = Math.max(Number.MIN_VALUE, ...bodies[place].filter(Boolean).map((body) => valuesOf(body, field).reduce((a, b) => Math.max(a, b), 0)));
+    if (!data.live) return now;
+    return grown[field] = Math.max(now, grown[field] || 0);
+  };
   const outsideOf = (body) => {
     const key = (triangles, t) => triangles[t] + "," + triangles[t + 1] + "," + triangles[t + 2];
     const taken = new Set();
@@ -214,7 +221,7 @@
   const show = () => {
     const { place, strategy, field, cut, times } = chosen();
     const body = bodies[place][strategy], reading = document.getElementById("view-reading");
-    input("times-reading").textContent = times + " ×" + (times === usual ? " (chosen for this run)" : "");
+    input("times-reading").textContent = times + " ×" + (times === usual && !data.live ? " (chosen for this run)" : "");
     if (!body) { reading.textContent = "The model did not get to the end of this insertion: there is no body to show."; return; }
     const largest = largestOf(place, field);
     const values = valuesOf(body, field).map((value) => Math.min(0.9999, Math.max(1e-4, value / largest)));
@@ -291,7 +298,7 @@
   canvas.addEventListener("pointerdown", (event) => { canvas.focus({ preventScroll: true }); if (event.pointerType === "touch") controls.enableZoom = true; });
 
   const most = Math.max(...bodies.flat().filter(Boolean).map((body) => body.moved_nodes.reduce((a, b) => Math.max(a, Math.abs(b)), 0)));
-  const usual = Math.min(20, Math.max(1, Math.round(0.1 * size / most) || 1));
+  const usual = data.live ? 1 : Math.min(20, Math.max(1, Math.round(0.1 * size / most) || 1));
   input("times").value = usual;
   for (const name of ["case", "strategy", "field", "through", "rest"]) input(name).addEventListener("change", show);
   input("cut").addEventListener("change", () => { face(); show(); });
@@ -304,4 +311,8 @@
   face();
   recolour();
   show();
+  if (data.live) window.spaceView = {
+    begin: (hasInclusions) => { grown = {}; data.cases[0].has_inclusions = hasInclusions; },
+    show: (body) => { bodies[0][0] = decoded(body); show(); },
+  };
 })();

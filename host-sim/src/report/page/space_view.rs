@@ -6,8 +6,9 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
-use model_offline::number::length;
-use model_offline::output::chart::colour_bar;
+use model_offline::geometry::Point;
+use model_offline::number::{in_unit, length};
+use model_offline::output::chart::{colour_bar, heading, sheet};
 use model_offline::output::field_picture::Field;
 use model_offline::output::space_picture::{
     CutPlane, Shown, SpaceGeometry, SpaceState, orthogonal, outside, planes, sections, seen_from,
@@ -16,6 +17,7 @@ use model_offline::scene::TissueVariant;
 use serde::Serialize;
 
 use super::embed::{CHART_WIDTH, charts, inline};
+use super::style;
 use crate::bench::in_space::{SpaceCase, SpaceRun};
 
 const THREE: &str = include_str!("three/three.min.js");
@@ -73,17 +75,7 @@ pub(super) fn section(run: &SpaceRun) -> Markup {
                         grey: needle and its contact; dark: immobile." }
                 }
             }
-            div #view.on-screen hidden {
-                canvas tabindex="0" role="img" aria-label="The deformed body, to be turned" {}
-                p.quiet { "Drag or arrow keys turn, two fingers or the right button move, + and − or, once the picture is chosen, the \
-                    wheel come nearer, 0 goes back." }
-                (controls(run))
-                p #view-reading aria-live="polite" {}
-                ul.keys {
-                    li.k-led { "controlled paddle" } li.k-held { "paddle held still" } li.k-needle { "needle, its contact and line" }
-                    li.k-immobile { "immobile" } li.k-inclusion { "inclusion" } li.k-target { "target: ring at rest, ball now" }
-                }
-            }
+            (view(&controls(run), true))
             figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place)))) }
             p.quiet { "Bodies are solved for once more at the end of each insertion, to " (length(run.depth)) " " (unit) "." }
         }
@@ -95,10 +87,43 @@ fn attached(run: &SpaceRun) -> Vec<u32> {
     run.bodies.cases.iter().flatten().flatten().flat_map(|state| state.paddles.iter().copied()).collect()
 }
 
+/// The view and how it is steered; whether what is read from it is read out, too.
+fn view(controls: &Markup, is_read_out: bool) -> Markup {
+    let politeness = if is_read_out { "polite" } else { "off" };
+    html! {
+        div #view.on-screen hidden {
+            canvas tabindex="0" role="img" aria-label="The deformed body, to be turned" {}
+            p.quiet { "Drag or arrow keys turn, two fingers or the right button move, + and − or, once the picture is chosen, the \
+                wheel come nearer, 0 goes back." }
+            (controls)
+            p #view-reading aria-live=(politeness) {}
+            ul.keys {
+                li.k-led { "controlled paddle" }
+                @if is_read_out { li.k-held { "paddle held still" } }
+                li.k-needle { "needle, its contact and line" }
+                li.k-immobile { "immobile" } li.k-inclusion { "inclusion" } li.k-target { "target: ring at rest, ball now" }
+            }
+        }
+    }
+}
+
 /// What the view shows: case, strategy, field, cuts, exaggeration.
 fn controls(run: &SpaceRun) -> Markup {
-    let planes = planes(&run.bodies.geometry);
-    let [view, _] = seen_from(&run.bodies.geometry, &attached(run));
+    let which = html! {
+        label { "tissue " select #view-case { @for (i, case) in run.cases.iter().enumerate() {
+            option value=(i) selected[i == shown_first(run)] { (case.tissue.name()) ", table of " (case.table_tissue.name()) }
+        } } }
+        label { "paddles " select #view-strategy { @for (i, name) in STRATEGIES.iter().enumerate() {
+            option value=(i) selected[i == 2] { (name) }
+        } } }
+    };
+    steering(&run.bodies.geometry, &run.units, &attached(run), &which)
+}
+
+/// How a body with these paddles attached is shown, beside what of it.
+fn steering(geometry: &SpaceGeometry, units: &[String; 2], attached: &[u32], which: &Markup) -> Markup {
+    let planes = planes(geometry);
+    let [view, _] = seen_from(geometry, attached);
     // Along the needle, and more aside than through the paddles that are looked at.
     let turned = |plane: &CutPlane| plane.normal.dot(&view).abs();
     let first = usize::from(turned(&planes[1]) < turned(&planes[0]));
@@ -106,19 +131,14 @@ fn controls(run: &SpaceRun) -> Markup {
         fieldset {
             legend { "What is shown" }
             div.choices {
-                label { "tissue " select #view-case { @for (i, case) in run.cases.iter().enumerate() {
-                    option value=(i) selected[i == shown_first(run)] { (case.tissue.name()) ", table of " (case.table_tissue.name()) }
-                } } }
-                label { "paddles " select #view-strategy { @for (i, name) in STRATEGIES.iter().enumerate() {
-                    option value=(i) selected[i == 2] { (name) }
-                } } }
+                (which)
                 label { "colour " select #view-field {
                     option value="orthogonal" { "orthogonal to the needle" } option value="size" { "whole displacement" }
                 } }
                 label { "cut " select #view-cut {
                     option value="none" { "none" }
                     @for (i, plane) in planes.iter().enumerate() {
-                        option value=(i) selected[i == first] { (plane.name(&run.units[0])) }
+                        option value=(i) selected[i == first] { (plane.name(&units[0])) }
                     }
                     option value="all" { "all three: a corner taken out" }
                 } }
@@ -133,6 +153,44 @@ fn controls(run: &SpaceRun) -> Markup {
                 label { input #view-rest type="checkbox"; " body at rest" }
             }
         }
+    }
+}
+
+/// The parts of a live view that are a body in space.
+#[derive(Debug)]
+pub(crate) struct LiveView {
+    /// What stands where the body is.
+    pub(crate) body: String,
+    /// Its style.
+    pub(crate) style: String,
+    /// Its data and scripts: they define `spaceView` where there is WebGL.
+    pub(crate) scripts: String,
+}
+
+/// A view of a body at rest with these labels of length and stress, seen from where these paddles are, to be moved by a script.
+pub(crate) fn live_view(geometry: &SpaceGeometry, units: &[String; 2], paddles: &[u32]) -> LiveView {
+    let all: Vec<u32> = geometry.paddles.iter().map(|paddle| paddle.index).collect();
+    let one = html! { input #view-case type="hidden" value="0"; input #view-strategy type="hidden" value="0"; };
+    let body = html! {
+        section #body {
+            p.stand-in.quiet { "No picture of the body: this browser has no WebGL." }
+            (view(&steering(geometry, units, paddles, &one), false))
+            figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(units), 0.0))) }
+        }
+    };
+    let rest = SpaceState {
+        depth: 0.0,
+        paddles: Vec::new(),
+        paddle_displacements: Vec::new(),
+        displacements: vec![[0.0; 3]; geometry.nodes.len()],
+        target: [0.0; 3],
+    };
+    let case = Case { has_inclusions: !geometry.inclusions.is_empty(), strategies: vec![Some(moved_body(&rest))] };
+    let data = data_of((geometry, units), &all, &seen_from(geometry, paddles), (vec![case], true));
+    LiveView {
+        body: body.into_string(),
+        style: format!("{}{}", style::view(), include_str!("live.css")),
+        scripts: html! { script { (PreEscaped(include_str!("common.js"))) } (scripts_of(&data)) }.into_string(),
     }
 }
 
@@ -151,6 +209,25 @@ pub(super) fn case_sections(run: &SpaceRun, place: usize) -> Markup {
         }
         figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place)))) }
     }
+}
+
+/// Outside and sections of a case under a strategy as a picture of its own; none where there is no body.
+pub(super) fn sections_picture(run: &SpaceRun, place: usize, strategy: usize) -> Option<String> {
+    let (case, unit) = (&run.cases[place], &run.units[0]);
+    let draw = |shown: &Shown<'_>| {
+        let mut drawings = vec![outside(shown, CHART_WIDTH)];
+        drawings.extend(sections(shown, CHART_WIDTH));
+        sheet("", &drawings, 2)
+    };
+    let all = drawn(run, place, strategy, draw).ok()?;
+    let title = format!("{}: tissue {}, {}", run.scene, case.tissue, STRATEGIES[strategy]);
+    let caption = format!(
+        "Outside and sections through the target at rest at the end of the insertion, to {}.",
+        in_unit(run.depth, unit)
+    );
+    let bar = colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place));
+    let head = heading(&title, &caption, all.size[0]);
+    Some(sheet(&title, &[head, all, bar], 1).file())
 }
 
 #[derive(Serialize)]
@@ -178,6 +255,8 @@ struct Data<'a> {
     view: [[f64; 3]; 2],
     planes: Vec<([f64; 3], f64)>,
     cases: Vec<Case>,
+    /// Whether bodies are replaced again and again.
+    live: bool,
 }
 
 #[derive(Serialize)]
@@ -189,11 +268,12 @@ struct Patch {
 #[derive(Serialize)]
 struct Case {
     has_inclusions: bool,
-    strategies: Vec<Option<Body>>,
+    strategies: Vec<Option<MovedBody>>,
 }
 
+/// A body that has moved, as the script reads it.
 #[derive(Serialize)]
-struct Body {
+pub(crate) struct MovedBody {
     depth: f64,
     paddles: Vec<u32>,
     moved: Vec<f64>,
@@ -203,12 +283,13 @@ struct Body {
     displacements: String,
 }
 
-fn body(state: &SpaceState) -> Body {
+/// What the script reads of a state.
+pub(crate) fn moved_body(state: &SpaceState) -> MovedBody {
     let largest = state.displacements.iter().flatten().fold(0.0_f64, |largest, part| largest.max(part.abs()));
     let step = if largest > 0.0 { largest / STEPS } else { 1.0 };
     let steps = state.displacements.iter().flatten().flat_map(|part| ((part / step).round() as i16).to_le_bytes());
     let length = |u: &[f64; 3]| u.iter().map(|part| part * part).sum::<f64>().sqrt();
-    Body {
+    MovedBody {
         depth: state.depth,
         paddles: state.paddles.clone(),
         moved: state.paddle_displacements.iter().map(length).collect(),
@@ -218,9 +299,24 @@ fn body(state: &SpaceState) -> Body {
     }
 }
 
-/// JSON that is safe inside of a script element.
+/// JSON of a run that is safe inside of a script element.
 fn data(run: &SpaceRun) -> String {
+    let attached = attached(run);
+    let cases = run.cases.iter().zip(&run.bodies.cases).map(|(case, bodies)| Case {
+        has_inclusions: case.tissue == TissueVariant::Inclusion,
+        strategies: bodies.iter().map(|state| state.as_ref().ok().map(moved_body)).collect(),
+    });
     let geometry = &run.bodies.geometry;
+    data_of((geometry, &run.units), &attached, &seen_from(geometry, &attached), (cases.collect(), false))
+}
+
+/// The same of these cases of a body, or of one that lives, with these of its paddles, seen from there.
+fn data_of(
+    (geometry, units): (&SpaceGeometry, &[String; 2]),
+    paddles: &[u32],
+    view: &[Point<3>; 2],
+    (cases, live): (Vec<Case>, bool),
+) -> String {
     // Two bytes number the nodes of most meshes.
     let index = if geometry.nodes.len() <= usize::from(u16::MAX) { 2 } else { 4 };
     let encode = |numbers: &mut dyn Iterator<Item = u32>| {
@@ -228,14 +324,9 @@ fn data(run: &SpaceRun) -> String {
     };
     let triangles = |patch: &[[u32; 3]]| encode(&mut patch.iter().flatten().copied());
     let nodes = geometry.nodes.iter().flatten().flat_map(|part| (*part as f32).to_le_bytes());
-    let attached = attached(run);
-    let cases = run.cases.iter().zip(&run.bodies.cases).map(|(case, bodies)| Case {
-        has_inclusions: case.tissue == TissueVariant::Inclusion,
-        strategies: bodies.iter().map(|state| state.as_ref().ok().map(body)).collect(),
-    });
     let data = Data {
-        unit: &run.units[0],
-        labels: [Field::Orthogonal, Field::Size].map(|field| field.label(&run.units)),
+        unit: &units[0],
+        labels: [Field::Orthogonal, Field::Size].map(|field| field.label(units)),
         index,
         nodes: STANDARD.encode(nodes.collect::<Vec<u8>>()),
         tetrahedra: encode(&mut geometry.tetrahedra.iter().flatten().copied()),
@@ -247,7 +338,7 @@ fn data(run: &SpaceRun) -> String {
         paddles: geometry
             .paddles
             .iter()
-            .filter(|patch| attached.contains(&patch.index))
+            .filter(|patch| paddles.contains(&patch.index))
             .map(|patch| Patch { index: patch.index, triangles: triangles(&patch.triangles) })
             .collect(),
         inclusions: geometry.inclusions.iter().map(|surface| triangles(surface)).collect(),
@@ -255,9 +346,10 @@ fn data(run: &SpaceRun) -> String {
         target: geometry.target,
         contact: geometry.middle(&geometry.needle).into(),
         extent: geometry.extent(),
-        view: seen_from(geometry, &attached).map(Into::into),
+        view: view.map(Into::into),
         planes: planes(geometry).map(|plane| (plane.normal.into(), plane.offset)).to_vec(),
-        cases: cases.collect(),
+        cases,
+        live,
     };
     // Numbers that are not finite become null; the view then stays away.
     serde_json::to_string(&data).unwrap_or_else(|_| "null".to_owned()).replace('<', "\\u003c")
@@ -265,8 +357,12 @@ fn data(run: &SpaceRun) -> String {
 
 /// The view's data and scripts.
 pub(super) fn scripts(run: &SpaceRun) -> Markup {
+    scripts_of(&data(run))
+}
+
+fn scripts_of(data: &str) -> Markup {
     html! {
-        script type="application/json" #space-data { (PreEscaped(data(run))) }
+        script type="application/json" #space-data { (PreEscaped(data)) }
         script { (PreEscaped(format!("/* three.js\n{THREE_LICENCE}*/\n{THREE}"))) }
         script { (PreEscaped(SCRIPT)) }
     }

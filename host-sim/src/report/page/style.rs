@@ -2,11 +2,19 @@
 
 use model_offline::output::chart::style;
 
-const PAGE: &str = include_str!("page.css");
+/// Of the view of a body in space, which the live view has, too.
+const VIEW: &str = include_str!("view.css");
+/// What is for phones and paper stands last.
+const PAGE: &str = concat!(include_str!("view.css"), include_str!("page.css"));
 
 /// Of the page.
 pub(super) fn page() -> String {
     format!("{}{PAGE}", style::page())
+}
+
+/// Of a body in space that is turned, and of its colours.
+pub(super) fn view() -> String {
+    format!("{}{VIEW}", style::page())
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use firmware::{Faults, Mode};
 use model_offline::model::TissueModel;
 
 use crate::runtime::time::mode::RunMode;
+use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::tissue::TissuePlant;
 use crate::world::truth::Truth;
 
@@ -43,13 +44,11 @@ pub trait Observer<T>: std::fmt::Debug + Send {
     fn hold(&mut self);
 }
 
-/// An insertion that is about to begin.
+/// An insertion that is about to begin, into this body.
 #[derive(Clone, Debug)]
-pub struct ObservedInsertion<'m> {
-    /// Its tissue.
-    pub model: &'m TissueModel,
-    /// Index of the attached paddle.
-    pub paddle: u32,
+pub struct ObservedInsertion<B> {
+    /// What the needle goes into.
+    pub body: B,
     /// What drives time.
     pub mode: RunMode,
     /// Period of the loop, ns.
@@ -58,8 +57,23 @@ pub struct ObservedInsertion<'m> {
     pub title: String,
 }
 
+/// A planar body with one of its paddles.
+#[derive(Clone, Copy, Debug)]
+pub struct PlanarBody<'m> {
+    /// Its tissue.
+    pub model: &'m TissueModel,
+    /// Index of the attached paddle.
+    pub paddle: u32,
+}
+
 /// Looks on at one insertion after another.
 pub trait Spectator: std::fmt::Debug {
-    /// Begins to look on.
-    fn observe<'m>(&self, insertion: ObservedInsertion<'m>) -> Box<dyn Observer<TissuePlant<'m>>>;
+    /// Begins to look on in the plane.
+    fn observe<'m>(&self, insertion: ObservedInsertion<PlanarBody<'m>>) -> Box<dyn Observer<TissuePlant<'m>>>;
+
+    /// Begins to look on in space.
+    fn observe_in_space<'m>(
+        &self,
+        insertion: ObservedInsertion<&PreparedBody<'m>>,
+    ) -> Box<dyn Observer<SpaceTissue<'m>>>;
 }

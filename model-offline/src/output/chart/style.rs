@@ -95,6 +95,15 @@ pub fn band(fraction: f64) -> String {
     format!("f{}", ((fraction * BANDS as f64) as usize).min(BANDS - 1))
 }
 
+/// Colour of a field's value, as [`band`] has it: red, green and blue from 0 to 1.
+pub fn band_colour(fraction: f64) -> [f64; 3] {
+    let rule = format!(".{}{{fill:#", band(fraction));
+    let digits = CHART.split(&rule).nth(1).unwrap_or_default();
+    [0, 2, 4]
+        .map(|at| digits.get(at..at + 2).and_then(|part| u8::from_str_radix(part, 16).ok()))
+        .map(|part| f64::from(part.unwrap_or(0)) / 255.0)
+}
+
 fn variables(colour: impl Fn(&(&str, &str, &str)) -> String) -> String {
     COLOURS.iter().fold(String::new(), |mut text, entry| {
         let _ = write!(text, "--{}:{};", entry.0, colour(entry));

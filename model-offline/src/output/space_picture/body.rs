@@ -3,9 +3,10 @@
 use crate::geometry::{Point, box_of};
 use crate::model::space::surfaces::Surfaces;
 use crate::model::space::{SpaceBody, SpaceModel};
+use serde::{Deserialize, Serialize};
 
 /// A body at rest, as pictures need it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpaceGeometry {
     /// Name of the scene.
     pub name: String,
@@ -36,7 +37,7 @@ pub struct SpaceGeometry {
 }
 
 /// Where a paddle may be attached.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PaddlePatch {
     /// Its index in the scene.
     pub index: u32,
@@ -45,7 +46,7 @@ pub struct PaddlePatch {
 }
 
 /// A body with needle and paddles somewhere.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SpaceState {
     /// Needle depth, length.
     pub depth: f64,

@@ -75,6 +75,11 @@ impl Array {
     }
 }
 
+/// Three components; what is missing is 0.
+pub(super) fn in_three<const D: usize>(point: &Point<D>) -> [f64; 3] {
+    std::array::from_fn(|k| point.get(k).copied().unwrap_or(0.0))
+}
+
 impl<const D: usize> Default for Grid<D> {
     fn default() -> Self {
         Self { points: Vec::new(), found: HashMap::new(), step: 0.0, cells: Vec::new() }
@@ -127,8 +132,7 @@ impl<const D: usize> Grid<D> {
 
     /// The file. The first array of the points is their displacement.
     pub(super) fn file(&self, of_points: &[Array], of_cells: &[Array]) -> String {
-        let flat = |p: &Point<D>| std::array::from_fn::<f64, 3, _>(|k| p.get(k).copied().unwrap_or(0.0));
-        let points = Array::new("Points".to_owned(), 3, self.points.iter().flat_map(flat).collect());
+        let points = Array::new("Points".to_owned(), 3, self.points.iter().flat_map(in_three).collect());
         let (mut connectivity, mut offsets, mut shapes, mut end) = (String::new(), String::new(), String::new(), 0);
         for (shape, points) in &self.cells {
             let words: Vec<String> = points.iter().map(ToString::to_string).collect();

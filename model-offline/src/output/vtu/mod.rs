@@ -6,8 +6,8 @@ mod parts;
 mod script;
 mod space;
 
-pub use parts::parts;
-pub use script::{Shown, script};
+pub use parts::{parts, parts_in_space};
+pub use script::{Shown, Sight, script};
 pub use space::vtu_in_space;
 
 use self::grid::{Array, Grid, Shape};

@@ -1,30 +1,72 @@
 //! A script for ParaView.
 
 use super::in_unit;
-use crate::scene::Scene;
+use crate::output::space_picture::{SpaceGeometry, planes, seen_from};
 
 /// What a script shows.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Shown<'a> {
+    /// Name of the scene.
+    pub scene: &'a str,
+    /// Labels of length and stress.
+    pub units: [&'a str; 2],
     /// File of the body, or of a series of it: a name in the folder of the script.
     pub body: &'a str,
-    /// File of needle, target and paddles; none where the body's file has them too.
+    /// File of needle, target and paddles.
     pub parts: &'a str,
     /// Whether stress is in the body's file.
     pub stress: bool,
+    /// How a body in space is looked at; none in the plane.
+    pub in_space: Option<Sight>,
+}
+
+/// How a body in space is looked at: cut open by a plane, whose side towards the eye is left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// A point of the plane, which is also looked at, length.
+    pub origin: [f64; 3],
+    /// Unit normal of the plane, towards the eye.
+    pub normal: [f64; 3],
+    /// Unit directions towards the eye and upwards.
+    pub view: [[f64; 3]; 2],
+}
+
+impl Sight {
+    /// A cut along the needle through the target at rest, with these paddles (indices) on this side.
+    pub fn new(geometry: &SpaceGeometry, paddles: &[u32]) -> Self {
+        let view = seen_from(geometry, paddles);
+        let [one, other, _] = planes(geometry).map(|plane| plane.normal);
+        let normal = if one.dot(&view[0]).abs() > other.dot(&view[0]).abs() { one } else { other };
+        let normal = if normal.dot(&view[0]) < 0.0 { -normal } else { normal };
+        Self { origin: geometry.target, normal: normal.into(), view: view.map(Into::into) }
+    }
+
+    fn lines(&self) -> [String; 3] {
+        let Self { origin, normal, view: [towards, up] } = self;
+        let eye: [f64; 3] = std::array::from_fn(|k| origin[k] + towards[k]);
+        [
+            "view.InteractionMode = \"3D\"\nview.CameraParallelProjection = 1".to_owned(),
+            format!(
+                "body = Clip(Input=body, ClipType=\"Plane\")\n\
+                 body.ClipType.Origin = {origin:?}\nbody.ClipType.Normal = {normal:?}\n"
+            ),
+            format!("view.CameraFocalPoint = {origin:?}\nview.CameraPosition = {eye:?}\nview.CameraViewUp = {up:?}\n"),
+        ]
+    }
 }
 
 /// A Python script that shows the deformed body, coloured by von Mises stress (by the largest principal strain where no stress
 /// is known), with needle, target, immobile boundary and paddles: `paraview --script=FILE`, or `pvpython FILE
-/// picture.png` for a picture without a window.
-pub fn script(scene: &Scene, shown: Shown<'_>) -> String {
-    let Shown { body, parts, stress } = shown;
-    let displacement = in_unit("displacement", &scene.length_unit);
-    let (colour, component) = if stress {
-        (in_unit("von_mises_stress", &scene.stress_unit), "")
-    } else {
-        ("principal_strain".to_owned(), "X")
-    };
+/// picture.png` for a picture without a window. A body in space is cut open.
+pub fn script(shown: Shown<'_>) -> String {
+    let Shown { scene, units: [length, stress_unit], body, parts, stress, in_space } = shown;
+    let flat = ["view.InteractionMode = \"2D\"".to_owned(), String::new(), String::new()];
+    let [mode, cut, camera] = in_space.map_or(flat, |sight| sight.lines());
+    // Lines are drawn over the surface that they lie in; surfaces are not.
+    let representation = if in_space.is_some() { "\n    shown.Representation = \"Wireframe\"" } else { "" };
+    let displacement = in_unit("displacement", length);
+    let (colour, component) =
+        if stress { (in_unit("von_mises_stress", stress_unit), "") } else { ("principal_strain".to_owned(), "X") };
     // What JSON takes for a string Python does, too.
     let quoted = |text: &str| serde_json::json!(text).to_string();
     format!(
@@ -45,12 +87,13 @@ def deformed(name):
 
 
 view = GetActiveViewOrCreate("RenderView")
-view.InteractionMode = "2D"
+{mode}
 view.UseColorPaletteForBackground = 0
 view.Background = [1.0, 1.0, 1.0]
 view.OrientationAxesVisibility = 0
 
-body = Show(deformed({body}), view)
+body = deformed({body})
+{cut}body = Show(body, view)
 body.Representation = "Surface With Edges"
 body.EdgeColor = [0.75, 0.75, 0.75]
 ColorBy(body, ("CELLS", {colour}, {component}))
@@ -75,18 +118,18 @@ for part, colour, width in [
     shown.ColorArrayName = [None, ""]
     shown.AmbientColor = shown.DiffuseColor = colour
     shown.LineWidth = shown.PointSize = width
-    shown.RenderPointsAsSpheres = 1
+    shown.RenderPointsAsSpheres = 1{representation}
 
 scene = GetAnimationScene()
 scene.UpdateAnimationUsingDataTimeSteps()
 scene.GoToLast()
-ResetCamera(view)
+{camera}ResetCamera(view)
 view.CameraParallelScale *= 1.4
 Render(view)
 if len(sys.argv) > 1:
     SaveScreenshot(sys.argv[1], view, ImageResolution=[1280, 960])
 "#,
-        name = scene.name.replace(['\n', '\r'], " "),
+        name = scene.replace(['\n', '\r'], " "),
         displacement = quoted(&displacement),
         body = quoted(body),
         parts = quoted(parts),

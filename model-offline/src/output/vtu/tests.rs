@@ -126,7 +126,35 @@ fn parts_and_script_show_the_scene() {
     }
     let target: [f64; 2] = scene.target.into();
     assert!(points.chunks(3).any(|x| [x[0], x[1]] == target));
-    let shown = Shown { body: "a \"b\".vtu", parts: "p.vtu", stress: true };
-    let script = script(&scene, shown);
+    let units = [&scene.length_unit[..], &scene.stress_unit];
+    let (scene, body, parts) = (&scene.name[..], "a \"b\".vtu", "p.vtu");
+    let script = script(Shown { scene, units, body, parts, stress: true, in_space: None });
     assert!(script.contains(r#"deformed("a \"b\".vtu")"#) && script.contains(r#"displacement [\"<m>&]"#), "{script}");
+}
+
+/// A script of a body in space cuts it open along the needle through the target, and what is left out is on the side of the eye.
+#[test]
+fn a_body_in_space_is_cut_open_towards_the_eye() {
+    use crate::geometry::Point;
+    use crate::output::space_picture::SpaceGeometry;
+    use crate::placement::space::workflow::coarse;
+    use crate::scene::space::SpaceScene;
+    for (name, paddles) in [("block", vec![3, 8]), ("mound", vec![1]), ("scan", vec![5, 6])] {
+        let scene = SpaceScene::bundled(name).unwrap();
+        let sight = Sight::new(&SpaceGeometry::new(&coarse(&scene).unwrap()), &paddles);
+        let [normal, towards, up] = [sight.normal, sight.view[0], sight.view[1]].map(Point::from);
+        assert_eq!(Point::from(sight.origin), scene.target);
+        assert!((normal.norm() - 1.0).abs() < 1e-12 && normal.dot(&scene.needle.axis).abs() < 1e-9, "{name}");
+        // At least by 45° of what it could be, of two orthogonal planes.
+        let aside = towards - scene.needle.axis * scene.needle.axis.dot(&towards);
+        assert!(normal.dot(&towards) >= aside.norm() * 0.5f64.sqrt() - 1e-9, "{name}");
+        assert!(up.dot(&towards).abs() < 1e-9, "{name}");
+        let units = [&scene.length_unit[..], &scene.stress_unit];
+        let shown = Shown { scene: name, units, body: "b.vtu", parts: "p.vtu", stress: true, in_space: Some(sight) };
+        let script = script(shown);
+        for line in ["ClipType.Origin = ", "ClipType.Normal = ", "CameraPosition = ", "shown.Representation = "] {
+            assert_eq!(script.matches(line).count(), 1, "{line}");
+        }
+        assert!(!script.contains("\"2D\""));
+    }
 }

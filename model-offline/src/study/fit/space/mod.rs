@@ -3,7 +3,7 @@
 //!
 //! 1. **Body**: quadratic tetrahedra within the tolerance (or the scene's own spacing or level), every paddle and pair.
 //! 2. **Slice**: the plane through needle, target and the best single paddle of the body, or the next best that makes a
-//!    slice with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within a quarter of the tolerance.
+//!    slice with that paddle ([`slice`](crate::study::slice)), by quadratic triangles within a tenth of the tolerance.
 //! 3. **Dimension**: the slice will do where all that it says of the best paddle is within the tolerance of the body:
 //!    how far a correction from its Jacobian moves the target (λ, which should be 1; the estimates of both models come
 //!    on top), what that moves across the plane,
@@ -37,7 +37,7 @@ use serde::Serialize;
 use std::time::Instant;
 
 /// What the slice may be wrong by, of the tolerance: it costs next to nothing, and what it leaves open counts against it.
-const SLICE_SHARE: f64 = 0.25;
+const SLICE_SHARE: f64 = 0.1;
 
 /// What one of the two models is, and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
