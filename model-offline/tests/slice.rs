@@ -297,6 +297,25 @@ fn the_body_is_needed_for_block_and_one_paddle_will_do() {
     let second = fit.verdict.rejected.iter().find(|r| r.alternative == SpaceAlternative::TwoPaddles).unwrap();
     assert!((second.number.unwrap() - (1.0 - 5.7488 / 5.7859)).abs() < 0.005, "{second:?}");
     assert!(fit.svg().contains("slice, plane strain"));
+    // What is written is the tissue that was fitted.
+    assert!(text.contains("[[inclusion]]") && scene(&fit.written(&body, &text).unwrap()).inclusions.is_empty());
+}
+
+/// A stiff lump beside the plane pushes the target across it, which no slice can know: most of the way orthogonal to the
+/// needle, and next to nothing of the way along it.
+#[test]
+fn a_lump_beside_the_plane_needs_the_body() {
+    let lump = "[[inclusion]]\nbox = { min = [0.3, 2.3, 0.35], max = [0.6, 2.9, 0.75] }\nstiffness = 100.0\n[target]";
+    let fit = fitted(&PRISM.replace("[target]", lump), 0.1);
+    assert_eq!(fit.verdict.dimension, 3, "{:?}", fit.verdict);
+    let way = fit.slice.as_ref().unwrap().without_help;
+    assert!(
+        way.body_across_plane.abs() > 0.1 * way.body_in_plane.abs()
+            && way.body_across_plane.abs() < 0.05 * way.body_axial.abs()
+    );
+    let reasons = fit.verdict.rejected.iter().filter(|r| r.alternative == SpaceAlternative::PlaneStrain);
+    let numbers: Vec<f64> = reasons.filter_map(|r| r.number).collect();
+    assert!(numbers.iter().any(|number| *number > 0.3), "{numbers:?}");
 }
 
 /// A paddle at its limit leaves 1 − limit/stroke of the target's displacement: more than the tolerance, and two are needed.

@@ -1,5 +1,5 @@
 //! Scenes of many kinds, none of which the methods were tuned on: slabs, notches, slots, inner needles, thin parts,
-//! inclusions on the edge, inner corners, other units, origins far away. The default rule reaches 1 % on all of them, and its
+//! inclusions on the edge, inner corners, other units, origins far away, paddles that hardly control the target. The default rule reaches 1 % on all of them, and its
 //! estimated errors hold against quadratic triangles refined until they leave next to nothing open.
 
 use model_offline::model::ModelError;
@@ -82,4 +82,12 @@ scenes! {
     an_ell_bent_round_its_corner: "ell-bent",
     an_ell_whose_short_arm_is_held: "ell-short-arm",
     a_tall_ell_with_an_inclusion_deep_inside: "ell-tall",
+    a_disc_whose_paddles_hardly_control_the_target: "disc",
+}
+
+/// Where a Jacobian is all but singular, two meshes agree on ‖J⁻¹n‖ by accident.
+#[test]
+fn quadratic_triangles_on_that_disc() {
+    let text = include_str!("../scenes/disc.toml");
+    check(&text.replace("[discretization]", "[discretization]\nintegration = \"fem-t6\""));
 }

@@ -323,6 +323,25 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_amplification_is_the_most_that_an_error_of_the_jacobian_can_do() {
+        let normal = Vector2::new(0.6, -0.8);
+        for jacobian in [Matrix2::new(0.3, 0.1, -0.05, 0.2), Matrix2::new(0.3, 0.1, 0.29, 0.1)] {
+            let of = |jacobian: Matrix2<f64>| RestResponse::new(jacobian, Vector2::zeros(), normal);
+            let found = of(jacobian);
+            let change = |angles: (f64, f64)| {
+                let [u, v] = [angles.0, angles.1].map(|a: f64| Vector2::new(a.cos(), a.sin()));
+                let step = 1e-8;
+                let moved = of(jacobian + u * v.transpose() * step).controllability_measure;
+                (moved / found.controllability_measure - 1.0).abs() / step
+            };
+            let angles = |i: i32| f64::from(i) * std::f64::consts::PI / 180.0;
+            let all = (0..180).flat_map(|i| (0..180).map(move |j| (angles(i), angles(j))));
+            let most = all.map(change).fold(0.0, f64::max);
+            assert!((most / amplification(&found) - 1.0).abs() < 1e-2, "{most} {}", amplification(&found));
+        }
+    }
+
+    #[test]
     fn the_triangles_parts_sum_to_the_difference_of_the_answers() {
         // Galerkin orthogonality: J(u_f) − J(u_h) = a(u_f − u_h, z_f − z_h), on a scene with an inclusion.
         let mut scene = Scene::bundled("paper-hull").unwrap();

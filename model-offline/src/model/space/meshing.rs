@@ -221,3 +221,63 @@ fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<T
         other => ModelError::Mesh(other),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::AnyScene;
+
+    /// A block with a square contact and paddles that are ten times as long as wide, square, and a band round a bore.
+    const STRIPS: &str = r#"
+[scene]
+name = "strips"
+dimension = 3
+[domain]
+solid = { difference = [{ box = { min = [0.0, 0.0, 0.0], max = [100.0, 100.0, 60.0] } },
+                        { cylinder = { from = [75.0, -1.0, 30.0], to = [75.0, 101.0, 30.0], radius = 10.0 } }] }
+[material]
+model = "neo-hookean"
+lambda = 4.0
+mu = 1.0
+[immobile]
+regions = [{ box = { min = [0.0, 0.0, 0.0], max = [100.0, 100.0, 0.0] } }]
+[needle]
+region = { box = { min = [45.0, 45.0, 60.0], max = [55.0, 55.0, 60.0] } }
+axis = [0.0, 0.0, -1.0]
+depth = 2.0
+[target]
+position = [50.0, 50.0, 30.0]
+[[paddle]]
+index = 1
+region = { box = { min = [0.0, 10.0, 28.0], max = [0.0, 90.0, 36.0] } }
+[[paddle]]
+index = 2
+region = { box = { min = [40.0, 0.0, 20.0], max = [60.0, 0.0, 40.0] } }
+[[paddle]]
+index = 3
+region = { box = { min = [60.0, 48.0, 10.0], max = [90.0, 52.0, 50.0] } }
+"#;
+
+    #[test]
+    fn strips_are_meshed_by_their_width_and_every_level_refines_every_patch() {
+        let Ok(AnyScene::Space(scene)) = AnyScene::parse(STRIPS, "strips.toml") else { panic!("no scene in space") };
+        let triangles = |mesh: &TetMesh| -> Vec<usize> {
+            let surface = Surface::new(mesh, scene.size());
+            patches(&scene).map(|region| surface.patch(&[region]).len()).collect()
+        };
+        let levels: Vec<TetMesh> = (0..3).map(|level| mesh(&scene, &MeshSize::level(level)).unwrap()).collect();
+        // Needle, paddles, immobile part: 80 by 8, 20 by 20, and 4 along a bore of 62.8 round.
+        let surface = Surface::new(&levels[1], scene.size());
+        let widths: Vec<f64> = patches(&scene).map(|region| surface.narrow_width(&surface.patch(&[region]))).collect();
+        let expected = [f64::INFINITY, 16.0, f64::INFINITY, 8.0, f64::INFINITY];
+        for (width, expected) in widths.iter().zip(expected) {
+            assert!(*width == expected || (width / expected - 1.0).abs() < 0.05, "{widths:?}");
+        }
+        let counts: Vec<Vec<usize>> = levels.iter().map(triangles).collect();
+        for pair in counts.windows(2) {
+            // Needle and paddles: their rims are where the answers are made.
+            let grown = pair[0][..4].iter().zip(&pair[1]).map(|(before, now)| *now as f64 / *before as f64);
+            assert!(grown.clone().all(|ratio| ratio > 1.5), "{counts:?}");
+        }
+    }
+}
