@@ -115,9 +115,10 @@ fn bores_voids_slots_and_rods_are_in_the_mesh_however_coarse_it_is() {
     let sphere = |radius: f64| format!("{{ sphere = {{ centre = [0.3, 0.3, 0.75], radius = {radius} }} }}");
     let slot = "{ box = { min = [0.7123, -0.1, 0.6217], max = [0.7523, 0.313, 0.873] } }";
     let disc = |radius: f64| std::f64::consts::PI * radius.powi(2);
-    // What is taken away or added, and how much of it at least a coarse mesh is to have.
+    // What is taken away or added, and how much of it at least a coarse mesh is to have: an octagon inscribed in a
+    // circle has 90 % of it.
     for (body, exact, share) in [
-        (with("difference", &bore(0.1)), -disc(0.1), 0.95),
+        (with("difference", &bore(0.1)), -disc(0.1), 0.9),
         (with("difference", &bore(0.03)), -disc(0.03), 0.8),
         (with("difference", &bore(0.01)), -disc(0.01), 0.6),
         // Its ends are outside of the body, and it slants.

@@ -28,9 +28,11 @@ const SHIFT: f64 = 0.7;
 const OPEN: f64 = 1.0;
 /// What direction may add to the error of a length whose own difference vanishes by accident.
 const SIDEWAYS: f64 = 0.25;
-/// What an error of the Jacobian may do to a length besides, of the most that it can: where a Jacobian is all but
-/// singular, differences of the length cancel by accident.
-const CANCELLED: f64 = 0.1;
+/// The share of an amplified error of the Jacobian that reaches a length, before a pair of meshes has shown one.
+const UNKNOWN_SHARE: f64 = 0.1;
+/// How much of the share counts one pair of meshes later: where a Jacobian is all but singular, the differences of one
+/// pair cancel by accident.
+const REMEMBERED: f64 = 0.5;
 /// Share of the sum of the triangles' parts that the triangles cut next make up.
 const CUT: f64 = 0.6;
 /// More nodes than this are not tried on the fine mesh.
@@ -51,6 +53,8 @@ pub(super) struct Certified {
     pub open: Vec<f64>,
     /// What it leaves open of the small-depth displacements, over the largest.
     pub open_displacement: f64,
+    /// The share of an amplified error of the Jacobian that reaches the length, paddle by paddle.
+    shares: Vec<f64>,
     /// Nodes of the fine model.
     pub nodes: usize,
     /// Fields of the coarse model, paddle by paddle.
@@ -103,7 +107,7 @@ impl Refinement {
     ) -> Result<(&Certified, bool), ModelError> {
         let mut last = match self.last.take() {
             Some(last) => last,
-            None => certified(&self.scene, &self.mesh)?,
+            None => certified(&self.scene, &self.mesh, None)?,
         };
         let mut is_enough = enough(&last.0);
         while !is_enough {
@@ -112,7 +116,7 @@ impl Refinement {
             if 8 * next.triangles.len() > MAX_NODES {
                 break;
             }
-            last = certified(&self.scene, &next)?;
+            last = certified(&self.scene, &next, Some(&last.0))?;
             self.mesh = next;
             is_enough = enough(&last.0);
         }
@@ -120,10 +124,14 @@ impl Refinement {
     }
 }
 
-/// A mesh certified by the one in which each of its triangles is cut into four.
-fn certified(scene: &Scene, mesh: &Triangulation) -> Result<(Certified, Vec<f64>), ModelError> {
+/// A mesh certified by the one in which each of its triangles is cut into four, and by what coarser ones have shown.
+fn certified(
+    scene: &Scene,
+    mesh: &Triangulation,
+    before: Option<&Certified>,
+) -> Result<(Certified, Vec<f64>), ModelError> {
     let (fine, parents) = mesh.refined();
-    Pair { coarse: model_on(scene, mesh)?, fine: model_on(scene, &fine)?, parents }.certify()
+    Pair { coarse: model_on(scene, mesh)?, fine: model_on(scene, &fine)?, parents }.certify(before)
 }
 
 fn model_on(scene: &Scene, mesh: &Triangulation) -> Result<TissueModel, ModelError> {
@@ -161,7 +169,7 @@ struct Pair {
 
 impl Pair {
     /// Answers of both, and every coarse triangle's part of their differences (the largest over all answers).
-    fn certify(self) -> Result<(Certified, Vec<f64>), ModelError> {
+    fn certify(self, earlier: Option<&Certified>) -> Result<(Certified, Vec<f64>), ModelError> {
         let mut coarse: Vec<Fields> = Vec::new();
         for_each_paddle(&self.coarse, Loads::OnTarget, |_, fields| {
             coarse.push(fields.clone());
@@ -172,6 +180,7 @@ impl Pair {
         let stiffness = self.stiffness();
         let mut parts = vec![0.0_f64; self.coarse.cells().len()];
         let (mut limit, mut open, mut open_displacement) = (Vec::new(), Vec::new(), 0.0_f64);
+        let mut shares = Vec::new();
         for_each_paddle(&self.fine, Loads::OnTarget, |paddle, fields| {
             let found = response_of(&self.fine, fields);
             let errors = self.errors(&coarse[paddle], fields);
@@ -180,13 +189,17 @@ impl Pair {
             }
             let before = &responses[paddle];
             limit.push(shifted(before, &found, self.fine.scene().needle.orthogonal()));
-            open.push(left_open(before, &found));
+            let left = left_open(before, &found, earlier.map(|earlier| earlier.shares[paddle]));
+            open.push(left.open);
+            shares.push(left.share);
             let moved = (found.target_per_depth - before.target_per_depth).norm();
             open_displacement = open_displacement.max(OPEN * moved / largest);
             Ok(())
         })?;
         let nodes = self.fine.nodes();
-        Ok((Certified { model: self.coarse, responses, limit, open, open_displacement, nodes, fields: coarse }, parts))
+        let certified =
+            Certified { model: self.coarse, responses, limit, open, open_displacement, shares, nodes, fields: coarse };
+        Ok((certified, parts))
     }
 
     /// Stiffness of the fine triangles at rest, between flat displacement gradients.
@@ -266,17 +279,27 @@ fn shifted(coarse: &RestResponse, fine: &RestResponse, normal: Vector2<f64>) -> 
     RestResponse::new(jacobian, per_depth, normal)
 }
 
-/// What the limit leaves open of the controllability measure, relative.
-fn left_open(coarse: &RestResponse, fine: &RestResponse) -> f64 {
+/// What a pair of meshes says of one controllability measure.
+struct Left {
+    /// What the limit leaves open, relative.
+    open: f64,
+    /// How much of the most that the Jacobian's difference can do to the length is to be expected.
+    share: f64,
+}
+
+/// What a limit leaves open, where `shown` is the share that the pairs before this one have shown.
+fn left_open(coarse: &RestResponse, fine: &RestResponse, shown: Option<f64>) -> Left {
     match (coarse.best_direction, fine.best_direction) {
         (Some(before), Some(after)) => {
-            let differences =
-                (OPEN * (after.norm() - before.norm()).abs()).max(SIDEWAYS * (after - before).norm()) / after.norm();
+            let difference = (after.norm() - before.norm()).abs() / after.norm();
+            let sideways = (after - before).norm() / after.norm();
             let amplified = amplification(fine) * (fine.jacobian - coarse.jacobian).norm();
-            differences.max(CANCELLED * amplified)
+            let own = if amplified > 0.0 { (difference / amplified).min(1.0) } else { 0.0 };
+            let share = own.max(shown.map_or(UNKNOWN_SHARE, |shown| REMEMBERED * shown));
+            Left { open: (OPEN * difference).max(SIDEWAYS * sideways).max(share * amplified), share }
         }
-        (None, None) => 0.0,
-        _ => f64::INFINITY,
+        (None, None) => Left { open: 0.0, share: 0.0 },
+        _ => Left { open: f64::INFINITY, share: 0.0 },
     }
 }
 
@@ -339,6 +362,27 @@ mod tests {
             let most = all.map(change).fold(0.0, f64::max);
             assert!((most / amplification(&found) - 1.0).abs() < 1e-2, "{most} {}", amplification(&found));
         }
+    }
+
+    /// The lengths agree and the Jacobians do not: by accident, as the pair before shows.
+    #[test]
+    fn what_cancels_on_one_pair_is_not_forgotten() {
+        let of = |jacobian: Matrix2<f64>| RestResponse::new(jacobian, Vector2::zeros(), Vector2::new(0.6, -0.8));
+        let fine = Matrix2::new(0.3, 0.1, 0.29, 0.1);
+        // J⁻¹n does not change with what is added to its normal.
+        let b = of(fine).best_direction.unwrap();
+        let harmless = Vector2::new(1.0, 0.0) * Vector2::new(-b.y, b.x).transpose() * (1e-4 / b.norm());
+        let left = |shown: Option<f64>| left_open(&of(fine + harmless), &of(fine), shown);
+        let most = amplification(&of(fine)) * harmless.norm();
+        for (shown, share) in [(None, UNKNOWN_SHARE), (Some(0.4), 0.2), (Some(0.2), 0.1), (Some(0.0), 0.0)] {
+            let left = left(shown);
+            assert!((left.share - share).abs() < 1e-9 && (left.open - share * most).abs() < 1e-9, "{shown:?}");
+        }
+        // What this pair shows counts whole.
+        let harmful = Matrix2::new(1e-4, 0.0, 0.0, 0.0);
+        let shown = left_open(&of(fine + harmful), &of(fine), Some(0.0));
+        let change = of(fine + harmful).controllability_measure / of(fine).controllability_measure - 1.0;
+        assert!((shown.open - change.abs()).abs() < 1e-9 && shown.share > 0.1, "{} {}", shown.open, shown.share);
     }
 
     #[test]
