@@ -116,7 +116,7 @@ fn bores_voids_slots_and_rods_are_in_the_mesh_however_coarse_it_is() {
     let slot = "{ box = { min = [0.7123, -0.1, 0.6217], max = [0.7523, 0.313, 0.873] } }";
     let disc = |radius: f64| std::f64::consts::PI * radius.powi(2);
     // What is taken away or added, and how much of it at least a coarse mesh is to have: an octagon inscribed in a
-    // circle has 90 % of it.
+    // circle has 90 % of it, a hexagon 83.
     for (body, exact, share) in [
         (with("difference", &bore(0.1)), -disc(0.1), 0.9),
         (with("difference", &bore(0.03)), -disc(0.03), 0.8),
@@ -130,7 +130,7 @@ fn bores_voids_slots_and_rods_are_in_the_mesh_however_coarse_it_is() {
         (with("difference", &sphere(0.08)), -disc(0.08) * 4.0 / 3.0 * 0.08, 0.85),
         (with("difference", &sphere(0.01)), -disc(0.01) * 4.0 / 3.0 * 0.01, 0.5),
         (with("difference", slot), -0.04 * 0.313 * (0.873 - 0.6217), 1.0 - 1e-9),
-        (with("union", &cylinder("[0.8, 0.2, 0.9]", "[0.8, 0.2, 1.3]", 0.03)), disc(0.03) * 0.3, 0.85),
+        (with("union", &cylinder("[0.8, 0.2, 0.9]", "[0.8, 0.2, 1.3]", 0.03)), disc(0.03) * 0.3, 0.82),
     ] {
         let (volume, off) = meshed(&body);
         let found = (volume - 1.0) / exact;

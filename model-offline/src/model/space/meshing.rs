@@ -225,7 +225,7 @@ fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<T
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::AnyScene;
+    use crate::scene::space::AnyScene;
 
     /// A block with a square contact and paddles that are ten times as long as wide, square, and a band round a bore.
     const STRIPS: &str = r#"

@@ -68,7 +68,7 @@ pub enum ReasonInSpace {
     },
     /// The best paddle's corrections may come out otherwise, for what the two models know.
     #[error(
-        "|1 − λ| of paddle {paddle} is below the tolerance, but not with {:.3} % that the estimates of the two models leave open",
+        "|1 − λ| of paddle {paddle} is below the tolerance, but not with {:.3} % that the estimates of the two models leave open: a smaller tolerance refines both",
         100.0 * open
     )]
     Unsure {
