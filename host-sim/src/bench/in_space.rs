@@ -52,7 +52,7 @@ const CHECKS: usize = 20;
 /// A run on a body in space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpaceRun {
-    /// [`FORMAT`](super::result::FORMAT).
+    /// [`FORMAT`].
     pub format: u32,
     /// Version of host-sim.
     pub version: String,
