@@ -2,10 +2,12 @@
 
 mod emulator;
 mod missing;
+mod scenes;
 
 use firmware::contract::frames::to_plane;
 use std::io::{ErrorKind, Read, Write};
 use std::os::unix::net::UnixStream;
+use std::path::Path;
 use std::time::Duration;
 
 use firmware::contract::{PaddleCommand, Table, Validity};
@@ -249,6 +251,52 @@ fn a_whole_insertion_on_the_cortex_m7_is_bit_identical() {
             std::fs::read(recording).unwrap()
         });
         assert!(recordings[0] == recordings[1], "{scalar}: the recordings differ");
+    }
+}
+
+/// `run` of `scan` with these pairs on homogeneous tissue in half a second, with the controller on a board.
+fn run_in_space(folder: &Path, pairs: &str, options: &[&str]) -> std::process::Output {
+    let scene = scenes::with_pairs(folder, pairs);
+    std::process::Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
+        .args(["run", "--quiet", "--tissue", "homogeneous", "--insertion-time", "0.5"])
+        .args(options)
+        .arg("--scene")
+        .arg(scene)
+        .arg("--out")
+        .arg(folder.join("report"))
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn two_paddles_in_space_are_held_bit_identically_by_the_cortex_m7() {
+    if image(ScalarKind::F64).is_none() {
+        return;
+    }
+    let [native, qemu] = ["native", "qemu"].map(|hardware| {
+        let folder = tempfile::tempdir().unwrap();
+        let options = ["--mode", "lockstep", "--controller", hardware];
+        let output = run_in_space(folder.path(), "[[5, 6]]", &options);
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let recording = folder.path().join("report/homogeneous-dynamic.rec");
+        host_sim(&["replay", recording.to_str().unwrap()]);
+        std::fs::read(recording).unwrap()
+    });
+    assert!(native == qemu, "the recordings differ");
+}
+
+#[test]
+fn what_no_image_controls_is_refused_before_anything_is_written() {
+    for (pairs, options, said) in [
+        ("[[5, 6]]", &["--mode", "free-run"][..], "add --mode lockstep"),
+        ("[]", &["--mode", "lockstep"], "no image controls 1 paddle(s) in 3 dimensions in f64"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let output = run_in_space(folder.path(), pairs, &[&["--controller", "qemu"], options].concat());
+        let error = String::from_utf8_lossy(&output.stderr).replace(['\n', '│'], " ");
+        let error = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(output.status.code() == Some(2) && error.contains(said), "{error}");
+        assert!(!folder.path().join("report").exists());
     }
 }
 

@@ -116,3 +116,104 @@ fn what_is_no_result_or_not_in_it_is_refused() {
     // A scene at rest has no fields.
     assert!(refused(Path::new("paper"), &["--field", "strain"]).contains("a scene at rest has none"));
 }
+
+/// Areas of the paths of a class in the order of the drawing, px².
+fn areas(svg: &str, class: &str) -> Vec<f64> {
+    let document = roxmltree::Document::parse(svg).unwrap();
+    let paths = document.descendants().filter(|node| node.attribute("class") == Some(class) && node.has_attribute("d"));
+    let area = |path: roxmltree::Node<'_, '_>| -> f64 {
+        let one = |text: &str| -> f64 {
+            let points: Vec<(f64, f64)> = text
+                .trim_end_matches('Z')
+                .split_whitespace()
+                .map(|point| point.split_once(',').unwrap())
+                .map(|(x, y)| (x.parse().unwrap(), y.parse().unwrap()))
+                .collect();
+            let pairs = points.iter().zip(points.iter().cycle().skip(1));
+            (0.5 * pairs.map(|(a, b)| a.0 * b.1 - a.1 * b.0).sum::<f64>()).abs()
+        };
+        path.attribute("d").unwrap().split('M').skip(1).map(one).sum()
+    };
+    paths.map(area).collect()
+}
+
+fn texts(svg: &str) -> Vec<String> {
+    let document = roxmltree::Document::parse(svg).unwrap();
+    let all = document.descendants().filter(|node| node.has_tag_name("text"));
+    all.filter_map(|node| node.text()).map(|text| text.replace('\u{a0}', " ")).collect()
+}
+
+#[test]
+fn a_scene_in_space_is_drawn_before_it_is_solved() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("scene.svg");
+    let draw = |scene: &Path, options: &[&str]| {
+        model_offline().arg("draw").arg(scene).arg("-o").arg(&out).args(options).assert().success();
+        std::fs::read_to_string(&out).unwrap()
+    };
+    let svg = draw(Path::new("block"), &[]);
+    let texts_of_block = texts(&svg);
+    for expected in
+        ["Scene block", "y = 0.5, along the needle", "x = 0.5, along the needle", "z = 0.5, across the needle"]
+    {
+        assert!(texts_of_block.iter().any(|text| text == expected), "{expected}: {texts_of_block:?}");
+    }
+    let paddles = texts_of_block.iter().flat_map(|text| text.split(", ")).filter_map(|text| text.parse::<u32>().ok());
+    let mut paddles: Vec<u32> = paddles.filter(|index| *index > 0).collect();
+    paddles.sort_unstable();
+    paddles.dedup();
+    assert_eq!(paddles, [1, 2, 3, 4, 5, 6, 7, 8]);
+    // A cube of side 1 whose inclusion is a cube of side 0.1: the plane y = 0.5 goes through both, the two others do not.
+    let (bodies, inclusions) = (areas(&svg, "body"), areas(&svg, "inclusion"));
+    assert!(bodies.len() == 3 && inclusions.len() == 1, "{bodies:?} {inclusions:?}");
+    assert!((inclusions[0] / bodies[0] - 0.01).abs() < 1e-4, "{inclusions:?} {bodies:?}");
+    let homogeneous = draw(Path::new("block"), &["--without-inclusion"]);
+    assert!(areas(&homogeneous, "inclusion").is_empty() && !texts(&homogeneous).contains(&"inclusion".to_owned()));
+
+    // A ball of 40 mm: its three sections through the target, which is beside its centre.
+    let ball = folder.path().join("ball.toml");
+    std::fs::write(
+        &ball,
+        r#"
+[scene]
+name = "ball"
+dimension = 3
+units = { length = "mm", stress = "kPa" }
+[domain]
+solid = { sphere = { centre = [105.0, 0.0, -3.0], radius = 20.0 } }
+[material]
+model = "neo-hookean"
+lambda = 30.0
+mu = 6.0
+[immobile]
+regions = [{ box = { min = [80.0, -20.0, -24.0], max = [130.0, 20.0, -15.0] } }]
+[needle]
+region = { sphere = { centre = [105.0, 0.0, 17.0], radius = 4.0 } }
+axis = [0.0, 0.0, -1.0]
+depth = 3.0
+[target]
+position = [109.0, 3.0, -5.0]
+[[paddle]]
+index = 12
+region = { sphere = { centre = [85.0, 0.0, -3.0], radius = 6.0 } }
+[discretization]
+tolerance = 0.1
+"#,
+    )
+    .unwrap();
+    let svg = draw(&ball, &[]);
+    let bodies = areas(&svg, "body");
+    let disc = |offset: f64| 20.0_f64.powi(2) - offset * offset;
+    // Through the target: y = 3, x = 109, z = −5. All three sections have one width on paper but not one scale: areas over
+    // squared widths are those of discs, seen with the needle in two of them.
+    assert_eq!(bodies.len(), 3);
+    let expected = [disc(3.0), disc(4.0), disc(2.0)];
+    let [first, second] = [0, 1].map(|k| bodies[k] / expected[k]);
+    assert!((first / second - 1.0).abs() < 0.03, "{bodies:?}");
+    assert!(texts(&svg).iter().any(|text| text == "12") && texts(&svg).iter().any(|text| text == "needle's way, 3 mm"));
+
+    // Its own file is not written over; --field is for results.
+    model_offline().arg("draw").arg(&ball).arg("-o").arg(&ball).assert().code(2);
+    let words = refused(&ball, &["--field", "strain"]);
+    assert!(words.contains("a scene at rest has none"), "{words}");
+}

@@ -5,9 +5,12 @@ use model_offline::discretization::{Integration, Method};
 use model_offline::model::ModelFailure;
 use model_offline::model::TissueModel;
 use model_offline::scene::Scene;
+use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
 use model_offline::study::stability::plan::{Experiment, base};
 use model_offline::study::stability::probe::{ExperimentResult, StopReason, run};
+use model_offline::study::stability::probe_space::run_in_space;
+use model_offline::study::stability::setting::Setting;
 use model_offline::study::stability::zero_energy;
 use nalgebra::Vector2;
 use std::path::Path;
@@ -20,7 +23,8 @@ fn paper() -> Scene {
 fn plain(integration: Integration, spacing: f64, paddle: u32) -> ExperimentResult {
     let scene = paper();
     let place = scene.paddles.iter().position(|p| p.index == paddle).unwrap();
-    let experiment = Experiment { line_search: false, cutback: false, ..base(&scene, integration, spacing) };
+    let experiment =
+        Experiment { line_search: false, cutback: false, ..base(&Setting::from(&scene), integration, spacing) };
     run(&scene, place, &experiment)
 }
 
@@ -56,7 +60,7 @@ fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
     for (spacing, nodes, depths) in [(0.1, 386, [0.11, 0.12]), (0.05, 1471, [0.07, 0.08])] {
         for (place, depth) in [1, 3].into_iter().zip(depths) {
             let reached = (0..8).map(|seed| {
-                let regular = base(&scene, Integration::FemT6, spacing);
+                let regular = base(&Setting::from(&scene), Integration::FemT6, spacing);
                 let experiment = Experiment { line_search: false, cutback: false, jitter: 0.01, seed, ..regular };
                 let outcome = run(&scene, place, &experiment);
                 assert_eq!(outcome.nodes, nodes);
@@ -71,7 +75,7 @@ fn quadratic_triangles_agree_up_to_the_choice_of_diagonals() {
 #[test]
 fn every_way_to_fail_has_its_type_and_names_its_place() {
     let scene = paper();
-    let regular = base(&scene, Integration::Scni, 0.1);
+    let regular = base(&Setting::from(&scene), Integration::Scni, 0.1);
     let small = run(&scene, 2, &Experiment { method: Method { support: 0.8, ..regular.method }, ..regular });
     assert_eq!((small.reason, small.depth), (StopReason::Model(ModelFailure::SingularMomentMatrix), 0.0));
     assert!(small.detail.contains("node"), "{}", small.detail);
@@ -97,7 +101,7 @@ fn every_way_to_fail_has_its_type_and_names_its_place() {
 #[test]
 fn a_last_state_shows_how_far_the_law_was_taken() {
     let scene = paper();
-    let outcome = run(&scene, 2, &base(&scene, Integration::Scni, 0.1));
+    let outcome = run(&scene, 2, &base(&Setting::from(&scene), Integration::Scni, 0.1));
     // Driven to where it fails: well past the stretch of 0.5768 at which the law's nominal stress peaks.
     assert!(outcome.min_stretch < 0.5768 && outcome.ellipticity < 0.0, "{outcome:?}");
     assert!(outcome.energy > 0.0);
@@ -215,4 +219,105 @@ fn small_steps_stop_where_a_column_buckles() {
         let (careless, _) = reached(NewtonSettings { require_stability: false, ..settings });
         assert!(careless > 1.2 * euler, "{careless}, Euler {euler}");
     }
+}
+
+/// The column in space, square: it buckles to any side. The paddle is at its foot, where it holds nothing that the foot does not.
+const COLUMN_IN_SPACE: &str = r#"
+[scene]
+name = "column"
+dimension = 3
+units = { length = "mm", stress = "kPa" }
+[domain]
+box = { min = [100.0, 0.0, 0.0], max = [105.0, 5.0, 50.0] }
+[material]
+model = "neo-hookean"
+lambda = 0.0
+mu = 5.0
+[immobile]
+regions = [{ box = { min = [100.0, 0.0, 0.0], max = [105.0, 5.0, 0.0] } }]
+[needle]
+region = { box = { min = [100.0, 0.0, 50.0], max = [105.0, 5.0, 50.0] } }
+axis = [0.0, 0.0, -1.0]
+depth = 1.0
+increments = 10
+[target]
+position = [102.5, 2.5, 25.0]
+[[paddle]]
+index = 7
+region = { box = { min = [100.0, 0.0, 0.0], max = [100.0, 5.0, 1.25] } }
+[discretization]
+spacing = 2.5
+"#;
+
+fn in_space(text: &str) -> SpaceScene {
+    match AnyScene::parse(text, "scene").unwrap() {
+        AnyScene::Space(scene) => *scene,
+        AnyScene::Planar(_) => panic!("a scene in the plane"),
+    }
+}
+
+#[test]
+fn a_column_in_space_buckles_where_euler_says() {
+    let scene = in_space(COLUMN_IN_SPACE);
+    let setting = Setting::in_space(&scene, None);
+    let found = run_in_space(&scene, 0, &base(&setting, Integration::FemT10, 2.5));
+    let euler = 4.0 * std::f64::consts::PI.powi(2) / 12.0 * 0.1_f64.powi(2);
+    assert!((found.depth / 50.0 / euler - 1.0).abs() < 0.04, "{found:?}, Euler {euler}");
+    let reason = ModelFailure::Solve(FailureReason::LostStability);
+    assert_eq!(found.reason, StopReason::Model(reason), "{found:?}");
+    // Compressed evenly but for the ends: the law itself is far from any limit.
+    assert!((0.94..1.0 - 0.8 * euler).contains(&found.min_stretch) && found.ellipticity > 0.9, "{found:?}");
+    // Strain energy of a bar: ½ E A L ε², E = 2μ.
+    let bar = 0.5 * 10.0 * 25.0 * 50.0 * (found.depth / 50.0).powi(2);
+    assert!((found.energy / bar - 1.0).abs() < 0.1, "{} {bar}", found.energy);
+    // Not so slender, it does not.
+    let stout =
+        in_space(&COLUMN_IN_SPACE.replace("50.0]", "12.5]").replace("25.0]", "6.25]").replace("50.0,", "12.5,"));
+    let setting = Setting::in_space(&stout, None);
+    let found = run_in_space(&stout, 0, &base(&setting, Integration::FemT10, 2.5));
+    assert_eq!((found.reason, found.depth), (StopReason::Reached, 2.0), "{found:?}");
+}
+
+#[test]
+fn what_cannot_be_made_in_space_is_a_row_of_its_own() {
+    let scene = in_space(COLUMN_IN_SPACE);
+    let own = base(&Setting::in_space(&scene, None), Integration::ScniStabilised, 2.5);
+    let unstable = run_in_space(&scene, 0, &Experiment { poisson: Some(0.7), ..own });
+    assert_eq!((unstable.reason, unstable.depth), (StopReason::UnstableLaw, 0.0), "{unstable:?}");
+    let fine = run_in_space(&scene, 0, &Experiment { spacing: 0.1, ..own });
+    assert!(matches!(fine.reason, StopReason::Model(_)) && !fine.detail.is_empty(), "{fine:?}");
+}
+
+#[test]
+fn the_study_of_a_body_in_space_is_written_like_that_of_the_plane() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scene, out) = (folder.path().join("stout.toml"), folder.path().join("out"));
+    // A block with an inclusion, in millimetres.
+    let text = COLUMN_IN_SPACE.replace("50.0]", "12.5]").replace("25.0]", "6.25]").replace("50.0,", "12.5,");
+    let inclusion = "[[inclusion]]\nsphere = { centre = [103.0, 2.0, 8.0], radius = 1.5 }\nstiffness = 10.0\n";
+    std::fs::write(&scene, text.replace("[immobile]", &format!("{inclusion}[immobile]"))).unwrap();
+    let study = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_model-offline"));
+        command.arg("stability").arg(&scene).args(["--quick", "--spacing", "5", "--out"]).arg(&out).args(arguments);
+        command.assert()
+    };
+    for (arguments, said) in
+        [(&["--paddle", "9"][..], "9"), (&["--essential", "nitsche"], "planar"), (&["--support", "0.1"], "support")]
+    {
+        let refused = study(arguments).code(2);
+        let error = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(error.contains(said) && !out.exists(), "{error}");
+    }
+    let output = study(&[]).success().get_output().stdout.clone();
+    let csv = std::fs::read_to_string(out.join("stability.csv")).unwrap();
+    for rule in ["rkpm,dni", "rkpm,scni", "rkpm,scni-stabilised", "rkpm,mscni", "fem,fem-t4", "fem,fem-t10"] {
+        for parameter in ["spacing", "contrast", "poisson", "increments", "solver", "barrier_over_mu"] {
+            assert!(csv.contains(&format!("{rule},{parameter},")), "{rule} {parameter}");
+        }
+    }
+    assert!(!csv.contains("jitter") && !out.join("zero_energy.csv").exists());
+    let summary = String::from_utf8(output).unwrap();
+    assert!(summary.contains("paddle 7 static") && summary.contains("median ratio"), "{summary}");
+    let svg = std::fs::read_to_string(out.join("stability.svg")).unwrap();
+    assert!(svg.contains("linear tetrahedra") && svg.contains("Stiffness contrast") && !svg.contains("ghost"));
 }

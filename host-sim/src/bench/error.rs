@@ -227,6 +227,7 @@ fn is_input_of_a_run(error: &RuntimeError) -> bool {
             | RuntimeError::OtherScene
             | RuntimeError::OtherUnits { .. }
             | RuntimeError::OtherPaddles { .. }
+            | RuntimeError::Board(BoardError::NoImage { .. })
             | RuntimeError::OtherSpace { .. }
             | RuntimeError::Link(LinkError::Name { .. })
             | RuntimeError::World(WorldError::NoPaddle { .. } | WorldError::TooSlow { .. })

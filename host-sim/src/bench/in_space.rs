@@ -31,7 +31,7 @@ use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
 use crate::record::recording::{Record, Recording};
 use crate::runtime::accounting::ledger::LedgerResult;
-use crate::runtime::executor::{AnyTable, Hardware};
+use crate::runtime::executor::{AnyTable, Hardware, image_for};
 use crate::runtime::names;
 use crate::runtime::plant::PlantLoop;
 use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
@@ -234,6 +234,8 @@ pub struct SpaceOptions<'a> {
     pub table_tissue: Option<TissueVariant>,
     /// What drives time; none: lockstep, then the controlled paddles once more in free-run.
     pub mode: Option<RunMode>,
+    /// What computes the controller's steps: a board in lockstep only, and two paddles.
+    pub hardware: Hardware,
     /// Files for other tools that are not always written.
     pub extras: Extras,
     /// Threads for placement and tabulation.
@@ -266,6 +268,9 @@ impl<'a> SpaceComparison<'a> {
     ) -> Result<Self, SimError> {
         let start = Instant::now();
         let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
+        if options.hardware == Hardware::Qemu && options.mode == Some(RunMode::FreeRun) {
+            return Err(SimError::QemuIsLockstepOnly);
+        }
         if scene.inclusions.is_empty() && [tissue, table_tissue].contains(&Some(TissueVariant::Inclusion)) {
             return Err(SimError::NoInclusion { scene: scene.name.clone() });
         }
@@ -351,7 +356,8 @@ impl<'a> SpaceComparison<'a> {
             Ok((body, table.to_bytes()?))
         });
         let (body, table_bytes) = repeated?;
-        Ok(Some(RepeatedCase { body, table_bytes, program: self.options.program, tissue, table_tissue }))
+        let SpaceOptions { program, hardware, .. } = self.options;
+        Ok(Some(RepeatedCase { body, table_bytes, program, hardware, tissue, table_tissue }))
     }
 }
 
@@ -361,6 +367,7 @@ pub struct RepeatedCase<'c> {
     body: PreparedBody<'c>,
     table_bytes: Vec<u8>,
     program: &'c Path,
+    hardware: Hardware,
     tissue: TissueVariant,
     table_tissue: TissueVariant,
 }
@@ -376,9 +383,9 @@ impl RepeatedCase<'_> {
         mode: RunMode,
         spectator: &dyn Spectator,
     ) -> Result<SpaceStrategyResult, SimError> {
-        let Self { body, table_bytes, program, tissue, table_tissue } = self;
+        let Self { body, table_bytes, program, hardware, tissue, table_tissue } = self;
         let label = Label { tissue: *tissue, table_tissue: *table_tissue, strategy: Strategy::dynamic(mode) };
-        let controller = LinkedController { program, table_bytes, mode, hardware: Hardware::Native, is_watched: true };
+        let controller = LinkedController { program, table_bytes, mode, hardware: *hardware, is_watched: true };
         let insertion = Insertion { body, simulation, label, extras: Extras::default(), spectator: Some(spectator) };
         insertion.controlled(controller, &mut Vec::new())
     }
@@ -429,7 +436,7 @@ fn case(
     (options, spectator): (&SpaceOptions<'_>, Option<&dyn Spectator>),
     artifacts: &mut Vec<Artifact>,
 ) -> Result<SpaceCase, SimError> {
-    let SpaceOptions { program, threads, extras, .. } = *options;
+    let SpaceOptions { program, threads, extras, hardware, .. } = *options;
     let label = |strategy| Label { tissue, table_tissue, strategy };
     let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
         let body = PreparedBody::new(&world.model, paddles, false, threads)?;
@@ -440,16 +447,20 @@ fn case(
         Ok((table, still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
     })?;
     let bytes = table.to_bytes()?;
+    if hardware == Hardware::Qemu {
+        // Before anybody waits for the controller: compiling takes a while the first time.
+        image_for(&bytes)?;
+    }
     let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
     let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
-        let (hardware, is_watched) = (Hardware::Native, spectator.is_some());
+        let is_watched = spectator.is_some();
         let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
         let label = label(Strategy::dynamic(mode));
         Insertion { body: &body, simulation, label, extras, spectator }.controlled(controller, artifacts)
     };
     let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
     // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
-    let once_more = options.mode.is_none() && tissue == table_tissue;
+    let once_more = options.mode.is_none() && tissue == table_tissue && hardware == Hardware::Native;
     let dynamic_free_run = if once_more { Some(controlled(RunMode::FreeRun)?) } else { None };
     Ok(SpaceCase {
         tissue,

@@ -110,7 +110,6 @@ impl RunArgs {
     fn in_space(&self) -> SpaceJob<'_> {
         let given = [
             (self.table.is_some(), "--table"),
-            (self.hardware != Hardware::Native, "--controller qemu"),
             (self.scalar != TableScalar::F64, "--scalar f32"),
             (self.causes, "--causes"),
         ];
@@ -119,6 +118,7 @@ impl RunArgs {
             tissue: self.tissue,
             table_tissue: self.table_tissue,
             mode: self.mode,
+            hardware: self.hardware,
             extras: self.extras(),
             view_port: self.view.then_some(self.view_port),
             out: &self.out,

@@ -8,6 +8,7 @@ use host_sim::record::files::write_json;
 use host_sim::report::directory::{check_directory, write_space_run};
 use host_sim::report::terminal::space_summary::summary;
 use host_sim::runtime::error::RuntimeError;
+use host_sim::runtime::executor::Hardware;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{View, insertions_in_space};
@@ -31,6 +32,8 @@ pub(super) struct SpaceJob<'a> {
     pub(super) table_tissue: Option<TissueVariant>,
     /// What drives time.
     pub(super) mode: Option<RunMode>,
+    /// What computes the controller's steps.
+    pub(super) hardware: Hardware,
     /// Files for other tools that are not always written.
     pub(super) extras: Extras,
     /// Directory for the report.
@@ -61,8 +64,8 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     check_json_beside_report(&inputs, args.json, args.out)?;
     let threads = parallel::threads(args.threads);
     let program = std::env::current_exe().map_err(RuntimeError::Spawn)?;
-    let SpaceJob { tissue, table_tissue, mode, extras, .. } = *args;
-    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, extras, threads };
+    let SpaceJob { tissue, table_tissue, mode, hardware, extras, .. } = *args;
+    let options = SpaceOptions { program: &program, tissue, table_tissue, mode, hardware, extras, threads };
     let comparison = SpaceComparison::prepare(scene, &options, &simulation)?;
     let units = [scene.length_unit.clone(), scene.stress_unit.clone()];
     let start = |port| {

@@ -11,7 +11,7 @@ use firmware::{Controller, Inputs, Settings, State};
 use model_offline::scene::TableScalar;
 
 use crate::exchange::board::device::scalar_of;
-use crate::exchange::board::{BoardError, Device, Image, Processor};
+use crate::exchange::board::{BoardError, Control, Device, Image, Processor};
 use crate::runtime::error::RuntimeError;
 
 /// What computes the controller's steps.
@@ -203,10 +203,22 @@ pub fn on_emulated_board(
     settings: &Settings,
     patience: Duration,
 ) -> Result<Box<dyn StepExecutor>, RuntimeError> {
-    let scalar = scalar_of(table).unwrap_or(ScalarKind::F64);
-    let mut device = Device::emulate(&Image::build(scalar, Processor::Double)?)?;
+    let mut device = Device::emulate(&image_for(table)?)?;
     device.begin(table, settings)?;
     Ok(Box::new(OnBoard { device, patience }))
+}
+
+/// The image that this encoded table is for, built for the board that is emulated; one for the plane where it is no table:
+/// the board refuses it.
+///
+/// # Errors
+/// [`BoardError`].
+pub fn image_for(table: &[u8]) -> Result<Image, BoardError> {
+    let (control, scalar) = match Header::read(table) {
+        Ok(header) => (Control::of_table(&header)?, header.scalar),
+        Err(_) => (Control::Plane, ScalarKind::F64),
+    };
+    Image::build_for(control, scalar, Processor::Double)
 }
 
 /// The table as another scalar, encoded.

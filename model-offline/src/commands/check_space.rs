@@ -5,6 +5,7 @@ use super::error::CliError;
 use super::json::write_json;
 use model_offline::discretization::Resolution;
 use model_offline::material::{Law, Material};
+use model_offline::model::ModelError;
 use model_offline::model::space::meshing::{MeshSize, even_mesh, mesh};
 use model_offline::model::space::survey::{PatchSurvey, Survey};
 use model_offline::number::{area, coordinate, in_unit, short};
@@ -23,13 +24,7 @@ pub(super) fn run(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliErro
 }
 
 fn check(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
-    let at_level = |level: i32| Survey::of(scene, &mesh(scene, &MeshSize::level(level))?);
-    let survey = match scene.discretization.resolution {
-        Resolution::Spacing(spacing) => Survey::of(scene, &even_mesh(scene, spacing)?)?,
-        Resolution::Level(level) => at_level(level)?,
-        // Where refinement begins: at the coarsest mesh that sees every patch.
-        Resolution::Tolerance(_) => at_level(0).or_else(|_| at_level(1))?,
-    };
+    let survey = survey(scene)?;
     let warnings = warnings(scene, &survey);
     let mut document = json!(survey);
     document["scene"] = json!(scene.name);
@@ -44,8 +39,19 @@ fn check(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
     Ok(())
 }
 
+/// What is there without solving, on the mesh that the scene asks for.
+pub(super) fn survey(scene: &SpaceScene) -> Result<Survey, ModelError> {
+    let at_level = |level: i32| Survey::of(scene, &mesh(scene, &MeshSize::level(level))?);
+    match scene.discretization.resolution {
+        Resolution::Spacing(spacing) => Survey::of(scene, &even_mesh(scene, spacing)?),
+        Resolution::Level(level) => at_level(level),
+        // Where refinement begins: at the coarsest mesh that sees every patch.
+        Resolution::Tolerance(_) => at_level(0).or_else(|_| at_level(1)),
+    }
+}
+
 /// What is seldom meant, in words.
-fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
+pub(super) fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
     let told = Told { scene, survey };
     let mut all: Vec<String> = survey.warnings.iter().map(|warning| warning.told(&scene.length_unit)).collect();
     let overlap = |[a, b]: &[u32; 2]| {

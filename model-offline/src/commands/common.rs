@@ -113,6 +113,15 @@ impl VariedArgs {
         }
     }
 
+    /// The scene in space with the flags in it, checked.
+    pub(super) fn over_space(&self, mut scene: SpaceScene) -> Result<SpaceScene, CliError> {
+        check_essential_in_space(self.essential)?;
+        let spec = &mut scene.discretization;
+        spec.resolution = self.spacing.map_or(spec.resolution, Resolution::Spacing);
+        scene.check_discretization()?;
+        Ok(scene)
+    }
+
     /// The scene with the flags in it, checked.
     pub(super) fn over(&self, mut scene: Scene) -> Result<Scene, CliError> {
         let spec = &mut scene.discretization;
@@ -120,6 +129,15 @@ impl VariedArgs {
         spec.essential = self.essential.unwrap_or(spec.essential);
         limits::check(&scene.discretization, &scene.outline)?;
         Ok(scene)
+    }
+}
+
+fn check_essential_in_space(essential: Option<Essential>) -> Result<(), CliError> {
+    match essential {
+        Some(Essential::Nitsche) => {
+            Err(CliError::usage("--essential: Nitsche's method is planar", "leave --essential out"))
+        }
+        Some(Essential::Transformation) | None => Ok(()),
     }
 }
 
@@ -160,9 +178,7 @@ impl DiscretizationArgs {
 impl DiscretizationArgs {
     /// The scene in space with the flags in it, checked.
     pub(super) fn over_space(&self, mut scene: SpaceScene) -> Result<SpaceScene, CliError> {
-        if self.essential.is_some_and(|essential| essential != Essential::Transformation) {
-            return Err(CliError::usage("--essential: Nitsche's method is planar", "leave --essential out"));
-        }
+        check_essential_in_space(self.essential)?;
         let spec = &mut scene.discretization;
         spec.resolution = match (self.spacing, self.tolerance) {
             (Some(spacing), _) => Resolution::Spacing(spacing),

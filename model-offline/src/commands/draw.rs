@@ -1,11 +1,15 @@
 //! `model-offline draw`: a scene, or a result, as a picture.
 
+use super::check_space;
 use super::common::SceneArgs;
 use super::common::warned;
 use super::error::CliError;
 use model_offline::output::field_picture::{self, Field};
 use model_offline::output::result_file::{Which, read_body};
+use model_offline::output::space_picture::{self, SpaceGeometry};
 use model_offline::output::{PictureFormat, check_outputs, scene_picture, write_picture};
+use model_offline::placement::space::workflow::coarse;
+use model_offline::scene::space::SpaceScene;
 use std::path::PathBuf;
 
 /// Options of `draw`.
@@ -49,9 +53,22 @@ pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
             "draw DIR/result.json of `host-sim run`, or what `solve SCENE --depth D --json FILE` writes",
         ));
     }
+    if let Some(scene) = args.scene.read_in_space()? {
+        check_outputs(&args.scene.files(&scene), &[("--output", Some(&args.output))])?;
+        return draw_in_space(args, &scene);
+    }
     let scene = args.scene.read_any()?;
     write_picture(&args.output, &scene_picture::svg(&scene))?;
     eprint!("{}", warned(&scene.told_warnings()));
+    Ok(())
+}
+
+/// The body at rest, on the mesh that insertions are followed on.
+fn draw_in_space(args: &DrawArgs, scene: &SpaceScene) -> Result<(), CliError> {
+    let warnings = check_space::warnings(scene, &check_space::survey(scene)?);
+    let geometry = SpaceGeometry::new(&coarse(scene)?);
+    write_picture(&args.output, &space_picture::scene_svg(&geometry, scene.needle.depth))?;
+    eprint!("{}", warned(&warnings));
     Ok(())
 }
 

@@ -2,13 +2,15 @@
 
 use super::common::{RunArgs, VariedArgs};
 use super::error::CliError;
-use model_offline::discretization::{Basis, Resolution};
+use model_offline::discretization::{Basis, Discretization, Resolution};
 use model_offline::model::ModelError;
 use model_offline::output;
 use model_offline::placement::model_with_paddle;
-use model_offline::scene::Scene;
+use model_offline::placement::space::workflow::best_single;
+use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::study::Extent;
-use model_offline::study::stability;
+use model_offline::study::stability::setting::Setting;
+use model_offline::study::stability::{self, Plan, Stability};
 use std::path::PathBuf;
 
 /// Options of `stability`.
@@ -16,7 +18,7 @@ use std::path::PathBuf;
 pub(super) struct StabilityArgs {
     /// Scene file, or the name of a bundled scene.
     scene: PathBuf,
-    /// Folder for stability.csv, stability.svg and zero_energy.csv; made when it is not there.
+    /// Folder for stability.csv, stability.svg and, in the plane, zero_energy.csv; made when it is not there.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Fewer values and one spacing for the sweeps.
@@ -38,28 +40,62 @@ pub(super) struct StabilityArgs {
 }
 
 pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
-    let mut scene = Scene::read(&args.scene)?;
+    let mut scene = match AnyScene::read(&args.scene)? {
+        AnyScene::Planar(scene) => *scene,
+        AnyScene::Space(scene) => return run_in_space(args, *scene),
+    };
     let method = &mut scene.discretization.method;
     method.support = args.support.unwrap_or(method.support);
     method.basis = args.basis.unwrap_or(method.basis);
     let scene = &args.varied.over(scene)?;
-    let Resolution::Spacing(_) = scene.discretization.resolution else {
-        return Err(CliError::usage(
-            "the study varies a spacing, and this scene has a tolerance",
-            "give the spacing to vary around, e.g. --spacing 0.1",
-        ));
-    };
+    check_spacing(&scene.discretization)?;
     let paddle = match args.paddle {
         Some(index) => scene.paddle_position(index).map(|_| index).map_err(ModelError::from)?,
         None => model_with_paddle(&scene.without_inclusions(), None)?.1,
     };
+    studied(args, scene.into(), &|plan, progress| plan.run(scene, paddle, args.run.threads(), progress))
+}
+
+fn check_spacing(discretization: &Discretization) -> Result<(), CliError> {
+    match discretization.resolution {
+        Resolution::Spacing(_) => Ok(()),
+        Resolution::Tolerance(_) | Resolution::Level(_) => Err(CliError::usage(
+            "the study varies a spacing, and this scene has none",
+            "give the spacing to vary around, e.g. --spacing 0.1",
+        )),
+    }
+}
+
+/// The same of a body in space. The paddle is the best by the scene's rule at the spacing.
+fn run_in_space(args: &StabilityArgs, mut scene: SpaceScene) -> Result<(), CliError> {
+    let method = &mut scene.discretization.method;
+    method.support = args.support.unwrap_or(method.support);
+    method.basis = args.basis.unwrap_or(method.basis);
+    let scene = &args.varied.over_space(scene)?;
+    check_spacing(&scene.discretization)?;
+    let paddle = match args.paddle {
+        Some(index) => scene.paddle_position(index).map(|_| index).map_err(ModelError::from)?,
+        None => best_single(&scene.without_inclusions())?,
+    };
+    let setting = Setting::in_space(scene, args.support);
+    studied(args, setting, &|plan, progress| plan.run_in_space(scene, paddle, args.run.threads(), progress))
+}
+
+/// Runs a plan behind a progress bar and writes what comes of it.
+fn studied(
+    args: &StabilityArgs,
+    setting: Setting,
+    run: &dyn Fn(&Plan, &(dyn Fn() + Sync)) -> Result<Stability, ModelError>,
+) -> Result<(), CliError> {
     output::make_folder(&args.out)?;
-    let plan = stability::Plan::new(scene, Extent::of_flag(args.quick));
+    let plan = Plan::new(setting, Extent::of_flag(args.quick));
     let bar = args.run.progress(plan.runs() as u64);
-    let result = plan.run(scene, paddle, args.run.threads(), &|| bar.inc(1))?;
+    let result = run(&plan, &|| bar.inc(1))?;
     bar.finish_and_clear();
     output::write_whole(&args.out.join("stability.csv"), &stability::csv(&result))?;
-    output::write_whole(&args.out.join("zero_energy.csv"), &stability::zero_energy_csv(&result))?;
+    if !result.zero_energy.is_empty() {
+        output::write_whole(&args.out.join("zero_energy.csv"), &stability::zero_energy_csv(&result))?;
+    }
     output::write_whole(&args.out.join("stability.svg"), stability::figure(&result).svg().as_bytes())?;
     if !args.run.quiet {
         print!("{}", stability::summary(&result));

@@ -20,6 +20,18 @@ pub enum BoardError {
         /// The emulator's program.
         program: &'static str,
     },
+    /// There is no image for such a table.
+    #[error(
+        "no image controls {paddles} paddle(s) in {dimension} dimensions in {scalar}: there are images for one paddle in the plane in f64 and f32, and for two paddles in space in f64; use `--controller native`"
+    )]
+    NoImage {
+        /// The table's dimension of space.
+        dimension: u8,
+        /// Its paddles.
+        paddles: u16,
+        /// What it is computed in.
+        scalar: &'static str,
+    },
     /// The image does not build or, because a panic can be reached, does not link.
     #[error("the image does not build:\n{log}")]
     Build {

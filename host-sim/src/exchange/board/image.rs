@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use firmware::contract::Header;
 use firmware::scalar::ScalarKind;
 
 use super::error::BoardError;
@@ -63,6 +64,22 @@ impl Control {
         match self {
             Self::Plane => "",
             Self::SpacePair => "-space",
+        }
+    }
+
+    /// Whether there is an image for a table with such a header.
+    ///
+    /// # Errors
+    /// [`BoardError::NoImage`].
+    pub fn of_table(header: &Header) -> Result<Self, BoardError> {
+        let Header { dimension, paddle_dof, scalar, .. } = *header;
+        match (dimension, paddle_dof, scalar) {
+            (2, 2, _) => Ok(Self::Plane),
+            (3, 6, ScalarKind::F64) => Ok(Self::SpacePair),
+            _ => {
+                let paddles = paddle_dof / u16::from(dimension).max(1);
+                Err(BoardError::NoImage { dimension, paddles, scalar: scalar.name() })
+            }
         }
     }
 

@@ -11,7 +11,7 @@ use model_offline::number::{in_unit, length};
 use model_offline::output::chart::{colour_bar, heading, sheet};
 use model_offline::output::field_picture::Field;
 use model_offline::output::space_picture::{
-    CutPlane, Shown, SpaceGeometry, SpaceState, orthogonal, outside, planes, sections, seen_from,
+    Colours, CutPlane, Shown, SpaceGeometry, SpaceState, orthogonal, outside, planes, sections, seen_from,
 };
 use model_offline::scene::TissueVariant;
 use serde::Serialize;
@@ -51,8 +51,8 @@ fn drawn<T>(run: &SpaceRun, place: usize, strategy: usize, draw: impl FnOnce(&Sh
     let state = run.bodies.cases[place][strategy].as_ref().map_err(String::as_str)?;
     let geometry = geometry(run, &run.cases[place]);
     let values = orthogonal(&geometry, state);
-    let shown =
-        Shown { geometry: &geometry, state, values: &values, scale: scale(run, place), held_still: strategy == 1 };
+    let colours = Colours::Field { values: &values, scale: scale(run, place) };
+    let shown = Shown { geometry: &geometry, state, colours, way: None, held_still: strategy == 1 };
     Ok(draw(&shown))
 }
 

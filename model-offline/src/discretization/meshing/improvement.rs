@@ -75,8 +75,10 @@ fn smooth(fitted: &mut Fitted<'_>, node: u32) -> bool {
         return false;
     }
     let first = best.0;
+    // Farther away nothing is the right way round: what is inside out only looks better there, the farther the better.
+    let reach = star.reach(&begin);
     let attempt = |x: Point<3>, best: &mut (f64, Point<3>)| {
-        let Some(x) = fitted.features.project(&x, on) else { return false };
+        let Some(x) = fitted.features.project(&x, on).filter(|x| (x - begin).norm() <= reach) else { return false };
         let quality = star.quality(&x, best.0 + GAIN);
         let better = quality > best.0 + GAIN;
         if better {
@@ -138,6 +140,11 @@ impl Star {
     /// Mean of the corners opposite to the node.
     fn middle(&self) -> Point<3> {
         self.others().sum::<Point<3>>() / (3 * self.tetrahedra.len()) as f64
+    }
+
+    /// Distance of the farthest of these corners.
+    fn reach(&self, x: &Point<3>) -> f64 {
+        self.others().map(|y| (y - x).norm()).fold(0.0, f64::max)
     }
 
     /// Mean distance of these corners.

@@ -7,7 +7,7 @@ const CHART: &str = include_str!("chart.css");
 /// Name, colour on a light and on a dark ground. The named colours are those of Okabe & Ito (*Color universal design*,
 /// 2008), told apart by people with any kind of colour vision: lighter on a dark ground where they are dark, and yellow
 /// darker on a light one.
-const COLOURS: [(&str, &str, &str); 14] = [
+const COLOURS: [(&str, &str, &str); 18] = [
     ("ground", "#ffffff", "#14171c"),
     ("ink", "#1a1d23", "#e8eaee"),
     ("quiet", "#5b6270", "#a3abb8"),
@@ -15,6 +15,10 @@ const COLOURS: [(&str, &str, &str); 14] = [
     ("grid", "#dfe2e8", "#333944"),
     ("body", "#f3f4f7", "#20252d"),
     ("strip", "#fbecd0", "#4a3a1c"),
+    ("shade-0", "#b4bac6", "#1d222a"),
+    ("shade-1", "#c8cdd7", "#272d37"),
+    ("shade-2", "#dce0e7", "#333a46"),
+    ("shade-3", "#eff1f5", "#414957"),
     ("orange", "#e69f00", "#e69f00"),
     ("sky", "#56b4e9", "#56b4e9"),
     ("green", "#009e73", "#2cc79b"),
@@ -93,6 +97,14 @@ pub const BANDS: usize = 10;
 /// Class of a field's value, 0 to 1; what is outside or no number has the nearest end's.
 pub fn band(fraction: f64) -> String {
     format!("f{}", ((fraction * BANDS as f64) as usize).min(BANDS - 1))
+}
+
+/// Number of shades of a body without colours, from dark to light.
+const SHADES: usize = 4;
+
+/// Class of a surface on which so much light falls, 0 to 1.
+pub fn shade(light: f64) -> String {
+    format!("s{}", ((light * SHADES as f64) as usize).min(SHADES - 1))
 }
 
 /// Colour of a field's value, as [`band`] has it: red, green and blue from 0 to 1.

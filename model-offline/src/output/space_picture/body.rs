@@ -113,6 +113,18 @@ impl SpaceGeometry {
 }
 
 impl SpaceState {
+    /// Before the needle goes in, with all paddles.
+    pub fn at_rest(geometry: &SpaceGeometry) -> Self {
+        let paddles: Vec<u32> = geometry.paddles.iter().map(|patch| patch.index).collect();
+        Self {
+            depth: 0.0,
+            paddle_displacements: vec![[0.0; 3]; paddles.len()],
+            paddles,
+            displacements: vec![[0.0; 3]; geometry.nodes.len()],
+            target: [0.0; 3],
+        }
+    }
+
     /// Of a body whose attached paddles have these indices.
     pub fn new(body: &SpaceBody<'_>, paddles: &[u32]) -> Self {
         let model = body.model();
@@ -141,6 +153,20 @@ pub fn orthogonal(geometry: &SpaceGeometry, state: &SpaceState) -> Vec<f64> {
     all.map(|u| (u - axis * axis.dot(&u)).norm()).collect()
 }
 
+/// What colours say.
+#[derive(Debug, Clone, Copy)]
+pub enum Colours<'a> {
+    /// A field: its values at the nodes, and the value at which the colours end.
+    Field {
+        /// One value per node.
+        values: &'a [f64],
+        /// Where the colours end.
+        scale: f64,
+    },
+    /// What is body and what is inclusion: nothing has moved yet.
+    Parts,
+}
+
 /// What a picture shows of a state.
 #[derive(Debug, Clone, Copy)]
 pub struct Shown<'a> {
@@ -148,10 +174,10 @@ pub struct Shown<'a> {
     pub geometry: &'a SpaceGeometry,
     /// The body now.
     pub state: &'a SpaceState,
-    /// The field's values at the nodes.
-    pub values: &'a [f64],
-    /// Value at which the colours end.
-    pub scale: f64,
+    /// What its colours say.
+    pub colours: Colours<'a>,
+    /// How deep the needle is to go from where it is, length; nothing where that is not shown.
+    pub way: Option<f64>,
     /// Whether paddles are a fixture, held still.
     pub held_still: bool,
 }
@@ -162,8 +188,16 @@ impl Shown<'_> {
         if self.held_still { "paddle" } else { "paddle best" }
     }
 
-    /// A value over that where colours end.
-    pub(super) fn part(&self, value: f64) -> f64 {
-        if self.scale > 0.0 { value / self.scale } else { 0.0 }
+    /// Whether nothing has moved yet.
+    pub(super) fn is_at_rest(&self) -> bool {
+        matches!(self.colours, Colours::Parts)
+    }
+
+    /// A value at every node: the field's, over that where colours end.
+    pub(super) fn parts_of_scale(&self) -> Vec<f64> {
+        match self.colours {
+            Colours::Field { values, scale } if scale > 0.0 => values.iter().map(|value| value / scale).collect(),
+            _ => vec![0.0; self.geometry.nodes.len()],
+        }
     }
 }

@@ -10,13 +10,13 @@ mod outside;
 mod section;
 mod sections;
 
-pub use self::body::{PaddlePatch, Shown, SpaceGeometry, SpaceState, orthogonal};
+pub use self::body::{Colours, PaddlePatch, Shown, SpaceGeometry, SpaceState, orthogonal};
 pub use self::frame::{CutPlane, planes, seen_from};
 pub use self::outside::outside;
 pub use self::section::{Cut, cut};
 pub use self::sections::sections;
 use super::chart::number::plain;
-use super::chart::{colour_bar, heading, sheet};
+use super::chart::{Key, Legend, Marker, colour_bar, heading, sheet};
 use super::field_picture::{Field, with_unit};
 
 /// Width of each drawing of a picture of its own, px.
@@ -27,7 +27,8 @@ const WIDTH: f64 = 380.0;
 pub fn svg(geometry: &SpaceGeometry, state: &SpaceState) -> String {
     let values = &orthogonal(geometry, state)[..];
     let scale = values.iter().copied().fold(0.0, f64::max);
-    let shown = Shown { geometry, state, values, scale, held_still: false };
+    let colours = Colours::Field { values, scale };
+    let shown = Shown { geometry, state, colours, way: None, held_still: false };
     let mut drawings = vec![outside(&shown, WIDTH)];
     drawings.extend(sections(&shown, WIDTH));
     let all = sheet("", &drawings, 2);
@@ -41,4 +42,38 @@ pub fn svg(geometry: &SpaceGeometry, state: &SpaceState) -> String {
     let width = all.size[0];
     let bar = colour_bar(width.min(WIDTH), &Field::Orthogonal.label(&geometry.units), scale);
     sheet(&title, &[heading(&title, &caption, width), all, bar], 1).file()
+}
+
+/// A body at rest with everything that its scene names: outside and sections, to be looked at before it is solved. The needle
+/// is to go `depth` deep, length.
+pub fn scene_svg(geometry: &SpaceGeometry, depth: f64) -> String {
+    let state = SpaceState::at_rest(geometry);
+    let shown = Shown { geometry, state: &state, colours: Colours::Parts, way: Some(depth), held_still: true };
+    let mut drawings = vec![outside(&shown, WIDTH)];
+    drawings.extend(sections(&shown, WIDTH));
+    let all = sheet("", &drawings, 2);
+    let title = format!("Scene {}", geometry.name);
+    let caption = "At rest, to scale, on a coarse mesh: outside, and sections through the target. Dotted: rims of paddles that a section does \
+                   not cut.";
+    let heading = heading(&title, caption, all.size[0]);
+    let legend = legend(geometry, depth).drawing(all.size[0]);
+    sheet(&title, &[heading, all, legend], 1).file()
+}
+
+fn legend(geometry: &SpaceGeometry, depth: f64) -> Legend {
+    let line = |class: &str| Key::Series(Some(class.to_owned()), None);
+    let mark = |marker: Marker, class: &str| Some((marker, class.to_owned()));
+    let mut legend = Legend::default();
+    legend.add(Key::Area("body".to_owned()), "body");
+    if !geometry.inclusions.is_empty() {
+        legend.add(Key::Area("inclusion".to_owned()), "inclusion");
+    }
+    legend.add(line("immobile"), "immobile");
+    legend.add(line("paddle"), "paddle");
+    legend.add(Key::Series(None, mark(Marker::Circle, "target")), "target");
+    legend.add(line("contact"), "needle contact");
+    legend.add(line("needle"), "needle");
+    let way = format!("needle's way, {}", with_unit(depth, &geometry.units[0]));
+    legend.add(Key::Series(Some("needle dashed".to_owned()), mark(Marker::Diamond, "arrow")), &way);
+    legend
 }

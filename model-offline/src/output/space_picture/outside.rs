@@ -1,8 +1,8 @@
 //! The deformed body from outside, in parallel projection.
 
-use super::{Shown, seen_from};
+use super::{PaddlePatch, Shown, seen_from};
 use crate::geometry::Point;
-use crate::output::chart::style::band;
+use crate::output::chart::style::{band, shade};
 use crate::output::chart::{Anchor, Drawing, Plane, heading};
 use std::collections::BTreeMap;
 
@@ -10,7 +10,11 @@ use std::collections::BTreeMap;
 const MARGIN: f64 = 0.02;
 const NEEDLE: f64 = 0.3;
 
-/// The outside in the colours of the field, patches in their own, about this wide, px; what is in front covers what is behind.
+/// From where light falls on a body without colours: from the viewer, from above and from the left.
+const LIGHT: [f64; 3] = [1.0, 0.8, -0.6];
+
+/// The outside in the colours of the field or, at rest, in light and shade, patches in their own, about this wide, px; what is
+/// in front covers what is behind.
 pub fn outside(shown: &Shown<'_>, width: f64) -> Drawing {
     let (geometry, state) = (shown.geometry, shown.state);
     let [view, up] = seen_from(geometry, &state.paddles);
@@ -23,27 +27,39 @@ pub fn outside(shown: &Shown<'_>, width: f64) -> Drawing {
     let paper = Plane::around(moved.iter().chain([&far]).map(flat), MARGIN * geometry.extent(), width);
     let classes = classes(shown);
     let at = |node: u32| moved[node as usize];
+    let normal = |t: &[u32; 3]| (at(t[1]) - at(t[0])).cross(&(at(t[2]) - at(t[0])));
+    let light = (view * LIGHT[0] + up * LIGHT[1] + right * LIGHT[2]).normalize();
+    let values = shown.parts_of_scale();
+    let ground = |t: &[u32; 3]| {
+        if shown.is_at_rest() {
+            // No triangle that is seen is without area.
+            shade(0.5 + 0.5 * normal(t).normalize().dot(&light))
+        } else {
+            band(t.iter().map(|node| values[*node as usize]).sum::<f64>() / 3.0)
+        }
+    };
     let mut seen: Vec<(f64, &[u32; 3])> = geometry
         .outside
         .iter()
-        .filter(|t| (at(t[1]) - at(t[0])).cross(&(at(t[2]) - at(t[0]))).dot(&view) > 0.0)
+        .filter(|t| normal(t).dot(&view) > 0.0)
         .map(|t| (t.iter().map(|node| view.dot(&at(*node))).sum::<f64>(), t))
         .collect();
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let label = "The deformed body from outside";
+    let label = if shown.is_at_rest() { "The body from outside" } else { "The deformed body from outside" };
     let title = heading("", label, width);
     let mut drawing = Drawing::new(paper.size, "");
     drawing.open_group("outside");
     for (_, triangle) in seen {
-        let mean = triangle.iter().map(|node| shown.values[*node as usize]).sum::<f64>() / 3.0;
-        let class = classes.get(triangle).map_or_else(|| band(shown.part(mean)), |class| (*class).to_owned());
+        let class = classes.get(triangle).map_or_else(|| ground(triangle), |class| (*class).to_owned());
         drawing.polygon(&class, &triangle.map(|node| paper.at(flat(&at(node)))));
     }
     drawing.close_group();
     let [tip, far] = [tip, far].map(|x| paper.at(flat(&x)));
     drawing.line("under", far, tip);
     drawing.needle(far, tip);
-    for patch in geometry.paddles.iter().filter(|patch| state.paddles.contains(&patch.index)) {
+    let is_seen = |patch: &&PaddlePatch| patch.triangles.iter().any(|t| normal(t).dot(&view) > 0.0);
+    let attached = geometry.paddles.iter().filter(|patch| state.paddles.contains(&patch.index));
+    for patch in attached.filter(is_seen) {
         let nodes: Vec<u32> = patch.triangles.iter().flatten().copied().collect();
         let middle = nodes.iter().map(|node| at(*node)).sum::<Point<3>>() / nodes.len().max(1) as f64;
         let [x, y] = paper.at(flat(&middle));

@@ -5,7 +5,7 @@ use super::section::cut_triangles;
 use super::{Cut, CutPlane, Shown, cut, planes};
 use crate::geometry::Point;
 use crate::output::chart::style::BANDS;
-use crate::output::chart::{Anchor, Drawing, Plane, Px, heading, map_of};
+use crate::output::chart::{Anchor, Drawing, Marker, Plane, Px, heading, map_of};
 use crate::output::field_picture::{bands, moved_target};
 use crate::output::surface::inside;
 
@@ -14,6 +14,8 @@ const MARGIN: f64 = 0.04;
 const OUTSIDE: f64 = 0.13;
 /// Distance of the strokes of what is held, the same.
 const STROKES: f64 = 0.022;
+/// What a paddle's name takes, px.
+const NAME: f64 = 12.0;
 /// Space between a section's name and the section, px.
 const GAP: f64 = 4.0;
 
@@ -21,6 +23,18 @@ const GAP: f64 = 4.0;
 pub fn sections(shown: &Shown<'_>, width: f64) -> [Drawing; 3] {
     let moved = shown.state.moved(shown.geometry);
     planes(shown.geometry).map(|plane| Section::new(shown, &moved, plane).drawing(width))
+}
+
+/// A name at a place; where there is one already, beside that.
+fn add_name(names: &mut Vec<(Px, String)>, at: Px, name: &str) {
+    let is_here = |there: &Px| (0..2).all(|k| (there[k] - at[k]).abs() < NAME);
+    match names.iter_mut().find(|(there, _)| is_here(there)) {
+        Some((_, names)) => {
+            names.push_str(", ");
+            names.push_str(name);
+        }
+        None => names.push((at, name.to_owned())),
+    }
 }
 
 /// A plane, and what it cuts.
@@ -41,10 +55,12 @@ impl<'a> Section<'a> {
         let rest: Vec<Point<3>> = geometry.nodes.iter().map(|x| Point::from(*x)).collect();
         let extent = geometry.extent();
         let axis = Point::from(geometry.axis);
+        let values = shown.parts_of_scale();
         let contact = geometry.middle(&geometry.needle) + axis * shown.state.depth;
         Self {
-            now: cut(moved, &geometry.tetrahedra, shown.values, &plane),
-            rest: cut(&rest, &geometry.tetrahedra, shown.values, &plane),
+            now: cut(moved, &geometry.tetrahedra, &values, &plane),
+            // Nothing has moved yet: once is enough.
+            rest: if shown.is_at_rest() { Vec::new() } else { cut(&rest, &geometry.tetrahedra, &values, &plane) },
             needle: [contact, contact - axis * (OUTSIDE * extent)],
             shown,
             moved,
@@ -79,13 +95,22 @@ impl<'a> Section<'a> {
     }
 
     fn draw(&self, drawing: &mut Drawing, paper: &Plane) {
-        self.field(drawing, paper);
+        if self.shown.is_at_rest() {
+            drawing.region("body", &self.edge(&self.now, paper, |_| true));
+        } else {
+            self.field(drawing, paper);
+        }
         for line in self.edge(&self.rest, paper, |_| true) {
             drawing.polyline("rest", &line);
         }
         let parts = &self.shown.geometry.parts;
         for part in 1..=self.shown.geometry.inclusions.len() as u32 {
-            for line in self.edge(&self.now, paper, |cut| parts[cut.tetrahedron] == part) {
+            let rim = self.edge(&self.now, paper, |cut| parts[cut.tetrahedron] == part);
+            if self.shown.is_at_rest() {
+                drawing.region("inclusion", &rim);
+                continue;
+            }
+            for line in rim {
                 drawing.polyline("under", &line);
                 drawing.polyline("rim", &line);
             }
@@ -102,15 +127,18 @@ impl<'a> Section<'a> {
         self.paddles(drawing, paper);
         let target = Point::from(self.shown.geometry.target);
         let at = |x: &Point<3>| paper.at(self.plane.coordinates(x));
-        moved_target(drawing, at(&target), at(&(target + Point::from(self.shown.state.target))));
+        if self.shown.is_at_rest() {
+            drawing.target(at(&target));
+        } else {
+            moved_target(drawing, at(&target), at(&(target + Point::from(self.shown.state.target))));
+        }
     }
 
     /// The field's colours: one shape each.
     fn field(&self, drawing: &mut Drawing, paper: &Plane) {
         let mut of_band: Vec<Edges> = (0..BANDS).map(|_| Edges::default()).collect();
         for cut in &self.now {
-            let corners: Vec<(Px, f64)> =
-                cut.corners.iter().map(|(at, value)| (paper.at(*at), self.shown.part(*value))).collect();
+            let corners: Vec<(Px, f64)> = cut.corners.iter().map(|(at, value)| (paper.at(*at), *value)).collect();
             for (band, points) in bands(&corners) {
                 of_band[band].add_polygon(&points);
             }
@@ -146,6 +174,12 @@ impl<'a> Section<'a> {
         }
         if !self.plane.across_needle {
             let [tip, far] = self.needle.map(|x| paper.at(self.plane.coordinates(&x)));
+            if let Some(end) = self.shown.way {
+                let end =
+                    paper.at(self.plane.coordinates(&(self.needle[0] + Point::from(self.shown.geometry.axis) * end)));
+                drawing.line("needle dashed", tip, end);
+                drawing.marker(Marker::Diamond, "arrow", end);
+            }
             drawing.line("under", far, tip);
             drawing.needle(far, tip);
         }
@@ -154,6 +188,7 @@ impl<'a> Section<'a> {
     fn paddles(&self, drawing: &mut Drawing, paper: &Plane) {
         let attached = &self.shown.state.paddles;
         let class = self.shown.paddle();
+        let mut names: Vec<(Px, String)> = Vec::new();
         for patch in self.shown.geometry.paddles.iter().filter(|patch| attached.contains(&patch.index)) {
             let lines = self.lines(&patch.triangles, paper);
             let rim = if lines.is_empty() { self.rim_of(&patch.triangles, paper) } else { Vec::new() };
@@ -163,11 +198,16 @@ impl<'a> Section<'a> {
             for line in &rim {
                 drawing.polyline(&format!("{class} beside"), line);
             }
+            // What is beside the plane has its name at its upper end: in its middle may be the target.
+            let top = rim.iter().flatten().map(|point| point[1]).fold(f64::INFINITY, f64::min);
             let all: Vec<Px> = lines.into_iter().chain(rim).flatten().collect();
             let [x, y] = crate::output::surface::middle(&all);
             if !all.is_empty() {
-                drawing.text("title halo", [x, y + 4.5], Anchor::Middle, &patch.index.to_string());
+                add_name(&mut names, [x, y.min(top + NAME)], &patch.index.to_string());
             }
+        }
+        for ([x, y], name) in names {
+            drawing.text("title halo", [x, y + 4.5], Anchor::Middle, &name);
         }
     }
 

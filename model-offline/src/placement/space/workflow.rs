@@ -120,6 +120,18 @@ pub fn at_resolution(scene: &SpaceScene) -> Result<(SpaceModel, Vec<SpaceRespons
     }
 }
 
+/// Index of the single paddle that controls the target best, at rest, by the scene's own discretization.
+///
+/// # Errors
+/// [`ModelError`], as of [`at_resolution`], and [`ModelError::NoPaddleControls`].
+pub fn best_single(scene: &SpaceScene) -> Result<u32, ModelError> {
+    let (_, rest) = at_resolution(scene)?;
+    let singles =
+        scene.paddles.iter().zip(&rest).filter_map(|(paddle, r)| Some((paddle.index, r.controllability?.measure)));
+    let best = singles.filter(|(_, measure)| measure.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
+    best.map(|(index, _)| index).ok_or(ModelError::NoPaddleControls)
+}
+
 /// The model of a scene at its spacing or level, or at the tolerance that it was refined to.
 ///
 /// # Errors
@@ -136,15 +148,20 @@ fn at_level(scene: &SpaceScene, level: i32) -> Result<(SpaceModel, Vec<SpaceResp
     answering(scene, &mesh(scene, &MeshSize::level(level))?)
 }
 
-/// A model of a mesh with its responses at rest, unless it is too large to be factorised.
-fn answering(scene: &SpaceScene, mesh: &TetMesh) -> Result<(SpaceModel, Vec<SpaceResponse>), ModelError> {
-    let integration = scene.discretization.method.integration;
+/// Whether the model of a mesh can be factorised within minutes.
+///
+/// # Errors
+/// [`ModelError::TooManyNodes`].
+pub fn affordable(integration: Integration, mesh: &TetMesh) -> Result<(), ModelError> {
     let limit = if integration.is_element() { MOST_ELEMENT_NODES } else { MOST_NODES };
     // A tetrahedron more brings about seven thirds of a middle node.
     let nodes = if integration == Integration::FemT10 { 7 * mesh.nodes.len() } else { mesh.nodes.len() };
-    if nodes > limit {
-        return Err(ModelError::TooManyNodes { nodes, limit });
-    }
+    if nodes > limit { Err(ModelError::TooManyNodes { nodes, limit }) } else { Ok(()) }
+}
+
+/// A model of a mesh with its responses at rest, unless it is too large to be factorised.
+fn answering(scene: &SpaceScene, mesh: &TetMesh) -> Result<(SpaceModel, Vec<SpaceResponse>), ModelError> {
+    affordable(scene.discretization.method.integration, mesh)?;
     let model = SpaceModel::on(scene, mesh)?;
     let rest = rest_responses(&model)?;
     Ok((model, rest))

@@ -15,6 +15,8 @@ fn name(integration: Integration) -> &'static str {
     match integration {
         Integration::FemT3 => "linear triangles",
         Integration::FemT6 => "quadratic triangles",
+        Integration::FemT4 => "linear tetrahedra",
+        Integration::FemT10 => "quadratic tetrahedra",
         meshfree => meshfree.name(),
     }
 }
@@ -57,7 +59,7 @@ fn by_integration(study: &Stability, place: Abscissa<'_>, height: fn(&Experiment
         }
         series
     };
-    Integration::PLANAR.iter().map(of_rule).collect()
+    study.setting.rules().iter().map(of_rule).collect()
 }
 
 /// Mean over the rules of their values at the left and at the right end.
@@ -70,7 +72,7 @@ fn ends(series: &[Series]) -> Option<[f64; 2]> {
 
 /// Depth reached over one parameter.
 fn depth_panel(study: &Stability, title: &str, x: Axis, place: Abscissa<'_>) -> Panel {
-    let scene = &study.scene;
+    let setting = &study.setting;
     let series = by_integration(study, place, |o| o.depth);
     let title = ends(&series).map_or_else(
         || title.to_owned(),
@@ -78,13 +80,13 @@ fn depth_panel(study: &Stability, title: &str, x: Axis, place: Abscissa<'_>) -> 
             format!("{title}: {} → {}", plain((left * 1e3).round() / 1e3), plain((right * 1e3).round() / 1e3))
         },
     );
-    let y = Axis::linear("depth reached", &scene.length_unit).range(0.0, 1.06 * deepest(study));
-    let wanted = ReferenceLine::new("scene's depth", Place::Y(scene.needle.depth), Dash::Dotted);
+    let y = Axis::linear("depth reached", &setting.length_unit).range(0.0, 1.06 * deepest(study));
+    let wanted = ReferenceLine::new("scene's depth", Place::Y(setting.depth), Dash::Dotted);
     Panel { series, lines: vec![wanted], ..Panel::new(&title, x, y) }
 }
 
 fn deepest(study: &Stability) -> f64 {
-    f64::from(super::probe::BEYOND) * study.scene.needle.depth
+    f64::from(super::probe::BEYOND) * study.setting.depth
 }
 
 /// A parameter's sweep at the study's spacing, its values mapped to the axis.
@@ -167,10 +169,10 @@ fn energy_panel(study: &Stability) -> Panel {
 fn conclusion(study: &Stability) -> Option<String> {
     let distinct = study.distinct();
     let depth = |&integration: &Integration| {
-        let own = base(&study.scene, integration, study.spacing);
+        let own = base(&study.setting, integration, study.spacing);
         distinct.iter().find(|(experiment, _)| *experiment == own).map(|(_, outcome)| (integration, outcome.depth))
     };
-    let depths: Vec<(Integration, f64)> = Integration::PLANAR.iter().filter_map(depth).collect();
+    let depths: Vec<(Integration, f64)> = study.setting.rules().iter().filter_map(depth).collect();
     let most = depths.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let least = depths.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let (most, least) = ((name(most.0), plain(most.1)), (name(least.0), plain(least.1)));
@@ -179,7 +181,7 @@ fn conclusion(study: &Stability) -> Option<String> {
 
 /// Every sweep, the law's limit, and the zero-energy modes.
 pub fn figure(study: &Stability) -> Figure {
-    let unit = study.scene.length_unit.as_str();
+    let unit = study.setting.length_unit.as_str();
     let same = |v: f64| v;
     let spacing = |e: &Entry, _: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(e.value.abscissa());
     let nodes = |e: &Entry, o: &ExperimentResult| (e.parameter == Parameter::Spacing).then_some(o.nodes as f64);
@@ -231,7 +233,7 @@ pub fn figure(study: &Stability) -> Figure {
     panels.retain(|p| p.series.iter().any(|s| !s.points.is_empty() || !s.failures.is_empty()));
     let conclusion = conclusion(study).unwrap_or_else(|| "Where methods stop".to_owned());
     Figure {
-        title: format!("{conclusion}: {} at spacing {}", study.scene.name, study.spacing),
+        title: format!("{conclusion}: {} at spacing {}", study.setting.name, study.spacing),
         caption: format!(
             "Paddle {} static; the needle is driven to {}, twice the scene's depth. After a title: mean depth over the \
              methods at the left → at the right end.",

@@ -56,11 +56,11 @@ impl Pairs {
 /// The claim's answer by element.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ClaimCounts {
-    /// Against linear triangles, which have the same nodes: equal spacing and equal degrees of freedom.
+    /// Against linear elements, which have the same nodes: equal spacing and equal degrees of freedom.
     pub linear: Pairs,
-    /// Against quadratic triangles of the same spacing, which have about four times the nodes.
+    /// Against quadratic elements of the same spacing, which have about four times the nodes, in space eight.
     pub quadratic_equal_spacing: Pairs,
-    /// Against quadratic triangles with as many nodes.
+    /// Against quadratic elements with as many nodes.
     pub quadratic_equal_nodes: Pairs,
     /// Runs whose law has a limit in compression, and those of them whose last state is compressed beyond it somewhere.
     pub beyond_limit: (usize, usize),
@@ -95,7 +95,7 @@ pub fn claim_counts(study: &Stability) -> ClaimCounts {
         let (m, e) = (m.1.nodes as f64, e.1.nodes as f64);
         (m - e).abs() <= EQUAL_NODES * m.max(e)
     };
-    let [linear, quadratic] = [Integration::FemT3, Integration::FemT6];
+    let [linear, quadratic] = study.setting.elements();
     let started: Vec<Run<'_, '_>> = distinct.iter().filter(|d| d.1.depth > 0.0).collect();
     let limited: Vec<(f64, &ExperimentResult)> =
         started.iter().filter_map(|(experiment, outcome)| Some((limit_of(study, experiment)?, *outcome))).collect();
@@ -118,31 +118,33 @@ pub(super) fn limit_of(study: &Stability, experiment: &Experiment) -> Option<f64
 
 /// One screen: depths by integration rule and parameter, and the claim's answer.
 pub fn summary(study: &Stability) -> String {
-    let scene = &study.scene;
+    let setting = &study.setting;
     let mut out = format!(
         "{} · paddle {} static · needle driven to {} at most, twice the scene's depth · {} runs in {} rows\n\n",
-        scene.name,
+        setting.name,
         study.paddle,
-        f64::from(super::probe::BEYOND) * scene.needle.depth,
+        f64::from(super::probe::BEYOND) * setting.depth,
         study.distinct().len(),
         study.rows.len()
     );
     write_depths(study, &mut out);
     write_claim(study, &mut out);
-    write_zero_energy(study, &mut out);
+    if !study.zero_energy.is_empty() {
+        write_zero_energy(study, &mut out);
+    }
     out
 }
 
 /// Depths by integration rule and parameter.
 fn write_depths(study: &Stability, out: &mut String) {
     let _ = write!(out, "{:<26}", "depth reached");
-    for &integration in Integration::PLANAR {
+    for &integration in study.setting.rules() {
         let _ = write!(out, "{:>9}", integration.name());
     }
     out.push('\n');
     let mut line = |label: &str, pick: &dyn Fn(&super::Entry) -> bool| {
         let _ = write!(out, "{label:<26}");
-        for &integration in Integration::PLANAR {
+        for &integration in study.setting.rules() {
             let depths: Vec<f64> = study
                 .rows
                 .iter()
@@ -189,7 +191,7 @@ fn write_claim(study: &Stability, out: &mut String) {
         "\n\"Meshfree is more stable than finite elements under large deformation\" (5 % counts as the same):\n",
     );
     for (what, p) in [
-        ("linear triangles, same nodes", v.linear),
+        ("linear elements, same nodes", v.linear),
         ("quadratic, same spacing", v.quadratic_equal_spacing),
         ("quadratic, as many nodes", v.quadratic_equal_nodes),
     ] {

@@ -9,6 +9,8 @@ pub mod bloch;
 pub mod law_limit;
 pub mod plan;
 pub mod probe;
+pub mod probe_space;
+pub mod setting;
 pub mod zero_energy;
 
 mod chart;
@@ -19,10 +21,12 @@ use crate::discretization::Resolution;
 use crate::model::ModelError;
 use crate::parallel;
 use crate::scene::Scene;
+use crate::scene::space::SpaceScene;
 use crate::study::extent::Extent;
 use law_limit::{Lateral, limit_stretch};
 use plan::{Entry, Experiment};
 use probe::ExperimentResult;
+use setting::Setting;
 use zero_energy::ZeroEnergy;
 
 pub use chart::figure;
@@ -44,7 +48,7 @@ pub struct LawLimit {
 #[derive(Debug, Clone)]
 pub struct Stability {
     /// The scene.
-    pub scene: Scene,
+    pub setting: Setting,
     /// Spacing that the sweeps are made at, length units.
     pub spacing: f64,
     /// Index of the paddle that was attached, static.
@@ -53,7 +57,7 @@ pub struct Stability {
     pub rows: Vec<(Entry, ExperimentResult)>,
     /// Limits of the scene's law, and of the law with every c that was tried.
     pub limits: Vec<LawLimit>,
-    /// Zero-energy modes by method.
+    /// Zero-energy modes by method; in space they are not measured.
     pub zero_energy: Vec<ZeroEnergy>,
 }
 
@@ -73,6 +77,7 @@ impl Stability {
 /// A study with its runs known, to say how many there are before they start.
 #[derive(Debug)]
 pub struct Plan {
+    setting: Setting,
     entries: Vec<Entry>,
     /// Settings that differ, finest first, so that long runs do not come last.
     experiments: Vec<Experiment>,
@@ -80,8 +85,8 @@ pub struct Plan {
 
 impl Plan {
     /// What the study of a scene will run. Empty when the scene's resolution is not a spacing.
-    pub fn new(scene: &Scene, extent: Extent) -> Self {
-        let entries = plan::entries(scene, extent);
+    pub fn new(setting: Setting, extent: Extent) -> Self {
+        let entries = plan::entries(&setting, extent);
         let mut experiments: Vec<Experiment> = Vec::new();
         for entry in &entries {
             if !experiments.contains(&entry.experiment) {
@@ -89,7 +94,7 @@ impl Plan {
             }
         }
         experiments.sort_by(|a, b| a.spacing.total_cmp(&b.spacing));
-        Self { entries, experiments }
+        Self { setting, entries, experiments }
     }
 
     /// Number of runs.
@@ -109,12 +114,40 @@ impl Plan {
         threads: usize,
         progress: &(dyn Fn() + Sync),
     ) -> Result<Stability, ModelError> {
-        let Resolution::Spacing(spacing) = scene.discretization.resolution else {
+        let place = scene.paddle_position(paddle)?;
+        let mut study = self.with(paddle, threads, progress, &|experiment| probe::run(scene, place, experiment))?;
+        study.zero_energy = zero_energy::measure(scene, study.spacing)?;
+        Ok(study)
+    }
+
+    /// The same of a scene in space.
+    ///
+    /// # Errors
+    /// As [`Plan::run`].
+    pub fn run_in_space(
+        &self,
+        scene: &SpaceScene,
+        paddle: u32,
+        threads: usize,
+        progress: &(dyn Fn() + Sync),
+    ) -> Result<Stability, ModelError> {
+        let place = scene.paddle_position(paddle)?;
+        let probe = |experiment: &Experiment| probe_space::run_in_space(scene, place, experiment);
+        self.with(paddle, threads, progress, &probe)
+    }
+
+    fn with(
+        &self,
+        paddle: u32,
+        threads: usize,
+        progress: &(dyn Fn() + Sync),
+        probe: &(dyn Fn(&Experiment) -> ExperimentResult + Sync),
+    ) -> Result<Stability, ModelError> {
+        let Resolution::Spacing(spacing) = self.setting.discretization.resolution else {
             return Err(ModelError::NoSpacing);
         };
-        let place = scene.paddle_position(paddle)?;
         let outcomes = parallel::map(self.experiments.len(), threads, |i| {
-            let outcome = probe::run(scene, place, &self.experiments[i]);
+            let outcome = probe(&self.experiments[i]);
             progress();
             outcome
         });
@@ -130,15 +163,15 @@ impl Plan {
             spacing,
             paddle,
             rows,
-            limits: limits(scene, &self.entries),
-            zero_energy: zero_energy::measure(scene, spacing)?,
-            scene: scene.clone(),
+            limits: limits(&self.setting, &self.entries),
+            zero_energy: Vec::new(),
+            setting: self.setting.clone(),
         })
     }
 }
 
 /// Limits of the scene's own law, then of those with every c of the plan.
-fn limits(scene: &Scene, entries: &[Entry]) -> Vec<LawLimit> {
+fn limits(setting: &Setting, entries: &[Entry]) -> Vec<LawLimit> {
     let mut values: Vec<f64> = entries.iter().filter_map(|e| e.experiment.c).collect();
     values.sort_by(f64::total_cmp);
     values.dedup();
@@ -146,8 +179,8 @@ fn limits(scene: &Scene, entries: &[Entry]) -> Vec<LawLimit> {
         .chain(values.into_iter().map(Some))
         .filter_map(|c| {
             let law = match c {
-                None => scene.material.clone(),
-                Some(c) => scene.material.with_exponential_factor(c)?.ok()?,
+                None => setting.material.clone(),
+                Some(c) => setting.material.with_exponential_factor(c)?.ok()?,
             };
             let at = |lateral| limit_stretch(&law, lateral);
             Some(LawLimit { c, confined: at(Lateral::Confined), free: at(Lateral::Free) })

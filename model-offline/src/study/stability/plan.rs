@@ -1,8 +1,8 @@
 //! What is varied: one parameter at a time around the scene's own setting.
 
+use super::setting::Setting;
 use crate::discretization::{Integration, Method, Resolution};
 use crate::material::Material;
-use crate::scene::Scene;
 use crate::study::extent::Extent;
 use std::fmt;
 use strum::{Display, IntoStaticStr, VariantArray};
@@ -153,9 +153,9 @@ pub struct Entry {
 }
 
 /// The scene's own setting with a method at a spacing.
-pub fn base(scene: &Scene, integration: Integration, spacing: f64) -> Experiment {
+pub fn base(setting: &Setting, integration: Integration, spacing: f64) -> Experiment {
     Experiment {
-        method: Method { integration, ..scene.discretization.method },
+        method: setting.method(integration),
         spacing,
         jitter: 0.0,
         seed: 0,
@@ -163,7 +163,7 @@ pub fn base(scene: &Scene, integration: Integration, spacing: f64) -> Experiment
         poisson: None,
         c: None,
         barrier: None,
-        increments: scene.needle.increments,
+        increments: setting.increments,
         line_search: true,
         cutback: true,
     }
@@ -208,28 +208,46 @@ impl Values {
             barrier: &[0.0, 0.1, 1.0],
         }
     }
-}
 
-/// Every row of the study of a scene, in the order of the files. Quick, it takes fewer values; in full it
-///  repeats
-/// every sweep but that of the spacing at half the scene's spacing.
-pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
-    let Resolution::Spacing(spacing) = scene.discretization.resolution else { return Vec::new() };
-    let factors = extent.choose(&[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25] as &[f64], &[2.0, 1.0, 0.5]);
-    let mut entries = Vec::new();
-    for &integration in Integration::PLANAR {
-        for factor in factors {
-            // 0.15, not 0.15000000000000002.
-            let experiment = base(scene, integration, (1e12 * spacing * factor).round() / 1e12);
-            entries.push(Entry { parameter: Parameter::Spacing, value: Value::Number(experiment.spacing), experiment });
-        }
-        let values = extent.choose(Values::full(), Values::few());
-        sweeps(scene, base(scene, integration, spacing), &values, &mut entries);
-        if extent == Extent::Full {
-            sweeps(scene, base(scene, integration, 0.5 * spacing), &Values::few(), &mut entries);
+    /// In space a run takes minutes where it takes seconds in the plane.
+    fn in_space(extent: Extent) -> Self {
+        Self {
+            support: extent.choose(vec![1.2, 1.6, 2.0, 2.4], vec![1.2, 2.0]),
+            contrast: extent.choose(&[1.0, 10.0, 100.0, 1e4, 1e6], &[1.0, 1e6]),
+            poisson: extent.choose(&[0.2, 0.4, 0.49, 0.4999], &[0.2, 0.499]),
+            c: extent.choose(&[0.0, 0.779, 10.0, 100.0, 1000.0], &[0.0, 0.779, 1000.0]),
+            increments: extent.choose(&[1, 5, 10, 20], &[1, 5]),
+            ..Self::few()
         }
     }
-    let key = |e: &Entry| (e.parameter, Integration::PLANAR.iter().position(|m| *m == e.experiment.method.integration));
+}
+
+/// Every row of the study of a scene, in the order of the files. Quick, it takes fewer values; in full it repeats in the plane
+/// every sweep but that of the spacing at half the scene's spacing. In space nodes are not moved at random.
+pub fn entries(setting: &Setting, extent: Extent) -> Vec<Entry> {
+    let Resolution::Spacing(spacing) = setting.discretization.resolution else { return Vec::new() };
+    let is_planar = setting.dimension == 2;
+    let factors: &[f64] = match (is_planar, extent) {
+        (true, Extent::Full) => &[2.0, 1.5, 1.0, 0.75, 0.5, 0.375, 0.25],
+        (true, Extent::Quick) => &[2.0, 1.0, 0.5],
+        // Lattices halve: between two of these there is no other mesh.
+        (false, Extent::Full) => &[2.0, 1.0, 0.5],
+        (false, Extent::Quick) => &[2.0, 1.0],
+    };
+    let mut entries = Vec::new();
+    for &integration in setting.rules() {
+        for factor in factors {
+            // 0.15, not 0.15000000000000002.
+            let experiment = base(setting, integration, (1e12 * spacing * factor).round() / 1e12);
+            entries.push(Entry { parameter: Parameter::Spacing, value: Value::Number(experiment.spacing), experiment });
+        }
+        let values = if is_planar { extent.choose(Values::full(), Values::few()) } else { Values::in_space(extent) };
+        sweeps(setting, base(setting, integration, spacing), &values, &mut entries);
+        if is_planar && extent == Extent::Full {
+            sweeps(setting, base(setting, integration, 0.5 * spacing), &Values::few(), &mut entries);
+        }
+    }
+    let key = |e: &Entry| (e.parameter, setting.rules().iter().position(|m| *m == e.experiment.method.integration));
     entries.sort_by(|a, b| {
         key(a)
             .cmp(&key(b))
@@ -244,13 +262,13 @@ pub fn entries(scene: &Scene, extent: Extent) -> Vec<Entry> {
 const PAPER_SHEAR_MODULUS: f64 = 319.279;
 
 /// What the values of c are multiplied by: c is a stress, and means nothing without the others of its law.
-fn stress_scale(scene: &Scene) -> f64 {
-    let scale = Material::<2>::rest_shear_modulus(&scene.material) / PAPER_SHEAR_MODULUS;
+fn stress_scale(setting: &Setting) -> f64 {
+    let scale = Material::<2>::rest_shear_modulus(&setting.material) / PAPER_SHEAR_MODULUS;
     // 1, not 0.9999999999999998.
     (1e12 * scale).round() / 1e12
 }
 
-fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>) {
+fn sweeps(setting: &Setting, base: Experiment, values: &Values, out: &mut Vec<Entry>) {
     let mut push =
         |parameter, value, experiment| out.push(Entry { parameter, value: Value::Number(value), experiment });
     if !base.method.integration.is_element() {
@@ -258,24 +276,25 @@ fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>
             push(Parameter::Support, support, Experiment { method: Method { support, ..base.method }, ..base });
         }
     }
-    for &percent in values.jitter {
+    // What is a lattice in space is refined at patches.
+    for &percent in if setting.dimension == 2 { values.jitter } else { &[] } {
         // Without jitter every seed gives the same nodes.
         for seed in 0..if percent == 0.0 { 1 } else { values.seeds } {
             push(Parameter::Jitter, percent, Experiment { jitter: 0.01 * percent, seed, ..base });
         }
     }
-    if !scene.inclusions.is_empty() {
+    if setting.has_inclusions {
         for &contrast in values.contrast {
             push(Parameter::Contrast, contrast, Experiment { contrast: Some(contrast), ..base });
         }
     }
-    if scene.material.with_poisson_ratio(0.3).is_some() {
+    if setting.material.with_poisson_ratio(0.3).is_some() {
         for &poisson in values.poisson {
             push(Parameter::Poisson, poisson, Experiment { poisson: Some(poisson), ..base });
         }
     }
-    if scene.material.with_exponential_factor(0.0).is_some() {
-        for c in values.c.iter().map(|c| c * stress_scale(scene)) {
+    if setting.material.with_exponential_factor(0.0).is_some() {
+        for c in values.c.iter().map(|c| c * stress_scale(setting)) {
             push(Parameter::C, c, Experiment { c: Some(c), ..base });
         }
     }
@@ -297,10 +316,10 @@ fn sweeps(scene: &Scene, base: Experiment, values: &Values, out: &mut Vec<Entry>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::BUNDLED;
+    use crate::scene::{BUNDLED, Scene};
 
     fn swept(scene: &Scene) -> Vec<f64> {
-        let all = entries(scene, Extent::Quick);
+        let all = entries(&Setting::from(scene), Extent::Quick);
         let mut factors: Vec<f64> =
             all.iter().filter(|e| e.parameter == Parameter::C).filter_map(|e| e.experiment.c).collect();
         factors.sort_by(f64::total_cmp);

@@ -4,12 +4,12 @@ use super::plan::Experiment;
 use crate::discretization::Planar;
 use crate::discretization::nodes::lattice::lattice_nodes;
 use crate::geometry::{Location, Point2, distance_to_polyline};
-use crate::material::{Law, Material as _, MaterialError};
+use crate::material::{Law, Material, MaterialError, Tensor4};
 use crate::model::{ModelError, ModelFailure, TissueModel};
 use crate::random::SplitMix64;
 use crate::scene::Scene;
-use crate::solver::equilibrium::NewtonSettings;
-use nalgebra::{Matrix2, Vector2};
+use crate::solver::equilibrium::{Failure, NewtonSettings};
+use nalgebra::{Matrix2, SMatrix, Vector2};
 
 /// How far beyond the scene's depth the needle is driven.
 pub const BEYOND: u32 = 2;
@@ -47,13 +47,20 @@ pub struct ExperimentResult {
     /// Smallest eigenvalue of the acoustic tensor Q_ik = N_J A_iJkL N_L over all directions N and all integration points of
     /// the last converged state, over that at rest. Not above zero: strong ellipticity is lost.
     pub ellipticity: f64,
-    /// Strain energy of the last converged state, per unit thickness.
+    /// Strain energy of the last converged state, in the plane per unit thickness.
     pub energy: f64,
 }
 
-/// Runs an experiment with the paddle at this place of the scene's list static.
-pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentResult {
-    let stopped = |nodes: usize, error: ModelError| ExperimentResult {
+impl ExperimentResult {
+    /// The law is not stable at rest: nothing was run.
+    pub(super) fn unstable_law(error: MaterialError) -> Self {
+        Self { reason: StopReason::UnstableLaw, ..stopped(0, &error.into()) }
+    }
+}
+
+/// What comes of a run that did not begin.
+pub(super) fn stopped(nodes: usize, error: &ModelError) -> ExperimentResult {
+    ExperimentResult {
         nodes,
         depth: 0.0,
         reason: StopReason::Model(error.kind()),
@@ -61,36 +68,26 @@ pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentR
         min_stretch: 1.0,
         ellipticity: 1.0,
         energy: 0.0,
-    };
+    }
+}
+
+/// Runs an experiment with the paddle at this place of the scene's list static.
+pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentResult {
     let scene = match varied(scene, experiment) {
         Ok(scene) => scene,
-        Err(error) => {
-            return ExperimentResult { reason: StopReason::UnstableLaw, ..stopped(0, error.into()) };
-        }
+        Err(error) => return ExperimentResult::unstable_law(error),
     };
     let nodes = jittered(&scene, experiment);
     let count = nodes.len();
     let model = match with_nodes(&scene, nodes, experiment) {
         Ok(model) => model,
-        Err(error) => return stopped(count, error),
+        Err(error) => return stopped(count, &error),
     };
-    let settings = NewtonSettings {
-        line_search: experiment.line_search,
-        max_cutbacks: if experiment.cutback { MAX_CUTBACKS } else { 0 },
-        ..NewtonSettings::default()
-    };
-    let mut body = match model.body(Some(paddle), settings) {
+    let mut body = match model.body(Some(paddle), newton_settings(experiment)) {
         Ok(body) => body,
-        Err(failure) => return stopped(model.nodes(), failure.into()),
+        Err(failure) => return stopped(model.nodes(), &failure.into()),
     };
-    let (mut reason, mut detail) = (StopReason::Reached, String::new());
-    for increment in 1..=BEYOND * experiment.increments {
-        let depth = scene.needle.depth * f64::from(increment) / f64::from(experiment.increments);
-        if let Err(failure) = body.drive(depth, Vector2::zeros()) {
-            (reason, detail) = (StopReason::Model(ModelFailure::Solve(failure.reason)), failure.detail);
-            break;
-        }
-    }
+    let (reason, detail) = pushed(scene.needle.depth, experiment, |depth| body.drive(depth, Vector2::zeros()));
     let gradients = body.equilibrium().state().displacement_gradients();
     ExperimentResult {
         nodes: model.nodes(),
@@ -105,6 +102,37 @@ pub fn run(scene: &Scene, paddle: usize, experiment: &Experiment) -> ExperimentR
     }
 }
 
+/// How the experiment looks for equilibria.
+pub(super) fn newton_settings(experiment: &Experiment) -> NewtonSettings {
+    NewtonSettings {
+        line_search: experiment.line_search,
+        max_cutbacks: if experiment.cutback { MAX_CUTBACKS } else { 0 },
+        ..NewtonSettings::default()
+    }
+}
+
+/// Drives a needle on in the experiment's increments until something gives or [`BEYOND`] times `depth` is reached; why it ended,
+/// with the numbers behind it.
+pub(super) fn pushed(
+    depth: f64,
+    experiment: &Experiment,
+    mut drive: impl FnMut(f64) -> Result<(), Failure>,
+) -> (StopReason, String) {
+    for increment in 1..=BEYOND * experiment.increments {
+        if let Err(failure) = drive(depth * f64::from(increment) / f64::from(experiment.increments)) {
+            return (StopReason::Model(ModelFailure::Solve(failure.reason)), failure.detail);
+        }
+    }
+    (StopReason::Reached, String::new())
+}
+
+/// Acoustic tensor Q_ik = n_j A_ijkl n_l.
+pub(super) fn acoustic<const D: usize>(a: &Tensor4<D>, n: &[f64; D]) -> SMatrix<f64, D, D> {
+    SMatrix::from_fn(|i, k| {
+        (0..D).flat_map(|j| (0..D).map(move |l| (j, l))).map(|(j, l)| n[j] * a[i][j][k][l] * n[l]).sum()
+    })
+}
+
 /// Smallest principal stretch √(λmin(FᵀF)).
 fn smallest_stretch(h: &Matrix2<f64>) -> f64 {
     (Matrix2::identity() + h).singular_values().min()
@@ -116,10 +144,7 @@ fn smallest_acoustic(law: &Law, h: &Matrix2<f64>) -> f64 {
     (0..36)
         .map(|i| {
             let (sin, cos) = (f64::from(i) * std::f64::consts::PI / 36.0).sin_cos();
-            let n = [cos, sin];
-            let q: Matrix2<f64> = Matrix2::from_fn(|i, k| {
-                (0..2).flat_map(|j| (0..2).map(move |l| (j, l))).map(|(j, l)| n[j] * a[i][j][k][l] * n[l]).sum()
-            });
+            let q = acoustic(&a, &[cos, sin]);
             let (mean, half) = (0.5 * q.trace(), 0.5 * (q[(0, 0)] - q[(1, 1)]));
             mean - half.hypot(q[(0, 1)])
         })
@@ -128,7 +153,18 @@ fn smallest_acoustic(law: &Law, h: &Matrix2<f64>) -> f64 {
 
 /// The scene with the experiment's material and inclusions.
 pub(super) fn varied(scene: &Scene, experiment: &Experiment) -> Result<Scene, MaterialError> {
-    let mut law = scene.material.clone();
+    let mut scene = scene.clone();
+    match experiment.contrast {
+        None => scene.inclusions.clear(),
+        Some(contrast) => scene.inclusions.iter_mut().for_each(|i| i.stiffness = contrast),
+    }
+    scene.material = varied_law(&scene.material, experiment)?;
+    Ok(scene)
+}
+
+/// A law with the experiment's numbers.
+pub(super) fn varied_law(law: &Law, experiment: &Experiment) -> Result<Law, MaterialError> {
+    let mut law = law.clone();
     if let Some(poisson) = experiment.poisson {
         law = law.with_poisson_ratio(poisson).unwrap_or(Ok(law))?;
     }
@@ -139,13 +175,7 @@ pub(super) fn varied(scene: &Scene, experiment: &Experiment) -> Result<Scene, Ma
         let shear = law.tangent(&Matrix2::zeros())[0][1][0][1];
         law = law.with_barrier(share * shear)?;
     }
-    let mut scene = scene.clone();
-    match experiment.contrast {
-        None => scene.inclusions.clear(),
-        Some(contrast) => scene.inclusions.iter_mut().for_each(|i| i.stiffness = contrast),
-    }
-    scene.material = law;
-    Ok(scene)
+    Ok(law)
 }
 
 /// Lattice nodes, those inside the body moved at random; nodes on the boundary and on the needle stay.

@@ -2,6 +2,7 @@
 //! displacements that alternate from node to node.
 
 use super::plan::{self, Experiment};
+use super::setting::Setting;
 use super::{bloch, probe};
 use crate::discretization::cells::triangulation::triangulate;
 use crate::discretization::quadrature::finite_element::Elements;
@@ -50,10 +51,11 @@ pub struct ZeroEnergy {
 /// # Errors
 /// [`ModelError`] when a model cannot be made.
 pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelError> {
+    let setting = &Setting::from(scene);
     [0.0, 0.4]
         .into_iter()
         .flat_map(|jitter| {
-            Integration::PLANAR.iter().map(move |m| Experiment { jitter, ..plan::base(scene, *m, spacing) })
+            Integration::PLANAR.iter().map(move |m| Experiment { jitter, ..plan::base(setting, *m, spacing) })
         })
         .map(|experiment| measure_one(scene, &experiment))
         .collect()
