@@ -113,7 +113,7 @@ fn options_and_commands_of_the_plane_say_so() {
         let (code, said, written) = place(text(), &options, folder.path());
         assert!(code == 2 && said.contains(expected) && written.is_none(), "{options:?}: {code} {said}");
     }
-    let output = program().args(["draw", "block", "-o", "a.svg"]).output().unwrap();
+    let output = program().args(["compare", "block"]).output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.code() == Some(2) && said.contains("dimension = 3"), "{said}");
     let output = program().args(["place", "paper", "--integration", "fem-t10", "--quiet"]).output().unwrap();

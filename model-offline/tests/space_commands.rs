@@ -265,7 +265,8 @@ fn options_that_do_not_belong_to_space_are_refused() {
         (vec!["solve", "paper", "--depth", "0.01", "--paddle", "3", "--paddle", "4"], "names 2 paddles"),
         (vec!["solve", "paper", "--depth", "0.01", "--paddle", "3", "--paddle-displacement", "0,0,0"], "two finite"),
         (vec!["new", "--dimension", "3", "--svg", "a.svg"], "--svg"),
-        (vec!["draw", "block", "-o", "a.svg"], "`check`, `solve` and `place`"),
+        (vec!["sweep", "block", "--out", "swept"], "all commands but `sweep` and `compare`"),
+        (vec!["compare", "block"], "all commands but `sweep` and `compare`"),
     ] {
         let (code, _, said) = run(&options, folder.path());
         let said = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");

@@ -32,7 +32,7 @@ pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
         return Err(source.error(
             dimension.span(),
             format!("dimension {} is not available here", dimension.get()),
-            "use dimension = 2 (plane strain); scenes with dimension = 3 are for `check`, `solve` and `place`",
+            "use dimension = 2 (plane strain); scenes with dimension = 3 are for all commands but `sweep` and `compare`",
         ));
     }
     let file: SceneFile = toml::from_str(source.text).map_err(|error| {
