@@ -129,6 +129,13 @@ fn bores_voids_slots_and_rods_are_in_the_mesh_however_coarse_it_is() {
         ),
         (with("difference", &sphere(0.08)), -disc(0.08) * 4.0 / 3.0 * 0.08, 0.85),
         (with("difference", &sphere(0.01)), -disc(0.01) * 4.0 / 3.0 * 0.01, 0.5),
+        // Just under a face, whose points must not take their place.
+        (
+            with("difference", "{ sphere = { centre = [0.5, 0.5, 0.96], radius = 0.015 } }"),
+            -disc(0.015) * 4.0 / 3.0 * 0.015,
+            0.5,
+        ),
+        (with("difference", &cylinder("[0.0, 0.3, 0.97]", "[1.0, 0.3, 0.97]", 0.01)), -disc(0.01), 0.6),
         (with("difference", slot), -0.04 * 0.313 * (0.873 - 0.6217), 1.0 - 1e-9),
         (with("union", &cylinder("[0.8, 0.2, 0.9]", "[0.8, 0.2, 1.3]", 0.03)), disc(0.03) * 0.3, 0.82),
     ] {

@@ -6,6 +6,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 
+use firmware::scalar::ScalarKind;
 use firmware::{Faults, Mode};
 use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
@@ -26,12 +27,13 @@ use super::insertion::{Extras, Label};
 use super::result::{FORMAT, RecordingResult};
 use super::space_bodies::{self, CaseBodies, SpaceBodies};
 use super::strategy::Strategy;
+use crate::exchange::board::{Control, Image, Processor};
 use crate::record::export::foxglove::{Scenery as _, SpaceStage};
 use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
 use crate::record::recording::{Record, Recording};
 use crate::runtime::accounting::ledger::LedgerResult;
-use crate::runtime::executor::{AnyTable, Hardware, image_for};
+use crate::runtime::executor::{AnyTable, Hardware};
 use crate::runtime::names;
 use crate::runtime::plant::PlantLoop;
 use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
@@ -286,7 +288,20 @@ impl<'a> SpaceComparison<'a> {
             ],
         };
         let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
-        Ok(Self { scene, options: *options, simulation, homogeneous, inclusion, wanted, start })
+        let prepared = Self { scene, options: *options, simulation, homogeneous, inclusion, wanted, start };
+        if options.hardware == Hardware::Qemu {
+            prepared.build_images()?;
+        }
+        Ok(prepared)
+    }
+
+    /// Builds what the board is to run, before anybody waits for it: compiling takes a while the first time.
+    fn build_images(&self) -> Result<(), SimError> {
+        for (_, believed) in &self.wanted {
+            let control = Control::of(3, self.of(*believed).optimum.dynamic.len(), ScalarKind::F64)?;
+            Image::build_for(control, ScalarKind::F64, Processor::Double)?;
+        }
+        Ok(())
     }
 
     fn of(&self, variant: TissueVariant) -> &Tissue {
@@ -447,10 +462,6 @@ fn case(
         Ok((table, still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
     })?;
     let bytes = table.to_bytes()?;
-    if hardware == Hardware::Qemu {
-        // Before anybody waits for the controller: compiling takes a while the first time.
-        image_for(&bytes)?;
-    }
     let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
     let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
         let is_watched = spectator.is_some();

@@ -213,7 +213,7 @@ pub fn on_emulated_board(
 ///
 /// # Errors
 /// [`BoardError`].
-pub fn image_for(table: &[u8]) -> Result<Image, BoardError> {
+fn image_for(table: &[u8]) -> Result<Image, BoardError> {
     let (control, scalar) = match Header::read(table) {
         Ok(header) => (Control::of_table(&header)?, header.scalar),
         Err(_) => (Control::Plane, ScalarKind::F64),

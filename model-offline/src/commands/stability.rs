@@ -53,7 +53,7 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
         Some(index) => scene.paddle_position(index).map(|_| index).map_err(ModelError::from)?,
         None => model_with_paddle(&scene.without_inclusions(), None)?.1,
     };
-    studied(args, scene.into(), &|plan, progress| plan.run(scene, paddle, args.run.threads(), progress))
+    studied(args, scene.into(), |plan, progress| plan.run(scene, paddle, args.run.threads(), progress))
 }
 
 fn check_spacing(discretization: &Discretization) -> Result<(), CliError> {
@@ -78,14 +78,14 @@ fn run_in_space(args: &StabilityArgs, mut scene: SpaceScene) -> Result<(), CliEr
         None => best_single(&scene.without_inclusions())?,
     };
     let setting = Setting::in_space(scene, args.support);
-    studied(args, setting, &|plan, progress| plan.run_in_space(scene, paddle, args.run.threads(), progress))
+    studied(args, setting, |plan, progress| plan.run_in_space(scene, paddle, args.run.threads(), progress))
 }
 
 /// Runs a plan behind a progress bar and writes what comes of it.
 fn studied(
     args: &StabilityArgs,
     setting: Setting,
-    run: &dyn Fn(&Plan, &(dyn Fn() + Sync)) -> Result<Stability, ModelError>,
+    run: impl FnOnce(&Plan, &(dyn Fn() + Sync)) -> Result<Stability, ModelError>,
 ) -> Result<(), CliError> {
     output::make_folder(&args.out)?;
     let plan = Plan::new(setting, Extent::of_flag(args.quick));

@@ -103,6 +103,11 @@ pub enum ModelError {
         /// Best estimate.
         reached: f64,
     },
+    /// A tolerance in space, where no two meshes could be compared.
+    #[error(
+        "no two meshes that differ on every patch can be afforded, so that nothing is known of errors: leave out details that are much finer than the patches, or give a level or spacing in [discretization]"
+    )]
+    NothingToCompare,
     /// The scene's resolution is a tolerance where nodes are needed.
     #[error("the resolution is a tolerance: refine to it with `placement::discretise`")]
     ToleranceIsNoResolution,
@@ -187,7 +192,9 @@ impl ModelError {
             Self::Solve(failure) => ModelFailure::Solve(failure.reason),
             Self::NothingConstrained(_) => ModelFailure::NothingConstrained,
             Self::Uncontrollable { .. } | Self::NoPaddleControls => ModelFailure::SingularJacobian,
-            Self::TooManyNodes { .. } | Self::ToleranceNotReached { .. } => ModelFailure::ToleranceNotReached,
+            Self::TooManyNodes { .. } | Self::ToleranceNotReached { .. } | Self::NothingToCompare => {
+                ModelFailure::ToleranceNotReached
+            }
             _ => ModelFailure::Unsupported,
         }
     }

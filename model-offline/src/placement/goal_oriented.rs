@@ -298,8 +298,9 @@ fn left_open(coarse: &RestResponse, fine: &RestResponse, shown: Option<f64>) -> 
             let share = own.max(shown.map_or(UNKNOWN_SHARE, |shown| REMEMBERED * shown));
             Left { open: (OPEN * difference).max(SIDEWAYS * sideways).max(share * amplified), share }
         }
-        (None, None) => Left { open: 0.0, share: 0.0 },
-        _ => Left { open: f64::INFINITY, share: 0.0 },
+        // Nothing has been shown of the share.
+        (None, None) => Left { open: 0.0, share: shown.unwrap_or(UNKNOWN_SHARE) },
+        _ => Left { open: f64::INFINITY, share: shown.unwrap_or(UNKNOWN_SHARE) },
     }
 }
 
@@ -377,6 +378,12 @@ mod tests {
         for (shown, share) in [(None, UNKNOWN_SHARE), (Some(0.4), 0.2), (Some(0.2), 0.1), (Some(0.0), 0.0)] {
             let left = left(shown);
             assert!((left.share - share).abs() < 1e-9 && (left.open - share * most).abs() < 1e-9, "{shown:?}");
+        }
+        // Where one of the two cannot control the target, nothing is known, and nothing learnt.
+        let singular = of(Matrix2::new(0.3, 0.1, 0.3, 0.1));
+        for (shown, share) in [(None, UNKNOWN_SHARE), (Some(0.4), 0.4)] {
+            let left = left_open(&singular, &of(fine), shown);
+            assert!(left.open.is_infinite() && left.share == share, "{shown:?}: {}", left.share);
         }
         // What this pair shows counts whole.
         let harmful = Matrix2::new(1e-4, 0.0, 0.0, 0.0);

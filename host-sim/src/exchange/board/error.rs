@@ -28,7 +28,7 @@ pub enum BoardError {
         /// The table's dimension of space.
         dimension: u8,
         /// Its paddles.
-        paddles: u16,
+        paddles: usize,
         /// What it is computed in.
         scalar: &'static str,
     },

@@ -67,20 +67,25 @@ impl Control {
         }
     }
 
-    /// Whether there is an image for a table with such a header.
+    /// What an image is to control with a table of so many paddles in so many dimensions.
+    ///
+    /// # Errors
+    /// [`BoardError::NoImage`].
+    pub fn of(dimension: u8, paddles: usize, scalar: ScalarKind) -> Result<Self, BoardError> {
+        match (dimension, paddles, scalar) {
+            (2, 1, _) => Ok(Self::Plane),
+            (3, 2, ScalarKind::F64) => Ok(Self::SpacePair),
+            _ => Err(BoardError::NoImage { dimension, paddles, scalar: scalar.name() }),
+        }
+    }
+
+    /// What the image for a table with such a header controls.
     ///
     /// # Errors
     /// [`BoardError::NoImage`].
     pub fn of_table(header: &Header) -> Result<Self, BoardError> {
         let Header { dimension, paddle_dof, scalar, .. } = *header;
-        match (dimension, paddle_dof, scalar) {
-            (2, 2, _) => Ok(Self::Plane),
-            (3, 6, ScalarKind::F64) => Ok(Self::SpacePair),
-            _ => {
-                let paddles = paddle_dof / u16::from(dimension).max(1);
-                Err(BoardError::NoImage { dimension, paddles, scalar: scalar.name() })
-            }
-        }
+        Self::of(dimension, usize::from(paddle_dof) / usize::from(dimension).max(1), scalar)
     }
 
     /// Dimension of space.

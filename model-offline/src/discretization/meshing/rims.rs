@@ -5,6 +5,7 @@ use super::mesh::TetMesh;
 use super::request::Request;
 use crate::geometry::{Implicit, Point};
 use rstar::RTree;
+use std::collections::BTreeMap;
 
 /// Points kept are at least this part of the spacing apart.
 const APART: f64 = 0.7;
@@ -86,27 +87,27 @@ impl<'a> Curves<'a> {
         let half = 0.5 * (high - low).max() + (self.spacing)(&middle);
         self.search(middle, half, &mut cubes);
         let mut corners: Vec<Point<3>> = Vec::new();
-        let mut along: Vec<Point<3>> = Vec::new();
+        let mut along: Vec<(usize, Point<3>)> = Vec::new();
         for (centre, half) in cubes {
             // Sheets that may meet the ball round this cube.
             let close = |k: &u16| self.features.level(*k, &centre).abs() < 2.0 * half;
-            let near: Vec<&Vec<u16>> = sets.iter().filter(|s| s.iter().all(close)).collect();
-            let found = |on: &[u16], all: &mut Vec<Point<3>>| {
-                let Some(x) = self.features.project(&centre, on) else { return };
+            let near: Vec<(usize, &Vec<u16>)> = sets.iter().enumerate().filter(|(_, s)| s.iter().all(close)).collect();
+            let found = |on: &[u16]| {
+                let x = self.features.project(&centre, on)?;
                 let free = self.features.tangents(&x, on).len();
-                if free == 3 - on.len() && (x - centre).norm() < 4.0 * half && belongs(&x) {
-                    all.push(x);
-                }
+                (free == 3 - on.len() && (x - centre).norm() < 4.0 * half && belongs(&x)).then_some(x)
             };
-            for (i, set) in near.iter().enumerate() {
-                found(set, &mut along);
-                let more = near[i + 1..].iter().flat_map(|s| s.iter().copied()).filter(|k| !set.contains(k));
+            for (i, (number, set)) in near.iter().enumerate() {
+                // Curves of one rim are one; surfaces beside each other may be those of different things.
+                let one = if set.len() == 1 { *number } else { 0 };
+                along.extend(found(set).map(|x| (one, x)));
+                let more = near[i + 1..].iter().flat_map(|(_, s)| s.iter().copied()).filter(|k| !set.contains(k));
                 let mut more: Vec<u16> = more.collect();
                 more.sort_unstable();
                 more.dedup();
                 let with = |k: u16| set.iter().copied().chain([k]).collect::<Vec<u16>>();
                 if set.len() == 2 {
-                    more.into_iter().for_each(|k| found(&with(k), &mut corners));
+                    corners.extend(more.into_iter().filter_map(|k| found(&with(k))));
                 }
             }
         }
@@ -140,16 +141,25 @@ impl<'a> Curves<'a> {
         }
     }
 
-    /// Corners once each, then points that keep away from them and from each other.
-    fn thin(&self, corners: Vec<Point<3>>, along: Vec<Point<3>>) -> Vec<Point<3>> {
-        let mut kept: RTree<[f64; 3]> = RTree::new();
+    /// Corners once each, then points that keep away from them and from others of the same number: a void beside a face is no
+    /// part of that face.
+    fn thin(&self, corners: Vec<Point<3>>, along: Vec<(usize, Point<3>)>) -> Vec<Point<3>> {
         let mut points = Vec::new();
-        let marked = corners.into_iter().map(|x| (x, 1e-3)).chain(along.into_iter().map(|x| (x, APART)));
-        for (x, apart) in marked {
-            let site = [x.x, x.y, x.z];
-            let distance = kept.nearest_neighbor(&site).map_or(f64::INFINITY, |p| (Point::from(*p) - x).norm());
-            if distance >= apart * (self.spacing)(&x) {
-                kept.insert(site);
+        let mut corners_kept: RTree<[f64; 3]> = RTree::new();
+        let mut kept: BTreeMap<usize, RTree<[f64; 3]>> = BTreeMap::new();
+        let distance = |kept: &RTree<[f64; 3]>, x: &Point<3>| {
+            kept.nearest_neighbor(&[x.x, x.y, x.z]).map_or(f64::INFINITY, |p| (Point::from(*p) - x).norm())
+        };
+        for x in corners {
+            if distance(&corners_kept, &x) >= 1e-3 * (self.spacing)(&x) {
+                corners_kept.insert([x.x, x.y, x.z]);
+                points.push(x);
+            }
+        }
+        for (number, x) in along {
+            let own = kept.entry(number).or_default();
+            if distance(&corners_kept, &x).min(distance(own, &x)) >= APART * (self.spacing)(&x) {
+                own.insert([x.x, x.y, x.z]);
                 points.push(x);
             }
         }

@@ -227,7 +227,12 @@ impl Reference {
             }
             coarser = Some((on_patches, rest));
         }
-        Err(ModelError::ToleranceNotReached { tolerance: open, reached })
+        // No two meshes that could be afforded differ on every patch.
+        if reached.is_infinite() {
+            Err(ModelError::NothingToCompare)
+        } else {
+            Err(ModelError::ToleranceNotReached { tolerance: open, reached })
+        }
     }
 }
 

@@ -24,7 +24,7 @@ pub struct Setting {
     pub has_inclusions: bool,
     /// The scene's own method and spacing.
     pub discretization: Discretization,
-    /// Kernel support over spacing of every meshfree rule; in space none is each rule's own.
+    /// Kernel support over spacing of every meshfree rule; in space none is each rule's own, and the scene's for its rule.
     pub support: Option<f64>,
 }
 
@@ -76,7 +76,11 @@ impl Setting {
 
     /// A rule with the rest of the scene's method.
     pub(super) fn method(&self, integration: Integration) -> Method {
+        let own = self.discretization.method;
+        if integration == own.integration && self.support.is_none() {
+            return own;
+        }
         let support = self.support.unwrap_or_else(|| integration.default_support_in_space());
-        Method { integration, support, ..self.discretization.method }
+        Method { integration, support, ..own }
     }
 }

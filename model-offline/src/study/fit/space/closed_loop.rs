@@ -1,6 +1,7 @@
 //! The insertion into the body with a controller that has the slice's table: followed, not estimated.
 
 use super::comparison::{Frame, Left};
+use super::verdict::NEGLIGIBLE;
 use crate::model::ModelError;
 use crate::model::space::SpaceBody;
 use crate::placement::PlacementStudy;
@@ -58,10 +59,11 @@ pub(super) fn follow(
     let settings = NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() };
     let (mut alone, mut fed) = (insertions.body(&[place], settings)?, insertions.body(&[place], settings)?);
     let frame = Frame::new(slice);
-    let orthogonal = &study.placement.no_paddle.static_study.orthogonal;
-    let enough = ENOUGH * study.placement.no_paddle.static_study.max_orthogonal;
+    let without_help = &study.placement.no_paddle.static_study;
+    let along = Vector3::from(study.placement.no_paddle.target_per_depth).norm() * scene.needle.depth;
+    let enough = ENOUGH * without_help.max_orthogonal.max(NEGLIGIBLE * along);
     let (mut found, mut offset): (Option<ClosedLoop>, Vector3<f64>) = (None, Vector3::zeros());
-    for (k, &depth) in table.static_study.depth.iter().enumerate().take(orthogonal.len()) {
+    for (k, &depth) in table.static_study.depth.iter().enumerate().take(without_help.orthogonal.len()) {
         let Some(unit) = correction(&frame, table, k) else { break };
         let forward = unit * -table.static_study.orthogonal[k];
         if alone.drive(depth, &[forward]).is_err() {
@@ -70,14 +72,15 @@ pub(super) fn follow(
         let (mut corrections, mut last) = (0, f64::INFINITY);
         let converges = loop {
             if fed.drive(depth, &[forward + offset]).is_err() {
-                break None;
+                // A loop that takes the body where it has no equilibrium does not converge; one without corrections is none.
+                break if corrections > 0 { Some(false) } else { None };
             }
             let error = fed.target_displacement().dot(&frame.normal);
             if error.abs() <= enough {
                 break Some(true);
             }
             // A loop that is led away may still end up somewhere: not here, where its paddle would be at its limit.
-            let is_away = error.abs() >= last || offset.norm() > limit;
+            let is_away = error.abs() >= last || (forward + offset).norm() > limit;
             if corrections == MOST_CORRECTIONS || is_away {
                 break Some(false);
             }
@@ -93,7 +96,7 @@ pub(super) fn follow(
             depth,
             table_alone: left(&alone),
             with_feedback: left(&fed),
-            without_help: orthogonal[k],
+            without_help: without_help.orthogonal[k],
             corrections: corrections.max(before.0),
             converges: converges && before.1,
         });

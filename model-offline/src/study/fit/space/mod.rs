@@ -39,6 +39,9 @@ use std::time::Instant;
 /// What the slice may be wrong by, of the tolerance: it costs next to nothing, and what it leaves open counts against it.
 const SLICE_SHARE: f64 = 0.1;
 
+/// No scene may ask for less.
+const TIGHTEST: f64 = 1e-4;
+
 /// What one of the two models is, and what it costs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FittedModel {
@@ -150,7 +153,7 @@ pub fn fit_in_space(
         Resolution::Tolerance(_) => run(&quadratic(tolerance))?,
         Resolution::Spacing(_) | Resolution::Level(_) => run(scene)?,
     };
-    let wanted = quadratic(SLICE_SHARE * tolerance);
+    let wanted = quadratic((SLICE_SHARE * tolerance).max(TIGHTEST));
     let best = |all: &[u32]| all.first().copied();
     let single = &study.placement.optimum_single;
     let optimum = BestPaddles { dynamic: best(&single.dynamic), fixture: best(&single.fixture) };

@@ -5,7 +5,7 @@ use serde::{Serialize, Serializer};
 use std::fmt;
 
 /// A way orthogonal to the needle below this part of the whole is none.
-const NEGLIGIBLE: f64 = 1e-3;
+pub(super) const NEGLIGIBLE: f64 = 1e-3;
 
 /// What is needed at the tolerance.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

@@ -175,7 +175,10 @@ fn named(paddles: &[u32]) -> String {
 
 fn model(model: &FittedModel) -> String {
     let level = model.level.map_or(String::new(), |level| format!(", level {level}"));
-    let error = model.error_estimate.map_or(String::new(), |error| format!(", estimated error {:.2} %", 100.0 * error));
+    let error = model.error_estimate.map_or_else(
+        || ", error unknown and not counted (no tolerance in the scene)".to_owned(),
+        |error| format!(", estimated error {:.2} %", 100.0 * error),
+    );
     format!(
         "{}{level}, {} nodes{error}; cost {} s by operations ({:.1} s, insertions included)",
         model.integration,
