@@ -221,7 +221,8 @@ fn small_steps_stop_where_a_column_buckles() {
     }
 }
 
-/// The column in space, square: it buckles to any side. The paddle is at its foot, where it holds nothing that the foot does not.
+/// The column in space, square: it buckles to any side. The paddle holds two sides just above its foot: on
+/// one side alone it would bend the column, which then gives way evenly.
 const COLUMN_IN_SPACE: &str = r#"
 [scene]
 name = "column"
@@ -244,7 +245,7 @@ increments = 10
 position = [102.5, 2.5, 25.0]
 [[paddle]]
 index = 7
-region = { box = { min = [100.0, 0.0, 0.0], max = [100.0, 5.0, 1.25] } }
+region = { box = { min = [99.0, 1.0, 0.5], max = [106.0, 4.0, 1.0] } }
 [discretization]
 spacing = 2.5
 "#;
@@ -262,11 +263,14 @@ fn a_column_in_space_buckles_where_euler_says() {
     let setting = Setting::in_space(&scene, None);
     let found = run_in_space(&scene, 0, &base(&setting, Integration::FemT10, 2.5));
     let euler = 4.0 * std::f64::consts::PI.powi(2) / 12.0 * 0.1_f64.powi(2);
-    assert!((found.depth / 50.0 / euler - 1.0).abs() < 0.04, "{found:?}, Euler {euler}");
-    let reason = ModelFailure::Solve(FailureReason::LostStability);
-    assert_eq!(found.reason, StopReason::Model(reason), "{found:?}");
-    // Compressed evenly but for the ends: the law itself is far from any limit.
-    assert!((0.94..1.0 - 0.8 * euler).contains(&found.min_stretch) && found.ellipticity > 0.9, "{found:?}");
+    // The paddle may shorten the column by its millimetre.
+    let over = found.depth / 50.0 / euler;
+    assert!((0.98..1.06).contains(&over), "{over}: {found:?}");
+    // Beyond it, or at it, where Newton's method does not come to rest.
+    let reasons = [FailureReason::LostStability, FailureReason::NotConverged];
+    assert!(reasons.map(|r| StopReason::Model(ModelFailure::Solve(r))).contains(&found.reason), "{found:?}");
+    // It is the column, not the law, that gives way: tissue is far from any limit even at the rims.
+    assert!(found.min_stretch < 1.0 - euler && found.ellipticity > 0.8, "{found:?}");
     // Strain energy of a bar: ½ E A L ε², E = 2μ.
     let bar = 0.5 * 10.0 * 25.0 * 50.0 * (found.depth / 50.0).powi(2);
     assert!((found.energy / bar - 1.0).abs() < 0.1, "{} {bar}", found.energy);
