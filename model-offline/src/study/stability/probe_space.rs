@@ -17,8 +17,11 @@ const DIRECTIONS: u32 = 120;
 
 /// Runs an experiment with the paddle at this place of the scene's list static. Nodes are those of a mesh of even edges, which is
 /// finer where a patch or an inclusion would not be seen; there is no jitter.
+///
+/// # Panics
+/// When the scene has no paddle at this place.
 pub fn run_in_space(scene: &SpaceScene, paddle: usize, experiment: &Experiment) -> ExperimentResult {
-    let scene = match varied(scene, experiment) {
+    let scene = match varied(scene, paddle, experiment) {
         Ok(scene) => scene,
         Err(error) => return ExperimentResult::unstable_law(error),
     };
@@ -26,7 +29,7 @@ pub fn run_in_space(scene: &SpaceScene, paddle: usize, experiment: &Experiment) 
         Ok(model) => model,
         Err(error) => return stopped(0, &error),
     };
-    let mut body = match model.body(&[paddle], newton_settings(experiment)) {
+    let mut body = match model.body(&[0], newton_settings(experiment)) {
         Ok(body) => body,
         Err(failure) => return stopped(model.nodes(), &failure.into()),
     };
@@ -54,9 +57,11 @@ fn model(scene: &SpaceScene, spacing: f64, method: Method) -> Result<SpaceModel,
     SpaceModel::on(&scene, &mesh)
 }
 
-/// The scene with the experiment's material and inclusions.
-fn varied(scene: &SpaceScene, experiment: &Experiment) -> Result<SpaceScene, MaterialError> {
+/// The scene with the experiment's material and inclusions, and one paddle alone: the mesh need not be fine at others.
+fn varied(scene: &SpaceScene, paddle: usize, experiment: &Experiment) -> Result<SpaceScene, MaterialError> {
     let mut scene = scene.clone();
+    scene.paddles = vec![scene.paddles[paddle].clone()];
+    scene.pairs.clear();
     match experiment.contrast {
         None => scene.inclusions.clear(),
         Some(contrast) => scene.inclusions.iter_mut().for_each(|i| i.stiffness = contrast),
