@@ -213,10 +213,11 @@ impl Values {
     fn in_space(extent: Extent) -> Self {
         Self {
             support: extent.choose(vec![1.2, 1.6, 2.0, 2.4], vec![1.2, 2.0]),
-            contrast: extent.choose(&[1.0, 10.0, 100.0, 1e4, 1e6], &[1.0, 1e6]),
-            poisson: extent.choose(&[0.2, 0.4, 0.49, 0.4999], &[0.2, 0.499]),
-            c: extent.choose(&[0.0, 0.779, 10.0, 100.0, 1000.0], &[0.0, 0.779, 1000.0]),
+            contrast: extent.choose(&[1.0, 10.0, 100.0, 1e4, 1e6], &[1.0, 1e4]),
+            poisson: extent.choose(&[0.2, 0.4, 0.49, 0.4999], &[0.2, 0.49]),
+            c: extent.choose(&[0.0, 0.779, 10.0, 100.0, 1000.0], &[0.0, 1000.0]),
             increments: extent.choose(&[1, 5, 10, 20], &[1, 5]),
+            barrier: extent.choose(&[0.0, 0.1, 1.0], &[0.1]),
             ..Self::few()
         }
     }
