@@ -401,7 +401,8 @@ impl RepeatedCase<'_> {
         let Self { body, table_bytes, program, hardware, tissue, table_tissue } = self;
         let label = Label { tissue: *tissue, table_tissue: *table_tissue, strategy: Strategy::dynamic(mode) };
         let controller = LinkedController { program, table_bytes, mode, hardware: *hardware, is_watched: true };
-        let insertion = Insertion { body, simulation, label, extras: Extras::default(), spectator: Some(spectator) };
+        let (extras, spectator) = (Extras::default(), Some(spectator));
+        let insertion = Insertion { body, simulation, label, extras, spectator, is_held_against_full: false };
         insertion.controlled(controller, &mut Vec::new())
     }
 }
@@ -455,7 +456,9 @@ fn case(
     let label = |strategy| Label { tissue, table_tissue, strategy };
     let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
         let body = PreparedBody::new(&world.model, paddles, false, threads)?;
-        Insertion { body: &body, simulation, label: label(strategy), extras, spectator: None }.uncontrolled(artifacts)
+        let label = label(strategy);
+        Insertion { body: &body, simulation, label, extras, spectator: None, is_held_against_full: true }
+            .uncontrolled(artifacts)
     };
     let (table, none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
         let table = table_of(believed, simulation)?;
@@ -467,7 +470,8 @@ fn case(
         let is_watched = spectator.is_some();
         let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
         let label = label(Strategy::dynamic(mode));
-        Insertion { body: &body, simulation, label, extras, spectator }.controlled(controller, artifacts)
+        Insertion { body: &body, simulation, label, extras, spectator, is_held_against_full: true }
+            .controlled(controller, artifacts)
     };
     let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
     // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
@@ -499,6 +503,8 @@ struct Insertion<'a, 'm> {
     label: Label,
     extras: Extras,
     spectator: Option<&'a dyn Spectator>,
+    /// Whether it is told how well the tissue was answered for, which takes further solves.
+    is_held_against_full: bool,
 }
 
 impl Insertion<'_, '_> {
@@ -640,11 +646,15 @@ impl Insertion<'_, '_> {
         let (fallbacks, first_fallback) = (tissue.fallbacks, tissue.first_fallback.clone());
         SpacePlantAccount {
             tabulation: body.report.clone(),
-            step_us: step_us(body.table().body(), body.paddles().len(), truths),
+            step_us: if self.is_held_against_full {
+                step_us(body.table().body(), body.paddles().len(), truths)
+            } else {
+                f64::NAN
+            },
             fallbacks,
             first_fallback,
             largest_estimate: tissue.largest_estimate,
-            largest_error: held_against_full(tissue, truths),
+            largest_error: if self.is_held_against_full { held_against_full(tissue, truths) } else { None },
         }
     }
 }

@@ -36,6 +36,7 @@ pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
                 "unit": scene.length_unit,
                 "depth": scene.needle.depth,
                 "has_inclusions": !scene.inclusions.is_empty(),
+                "paddles": body.paddles.len(),
             })
         }
     };
