@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 use model_offline::discretization::{Basis, Essential, Integration, Resolution};
 use model_offline::model::ModelError;
 use model_offline::number::short;
-use model_offline::output::terminal;
+use model_offline::output::{self, check_outputs, terminal};
 use model_offline::parallel;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::scene::{Scene, limits};
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub(super) struct SceneArgs {
     /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, breast-world, prostate, prostate-world,
-    /// tethered; in space, for `check`, `solve`, `place`, `table`, `slice` and `fit`: block, mound, scan).
+    /// tethered; in space, for all commands but `sweep` and `compare`: block, mound, scan).
     pub(super) scene: PathBuf,
     /// Leave the inclusions out: homogeneous tissue.
     #[arg(long)]
@@ -139,6 +139,25 @@ fn check_essential_in_space(essential: Option<Essential>) -> Result<(), CliError
         }
         Some(Essential::Transformation) | None => Ok(()),
     }
+}
+
+/// Makes the folder of a study; where its files of these names go in it, none of which is one of the inputs.
+pub(super) fn study_files<const N: usize>(
+    inputs: &[&Path],
+    folder: &Path,
+    names: [&str; N],
+) -> Result<[PathBuf; N], CliError> {
+    if folder.exists() && !folder.is_dir() {
+        return Err(CliError::usage(
+            format!("--out {}: a file is in its place", folder.display()),
+            "name a folder; it is made when it is not there",
+        ));
+    }
+    output::make_folder(folder)?;
+    let files = names.map(|name| folder.join(name));
+    let outputs: Vec<_> = files.iter().map(|file| ("--out", Some(file.as_path()))).collect();
+    check_outputs(inputs, &outputs)?;
+    Ok(files)
 }
 
 /// How to run.

@@ -58,7 +58,9 @@ enum Command {
     #[command(after_help = "Example:\n  model-offline table paper --paddle 3 -o paddle3.table")]
     Table(table::TableArgs),
     /// Where each method stops working, and why: depth reached against every parameter.
-    #[command(after_help = "Example:\n  model-offline stability paper --out stability --quick")]
+    #[command(
+        after_help = "Example:\n  model-offline stability paper --out stability --quick\n\nIn space a run takes seconds to minutes, and a study many minutes, also with --quick: begin with a coarse --spacing."
+    )]
     Stability(stability::StabilityArgs),
     /// What a table holds, checked.
     #[command(after_help = "Example:\n  model-offline inspect paddle3.table")]

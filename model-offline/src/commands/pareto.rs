@@ -1,6 +1,6 @@
 //! `model-offline pareto`: error against time for every method.
 
-use super::common::{RunArgs, SceneArgs, VariedArgs};
+use super::common::{RunArgs, SceneArgs, VariedArgs, study_files};
 use super::error::CliError;
 use model_offline::output;
 use model_offline::scene::TissueVariant;
@@ -8,6 +8,9 @@ use model_offline::study::Extent;
 use model_offline::study::pareto::{self, Pareto};
 use model_offline::study::pareto_space::compare_in_space;
 use std::path::PathBuf;
+
+/// What it writes.
+const FILES: [&str; 2] = ["pareto.csv", "pareto.svg"];
 
 /// Options of `pareto`.
 #[derive(Debug, clap::Args)]
@@ -42,7 +45,7 @@ fn shown(
     args: &ParetoArgs,
     compare: impl FnOnce(&dyn Fn(f64)) -> Result<Pareto, CliError>,
 ) -> Result<Pareto, CliError> {
-    output::make_folder(&args.out)?;
+    study_files(&[&args.scene.scene], &args.out, FILES)?;
     let bar = args.run.progress(1000);
     let comparison = compare(&|share| bar.set_position((1000.0 * share) as u64))?;
     bar.finish_and_clear();
@@ -51,7 +54,7 @@ fn shown(
 
 /// Writes chart and numbers.
 fn written(args: &ParetoArgs, comparison: &Pareto, scene: &str, tissue: TissueVariant) -> Result<(), CliError> {
-    let (csv, svg) = (args.out.join("pareto.csv"), args.out.join("pareto.svg"));
+    let [csv, svg] = FILES.map(|name| args.out.join(name));
     output::write_whole(&csv, &comparison.csv())?;
     output::write_whole(&svg, comparison.svg(scene, tissue).as_bytes())?;
     if !args.run.quiet {

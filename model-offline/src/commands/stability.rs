@@ -1,6 +1,6 @@
 //! `model-offline stability`: where each method stops working.
 
-use super::common::{RunArgs, VariedArgs};
+use super::common::{RunArgs, VariedArgs, study_files};
 use super::error::CliError;
 use model_offline::discretization::{Basis, Discretization, Resolution};
 use model_offline::model::ModelError;
@@ -13,10 +13,13 @@ use model_offline::study::stability::setting::Setting;
 use model_offline::study::stability::{self, Plan, Stability};
 use std::path::PathBuf;
 
+/// A spacing to begin with, over the size of the body.
+const USUAL: f64 = 0.07;
+
 /// Options of `stability`.
 #[derive(Debug, clap::Args)]
 pub(super) struct StabilityArgs {
-    /// Scene file, or the name of a bundled scene.
+    /// Scene file, or the name of a bundled scene (paper, paper-hull, breast, prostate, tethered; in space block, mound, scan).
     scene: PathBuf,
     /// Folder for stability.csv, stability.svg and, in the plane, zero_energy.csv; made when it is not there.
     #[arg(long, value_name = "DIR")]
@@ -48,7 +51,7 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
     method.support = args.support.unwrap_or(method.support);
     method.basis = args.basis.unwrap_or(method.basis);
     let scene = &args.varied.over(scene)?;
-    check_spacing(&scene.discretization)?;
+    check_spacing(&scene.discretization, scene.outline.size())?;
     let paddle = match args.paddle {
         Some(index) => scene.paddle_position(index).map(|_| index).map_err(ModelError::from)?,
         None => model_with_paddle(&scene.without_inclusions(), None)?.1,
@@ -56,14 +59,20 @@ pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
     studied(args, scene.into(), |plan, progress| plan.run(scene, paddle, args.run.threads(), progress))
 }
 
-fn check_spacing(discretization: &Discretization) -> Result<(), CliError> {
+/// `size` is that of the body, length units.
+fn check_spacing(discretization: &Discretization, size: f64) -> Result<(), CliError> {
     match discretization.resolution {
         Resolution::Spacing(_) => Ok(()),
         Resolution::Tolerance(_) | Resolution::Level(_) => Err(CliError::usage(
             "the study varies a spacing, and this scene has none",
-            "give the spacing to vary around, e.g. --spacing 0.1",
+            format!("give the spacing to vary around, e.g. --spacing {}", rounded(USUAL * size)),
         )),
     }
+}
+
+/// With one digit.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.0e}").parse().unwrap_or(value)
 }
 
 /// The same of a body in space. The paddle is the best by the scene's rule at the spacing.
@@ -72,7 +81,7 @@ fn run_in_space(args: &StabilityArgs, mut scene: SpaceScene) -> Result<(), CliEr
     method.support = args.support.unwrap_or(method.support);
     method.basis = args.basis.unwrap_or(method.basis);
     let scene = &args.varied.over_space(scene)?;
-    check_spacing(&scene.discretization)?;
+    check_spacing(&scene.discretization, scene.size())?;
     let paddle = match args.paddle {
         Some(index) => scene.paddle_position(index).map(|_| index).map_err(ModelError::from)?,
         None => best_single(&scene.without_inclusions())?,
@@ -87,16 +96,17 @@ fn studied(
     setting: Setting,
     run: impl FnOnce(&Plan, &(dyn Fn() + Sync)) -> Result<Stability, ModelError>,
 ) -> Result<(), CliError> {
-    output::make_folder(&args.out)?;
+    let [csv, svg, zero_energy] =
+        study_files(&[&args.scene], &args.out, ["stability.csv", "stability.svg", "zero_energy.csv"])?;
     let plan = Plan::new(setting, Extent::of_flag(args.quick));
     let bar = args.run.progress(plan.runs() as u64);
     let result = run(&plan, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    output::write_whole(&args.out.join("stability.csv"), &stability::csv(&result))?;
+    output::write_whole(&csv, &stability::csv(&result))?;
     if !result.zero_energy.is_empty() {
-        output::write_whole(&args.out.join("zero_energy.csv"), &stability::zero_energy_csv(&result))?;
+        output::write_whole(&zero_energy, &stability::zero_energy_csv(&result))?;
     }
-    output::write_whole(&args.out.join("stability.svg"), stability::figure(&result).svg().as_bytes())?;
+    output::write_whole(&svg, stability::figure(&result).svg().as_bytes())?;
     if !args.run.quiet {
         print!("{}", stability::summary(&result));
     }

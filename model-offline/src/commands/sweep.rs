@@ -1,6 +1,6 @@
 //! `model-offline sweep`: what the mesh does to the choice of a paddle.
 
-use super::common::{RunArgs, SceneArgs, VariedArgs};
+use super::common::{RunArgs, SceneArgs, VariedArgs, study_files};
 use super::error::CliError;
 use model_offline::output;
 use model_offline::study::sweep;
@@ -22,11 +22,10 @@ pub(super) struct SweepArgs {
 
 pub(super) fn run(args: &SweepArgs) -> Result<(), CliError> {
     let scene = args.varied.over(args.scene.read()?)?;
-    output::make_folder(&args.out)?;
+    let [csv, svg] = study_files(&[&args.scene.scene], &args.out, ["sweep.csv", "sweep.svg"])?;
     let bar = args.run.progress(sweep::STEPS);
     let found = sweep::sweep(&scene, args.run.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
-    let (csv, svg) = (args.out.join("sweep.csv"), args.out.join("sweep.svg"));
     output::write_whole(&csv, &found.csv())?;
     output::write_whole(&svg, found.svg().as_bytes())?;
     if !args.run.quiet {

@@ -5,7 +5,7 @@ use super::seen::BodySurface;
 use super::{loose_part, overlapping, patches_of};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::mesh::Element;
-use crate::geometry::{Implicit, Point};
+use crate::geometry::{Implicit, Point, box_of};
 use crate::model::error::ModelError;
 use crate::scene::SceneWarning;
 use crate::scene::space::SpaceScene;
@@ -126,6 +126,18 @@ pub struct MeshSurvey {
     pub off_surface: f64,
 }
 
+/// Bounds of what a differing or cut solid leaves may be far off; those of a mesh lie a little inside of a curved body.
+const LOOSE: f64 = 0.05;
+
+/// Lowest and highest coordinates: the body's own bounds, where the mesh is about as large.
+fn extent(scene: &SpaceScene, mesh: &TetMesh) -> (Point<3>, Point<3>) {
+    let (low, high) = box_of(&mesh.nodes).unwrap_or_default();
+    let Some(bounds) = scene.body.bounds() else { return (low, high) };
+    let near = LOOSE * (high - low).max();
+    let nearer = |own: f64, found: f64| if (own - found).abs() <= near { own } else { found };
+    (bounds.0.zip_map(&low, nearer), bounds.1.zip_map(&high, nearer))
+}
+
 impl Survey {
     /// Of a scene on one of its meshes.
     ///
@@ -142,7 +154,7 @@ impl Survey {
             let volume = own().map(|(_, volume)| volume).sum();
             InclusionSurvey { number: i + 1, stiffness: inclusion.stiffness, volume, elements: own().count() }
         });
-        let (low, high) = scene.body.bounds().unwrap_or_default();
+        let (low, high) = extent(scene, mesh);
         let needle =
             NeedleSurvey { contact: measured[1].clone(), axis: scene.needle.axis.into(), depth: scene.needle.depth };
         let paddles = scene.paddles.iter().zip(&measured[2..]);

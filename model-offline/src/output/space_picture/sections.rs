@@ -91,7 +91,12 @@ impl<'a> Section<'a> {
         let needle = self.needle.iter().map(|x| self.plane.coordinates(x));
         let target = Point::from(self.shown.geometry.target);
         let target = [self.plane.coordinates(&target)];
-        Plane::around(corners.chain(needle).chain(target), MARGIN * self.extent, width)
+        // Rims of paddles beside the plane may reach beyond what it cuts.
+        let attached = &self.shown.state.paddles;
+        let patches = self.shown.geometry.paddles.iter().filter(|patch| attached.contains(&patch.index));
+        let nodes = patches.flat_map(|patch| patch.triangles.iter().flatten());
+        let rims = nodes.map(|node| self.plane.coordinates(&self.moved[*node as usize]));
+        Plane::around(corners.chain(needle).chain(target).chain(rims), MARGIN * self.extent, width)
     }
 
     fn draw(&self, drawing: &mut Drawing, paper: &Plane) {

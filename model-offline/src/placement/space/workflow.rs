@@ -203,12 +203,18 @@ impl Reference {
         let scene = scene.with_method(Method::new(Integration::FemT10));
         let mut reached = f64::INFINITY;
         let mut coarser: Option<(Vec<usize>, Vec<SpaceResponse>)> = None;
+        let mut failed = None;
         for level in *LEVELS.start() - 1..=*LEVELS.end() {
             let (model, rest) = match at_level(&scene, level) {
                 Ok(found) => found,
                 // The coarsest meshes may not see every patch, the finest may not be affordable.
                 Err(ModelError::TooManyNodes { .. }) if coarser.is_some() => break,
                 Err(_) if coarser.is_none() && level <= *LEVELS.start() => continue,
+                // One level may meet what is near a surface badly where the next does not.
+                Err(error @ ModelError::Mesh(_)) => {
+                    failed = Some(error);
+                    continue;
+                }
                 Err(error) => return Err(error),
             };
             let on_patches = model.nodes_on_patches();
@@ -227,11 +233,11 @@ impl Reference {
             }
             coarser = Some((on_patches, rest));
         }
-        // No two meshes that could be afforded differ on every patch.
-        if reached.is_infinite() {
-            Err(ModelError::NothingToCompare)
-        } else {
-            Err(ModelError::ToleranceNotReached { tolerance: open, reached })
+        match failed {
+            _ if reached.is_finite() => Err(ModelError::ToleranceNotReached { tolerance: open, reached }),
+            Some(error) => Err(error),
+            // No two meshes that could be afforded differ on every patch.
+            None => Err(ModelError::NothingToCompare),
         }
     }
 }

@@ -175,6 +175,9 @@ fn conclusion(study: &Stability) -> Option<String> {
     let depths: Vec<(Integration, f64)> = study.setting.rules().iter().filter_map(depth).collect();
     let most = depths.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let least = depths.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    if most.1 == least.1 {
+        return Some(format!("Every method goes as deep ({})", plain(most.1)));
+    }
     let (most, least) = ((name(most.0), plain(most.1)), (name(least.0), plain(least.1)));
     Some(format!("Deepest goes {} ({}), least deep {} ({})", most.0, most.1, least.0, least.1))
 }

@@ -223,6 +223,11 @@ fn helps(two: &PaddleSet, one: &PaddleSet) -> bool {
         || wrong(one) && !wrong(two)
 }
 
+/// Whether something speaks against the best single paddle alone.
+pub(super) fn fails_alone(fit: &SpaceFit) -> bool {
+    !against_one(&fit.one, fit.tolerance).is_empty()
+}
+
 fn against_one(one: &PaddleSet, tolerance: f64) -> Vec<ReasonInSpace> {
     let mut against = Vec::new();
     if one.left_at_limit > tolerance {

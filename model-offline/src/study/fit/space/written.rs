@@ -1,6 +1,7 @@
 //! A fit of dimension and paddles on one screen, and as a scene file.
 
-use super::{FittedModel, PaddleSet, SliceInBody, SpaceFit};
+use super::verdict::fails_alone;
+use super::{FittedModel, PaddleSet, SliceInBody, SpaceAlternative, SpaceFit};
 use crate::discretization::Discretization;
 use crate::number::{in_unit, short};
 use crate::scene::TissueVariant;
@@ -49,13 +50,23 @@ impl SpaceFit {
     pub fn summary(&self) -> String {
         let verdict = &self.verdict;
         let paddles = named(&verdict.paddles);
+        let is_short = |alternative| verdict.rejected.iter().any(|rejected| rejected.alternative == alternative);
+        let short_of = if verdict.paddles.len() == 2 || !fails_alone(self) {
+            ""
+        } else if is_short(SpaceAlternative::TwoPaddles) {
+            "; it is not enough, and a second does not help"
+        } else {
+            "; it is not enough, and the scene has no pair"
+        };
         let what = match (verdict.dimension, verdict.paddles.len()) {
             (2, _) => format!("the slice in plane strain, paddle {paddles}"),
             (_, 1) => format!("the body in three dimensions, one paddle ({paddles})"),
             _ => format!("the body in three dimensions, two paddles ({paddles})"),
         };
-        let mut out =
-            format!("{} · {} tissue · tolerance {}\n\nneeded: {what}\n\n", self.scene, self.tissue, self.tolerance);
+        let mut out = format!(
+            "{} · {} tissue · tolerance {}\n\nneeded: {what}{short_of}\n\n",
+            self.scene, self.tissue, self.tolerance
+        );
         let _ = writeln!(out, "body   {}", model(&self.body));
         if let Some(slice) = &self.slice {
             let _ = writeln!(out, "slice  {}; {}", model(&slice.model), slice.plane);
