@@ -207,16 +207,13 @@ fn an_output_over_the_bodys_file_is_refused() {
 }
 
 #[test]
-fn what_meets_in_a_point_or_an_edge_alone_is_not_held() {
-    let beside = |min: &str, max: &str| {
-        format!("solid = {{ union = [{{ {BOX} }}, {{ box = {{ min = {min}, max = {max} }} }}] }}")
-    };
+fn what_meets_in_a_point_alone_is_not_held() {
+    let beside = "{ box = { min = [1.0, 1.0, 1.0], max = [2.0, 2.0, 2.0] } }";
+    let body = format!("solid = {{ union = [{{ {BOX} }}, {beside}] }}");
     let folder = tempfile::tempdir().unwrap();
-    for body in [beside("[1.0, 1.0, 1.0]", "[2.0, 2.0, 2.0]"), beside("[1.0, 1.0, 0.0]", "[2.0, 2.0, 1.0]")] {
-        let file = folder.path().join("scene.toml");
-        std::fs::write(&file, scene(&[(BOX, &body)])).unwrap();
-        let output = Command::cargo_bin("model-offline").unwrap().arg("check").arg(&file).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert!(!output.status.success() && said.contains("hangs on nothing"), "{body}: {said}");
-    }
+    let file = folder.path().join("scene.toml");
+    std::fs::write(&file, scene(&[(BOX, &body)])).unwrap();
+    let output = Command::cargo_bin("model-offline").unwrap().arg("check").arg(&file).output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success() && said.contains("hangs on nothing"), "{said}");
 }
