@@ -153,7 +153,7 @@ fn a_pressed_square_sinks_as_boussinesq_says() {
     let summed = under_pressure(&Point::<3>::new(0.0, 0.0, 0.0), 400).z;
     assert!((summed / middle - 1.0).abs() < 0.005, "{summed} {middle}");
     for (integration, within) in
-        [(Integration::FemT10, 0.01), (Integration::ScniStabilised, 0.03), (Integration::FemT4, 0.04)]
+        [(Integration::FemT10, 0.01), (Integration::ScniStabilised, 0.03), (Integration::FemT4, 0.05)]
     {
         let (spatial, coefficients) = solved(&mesh, integration, |x| cut(x).then(|| under_pressure(x, 24)), press);
         let at = |x: Point<3>| spatial.value_stencil(&x).unwrap().interpolate(&coefficients);
