@@ -325,3 +325,31 @@ fn the_study_of_a_body_in_space_is_written_like_that_of_the_plane() {
     let svg = std::fs::read_to_string(out.join("stability.svg")).unwrap();
     assert!(svg.contains("linear tetrahedra") && svg.contains("Stiffness contrast") && !svg.contains("ghost"));
 }
+
+#[test]
+fn no_study_writes_over_the_scene_that_it_is_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let bundled = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/paper.toml");
+    for (command, file) in [
+        ("stability", "stability.svg"),
+        ("stability", "zero_energy.csv"),
+        ("pareto", "pareto.csv"),
+        ("sweep", "sweep.svg"),
+    ] {
+        let scene = folder.path().join(file);
+        std::fs::copy(&bundled, &scene).unwrap();
+        let mut call = Command::new(env!("CARGO_BIN_EXE_model-offline"));
+        call.arg(command).arg(&scene).args(["--spacing", "0.2", "--out"]).arg(folder.path());
+        if command == "stability" {
+            call.args(["--paddle", "4"]);
+        }
+        let refused = call.assert().code(2);
+        let error = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+        assert!(error.contains("this is an input of the same"), "{command}: {error}");
+        assert_eq!(std::fs::read(&scene).unwrap(), std::fs::read(&bundled).unwrap());
+        // A file is no folder.
+        let mut call = Command::new(env!("CARGO_BIN_EXE_model-offline"));
+        call.args([command, "paper", "--spacing", "0.2", "--out"]).arg(&scene).assert().code(2);
+        std::fs::remove_file(&scene).unwrap();
+    }
+}

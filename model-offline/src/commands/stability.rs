@@ -2,7 +2,7 @@
 
 use super::common::{RunArgs, VariedArgs, study_files};
 use super::error::CliError;
-use model_offline::discretization::{Basis, Discretization, Resolution};
+use model_offline::discretization::{Basis, Discretization, Method, Resolution};
 use model_offline::model::ModelError;
 use model_offline::output;
 use model_offline::placement::model_with_paddle;
@@ -42,14 +42,20 @@ pub(super) struct StabilityArgs {
     run: RunArgs,
 }
 
+impl StabilityArgs {
+    /// Puts support and basis into a scene's method, where they are given.
+    fn over(&self, method: &mut Method) {
+        method.support = self.support.unwrap_or(method.support);
+        method.basis = self.basis.unwrap_or(method.basis);
+    }
+}
+
 pub(super) fn run(args: &StabilityArgs) -> Result<(), CliError> {
     let mut scene = match AnyScene::read(&args.scene)? {
         AnyScene::Planar(scene) => *scene,
         AnyScene::Space(scene) => return run_in_space(args, *scene),
     };
-    let method = &mut scene.discretization.method;
-    method.support = args.support.unwrap_or(method.support);
-    method.basis = args.basis.unwrap_or(method.basis);
+    args.over(&mut scene.discretization.method);
     let scene = &args.varied.over(scene)?;
     check_spacing(&scene.discretization, scene.outline.size())?;
     let paddle = match args.paddle {
@@ -77,9 +83,7 @@ fn rounded(value: f64) -> f64 {
 
 /// The same of a body in space. The paddle is the best by the scene's rule at the spacing.
 fn run_in_space(args: &StabilityArgs, mut scene: SpaceScene) -> Result<(), CliError> {
-    let method = &mut scene.discretization.method;
-    method.support = args.support.unwrap_or(method.support);
-    method.basis = args.basis.unwrap_or(method.basis);
+    args.over(&mut scene.discretization.method);
     let scene = &args.varied.over_space(scene)?;
     check_spacing(&scene.discretization, scene.size())?;
     let paddle = match args.paddle {
