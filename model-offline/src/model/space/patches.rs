@@ -97,37 +97,21 @@ pub(super) fn nodes_of(patch: &[[u32; 3]], middles: &BTreeMap<(u32, u32), u32>) 
 /// A corner of a part of the mesh that has no triangle of these nodes; none where every part has one. Parts are what common
 /// faces join.
 pub(super) fn loose<'n>(mesh: &TetMesh, held: impl Iterator<Item = &'n u32>) -> Option<Point<3>> {
-    // Tetrahedra of one part lead to one and the same.
-    let mut leads: Vec<u32> = (0..mesh.tetrahedra.len() as u32).collect();
-    fn end(leads: &mut [u32], mut t: u32) -> u32 {
-        while leads[t as usize] != t {
-            leads[t as usize] = leads[leads[t as usize] as usize];
-            t = leads[t as usize];
-        }
-        t
-    }
-    // What meets in a corner or an edge alone turns about it.
-    let mut beside: BTreeMap<[u32; 3], u32> = BTreeMap::new();
-    for (t, corners) in (0..).zip(&mesh.tetrahedra) {
-        for left in 0..4 {
-            let mut face: [u32; 3] = std::array::from_fn(|k| corners[(left + 1 + k) % 4]);
-            face.sort_unstable();
-            if let Some(other) = beside.insert(face, t) {
-                let (a, b) = (end(&mut leads, t), end(&mut leads, other));
-                leads[a.max(b) as usize] = a.min(b);
+    let held: BTreeSet<u32> = held.copied().collect();
+    // Three corners of an element, and no part turns about them. What meets in a corner or an edge alone turns about it.
+    let is_held = |corners: &[u32; 4]| corners.iter().filter(|node| held.contains(node)).count() >= 3;
+    let mut reached: Vec<bool> = mesh.tetrahedra.iter().map(is_held).collect();
+    let mut beyond: Vec<u32> = (0..).zip(&reached).filter(|(_, held)| **held).map(|(t, _)| t).collect();
+    let neighbours = mesh.neighbours();
+    while let Some(t) = beyond.pop() {
+        for next in neighbours[t as usize].into_iter().flatten() {
+            if !std::mem::replace(&mut reached[next as usize], true) {
+                beyond.push(next);
             }
         }
     }
-    let held: BTreeSet<u32> = held.copied().collect();
-    let mut held_parts: BTreeSet<u32> = BTreeSet::new();
-    for (t, corners) in (0..).zip(&mesh.tetrahedra) {
-        // Three corners of an element, and no part turns about them.
-        if corners.iter().filter(|node| held.contains(node)).count() >= 3 {
-            held_parts.insert(end(&mut leads, t));
-        }
-    }
-    let mut all = (0..).zip(&mesh.tetrahedra);
-    all.find(|(t, _)| !held_parts.contains(&end(&mut leads, *t))).map(|(_, corners)| mesh.nodes[corners[0] as usize])
+    let first = reached.iter().position(|reached| !reached)?;
+    Some(mesh.nodes[mesh.tetrahedra[first][0] as usize])
 }
 
 /// Whether two patches have triangles in common, and not just an edge or a corner.
