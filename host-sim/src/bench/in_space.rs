@@ -10,6 +10,7 @@ use firmware::scalar::ScalarKind;
 use firmware::{Faults, Mode};
 use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
+use model_offline::parallel;
 use model_offline::placement::space::insertion::InsertionModel;
 use model_offline::placement::space::study::{SpaceOptimum, place_in_space};
 use model_offline::placement::space::workflow::insertion_model;
@@ -421,12 +422,12 @@ pub fn compare(
 
 /// The homogeneous tissue of a scene, and the one with its inclusions where there are any, with what is best on them.
 fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>), SimError> {
-    let with = insertion_model(scene)?;
+    let with = parallel::within(threads, || insertion_model(scene))?;
     let study = |model: InsertionModel| -> Result<Tissue, SimError> {
         let placement = place_in_space(&model, threads, &|| ())?;
         Ok(Tissue { optimum: placement.optimum, model })
     };
-    let homogeneous = study(with.without_inclusions()?)?;
+    let homogeneous = study(parallel::within(threads, || with.without_inclusions())?)?;
     let inclusion = if scene.inclusions.is_empty() { None } else { Some(study(with)?) };
     Ok((homogeneous, inclusion))
 }

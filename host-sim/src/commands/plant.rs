@@ -111,8 +111,9 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
     if scene.inclusions.is_empty() && args.tissue == Some(TissueVariant::Inclusion) {
         return Err(SimError::NoInclusion { scene: scene.name.clone() });
     }
+    let threads = parallel::threads(None);
     let (model, paddles) = signals::ends_at_once(|| -> Result<_, SimError> {
-        let whole = insertion_model(scene)?;
+        let whole = parallel::within(threads, || insertion_model(scene))?;
         let paddles = match args.paddle.is_empty() {
             true => whole.best_to_control()?,
             false => args.paddle.clone(),
@@ -123,7 +124,6 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
     if !(1..=MAX_PADDLES).contains(&paddles.len()) {
         return Err(TableBuildError::Paddles(paddles.len()).into());
     }
-    let threads = parallel::threads(None);
     let world = signals::ends_at_once(|| -> Result<_, SimError> {
         let body = PreparedBody::new(&model, &paddles, true, threads)?;
         Ok(match args.mode {

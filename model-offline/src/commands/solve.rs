@@ -126,6 +126,7 @@ fn in_space(scene: &SpaceScene, args: &SolveArgs) -> Result<(), CliError> {
         json: args.json.as_deref(),
         vtu: args.vtu.as_deref(),
         svg: args.svg.as_deref(),
+        threads: args.run.threads(),
         quiet: args.run.quiet,
     };
     solve_space::run(scene, asked)

@@ -9,6 +9,7 @@ use model_offline::number::{in_unit, short};
 use model_offline::output;
 use model_offline::output::space_picture::{self, SpaceGeometry, SpaceState};
 use model_offline::output::vtu;
+use model_offline::parallel;
 use model_offline::placement::space::workflow;
 use model_offline::scene::space::SpaceScene;
 use model_offline::solver::equilibrium::NewtonSettings;
@@ -31,6 +32,8 @@ pub(super) struct SpaceArgs<'a> {
     pub(super) vtu: Option<&'a Path>,
     /// Where its picture goes.
     pub(super) svg: Option<&'a Path>,
+    /// Threads to use.
+    pub(super) threads: usize,
     /// No summary.
     pub(super) quiet: bool,
 }
@@ -43,7 +46,8 @@ pub(super) fn run(scene: &SpaceScene, args: SpaceArgs<'_>) -> Result<(), CliErro
     if !args.quiet {
         scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
     }
-    solve(scene, &paddles, args).map_err(|error| error.reported_of(args.json, &scene.name, scene.tissue()))
+    let solved = parallel::within(args.threads, || solve(scene, &paddles, args));
+    solved.map_err(|error| error.reported_of(args.json, &scene.name, scene.tissue()))
 }
 
 /// The paddles that are named, with their displacements.

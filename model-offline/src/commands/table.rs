@@ -4,6 +4,7 @@ use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
 use model_offline::output::check_outputs;
 use model_offline::output::{self, space_table_text, table_text};
+use model_offline::parallel;
 use model_offline::placement::model_with_paddle;
 use model_offline::placement::space::workflow::insertion_model;
 use model_offline::scene::space::SpaceScene;
@@ -56,7 +57,7 @@ pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
 /// A table in space, of the model that insertions are followed on.
 fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
     check_outputs(&args.scene.files(&scene), &[("--output", Some(&args.output))])?;
-    let model = insertion_model(&scene)?;
+    let model = parallel::within(args.run.threads(), || insertion_model(&scene))?;
     let paddles = match args.paddle.is_empty() {
         true => model.best_to_control()?,
         false => args.paddle.clone(),

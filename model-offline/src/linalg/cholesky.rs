@@ -1,8 +1,10 @@
 //! Sparse Cholesky factorisation by faer: symbolic analysis once per pattern, numbers per iteration.
 
+use super::dense::shared_by;
 use super::ordering::nested_dissection;
 use super::pattern::Pattern;
 use crate::geometry::Point;
+use crate::parallel;
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::perm::PermRef;
@@ -22,6 +24,8 @@ const NODES_ORDERED: usize = 500;
 /// Straight cuts win on evenly spaced nodes (SCNI, support 2, 5,741 nodes: 6.3 against 6.5 million entries; a tenth less
 /// time at 25,000 nodes), minimum degree wins by far on graded ones, where every straight cut runs through crowded nodes.
 const DISSECTION_TRIED: usize = 3000;
+/// Operations of a factorisation from which on several threads share it: below, they wait for each other longer than they work.
+const SHARED_FLOPS: f64 = 1e9;
 
 /// The matrix is not positive definite.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -143,8 +147,12 @@ pub struct SparseCholesky {
     symbolic: Arc<SymbolicCholesky<u32>>,
     factor: Vec<f64>,
     workspace: MemBuffer,
+    /// Threads that the workspace has room for.
+    workspace_threads: usize,
     solve_workspace: MemBuffer,
     solve_columns: usize,
+    /// Whether it pays that several threads share a factorisation.
+    shareable: bool,
 }
 
 impl std::fmt::Debug for SparseCholesky {
@@ -158,6 +166,7 @@ impl Clone for SparseCholesky {
     fn clone(&self) -> Self {
         let mut copy = Self::empty(&self.symbolic);
         copy.factor.clone_from(&self.factor);
+        copy.shareable = self.shareable;
         copy
     }
 }
@@ -167,16 +176,31 @@ impl SparseCholesky {
     pub fn new(analysed: &SymbolicFactor) -> Self {
         let mut room = Self::empty(&analysed.symbolic);
         room.factor = vec![0.0; analysed.entries()];
+        room.shareable = analysed.flops() >= SHARED_FLOPS;
         room
     }
 
     fn empty(symbolic: &Arc<SymbolicCholesky<u32>>) -> Self {
-        let workspace = MemBuffer::new(symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()));
-        let solve_workspace = MemBuffer::new(StackReq::EMPTY);
-        let symbolic = Arc::clone(symbolic);
-        let mut empty = Self { symbolic, factor: Vec::new(), workspace, solve_workspace, solve_columns: 0 };
+        let mut empty = Self {
+            symbolic: Arc::clone(symbolic),
+            factor: Vec::new(),
+            workspace: MemBuffer::new(StackReq::EMPTY),
+            workspace_threads: 0,
+            solve_workspace: MemBuffer::new(StackReq::EMPTY),
+            solve_columns: 0,
+            shareable: false,
+        };
+        empty.reserve_threads(1);
         empty.reserve_columns(1);
         empty
+    }
+
+    fn reserve_threads(&mut self, threads: usize) {
+        if threads > self.workspace_threads {
+            let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(shared_by(threads), Default::default());
+            self.workspace = MemBuffer::new(scratch);
+            self.workspace_threads = threads;
+        }
     }
 
     fn reserve_columns(&mut self, columns: usize) {
@@ -191,19 +215,22 @@ impl SparseCholesky {
         self.factor.len()
     }
 
-    /// Factorises the matrix with these values (lower triangle, laid out by the analysed pattern).
+    /// Factorises the matrix with these values (lower triangle, laid out by the analysed pattern); a large one on as many
+    /// threads as it is called [within](crate::parallel::within).
     ///
     /// # Errors
     /// [`NotPositiveDefinite`]; the factor is then not usable.
     pub fn factorise(&mut self, pattern: &Pattern, values: &[f64]) -> Result<(), NotPositiveDefinite> {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
+        let threads = if self.shareable { parallel::here() } else { 1 };
+        self.reserve_threads(threads);
         self.symbolic
             .factorize_numeric_llt(
                 &mut self.factor,
                 matrix,
                 Side::Lower,
                 LltRegularization::default(),
-                Par::Seq,
+                shared_by(threads),
                 MemStack::new(&mut self.workspace),
                 Default::default(),
             )
@@ -252,5 +279,61 @@ impl SparseCholesky {
             Par::Seq,
             MemStack::new(&mut self.solve_workspace),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parallel::within;
+
+    /// A cube of springs between neighbours along the axes and the diagonals of faces, three unknowns a node: enough work to
+    /// be shared.
+    fn cube(side: u32) -> (Pattern, Vec<Point<3>>, Vec<f64>) {
+        let place = |i: u32| [i % side, i / side % side, i / side / side];
+        let count = side.pow(3);
+        let mut springs: Vec<Vec<u32>> = (0..count).map(|i| vec![i]).collect();
+        for i in 0..count {
+            for step in [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]] {
+                let [x, y, z]: [u32; 3] = std::array::from_fn(|k| place(i)[k] + step[k]);
+                if x.max(y).max(z) < side {
+                    springs.push(vec![i, x + side * (y + side * z)]);
+                }
+            }
+        }
+        let pattern = Pattern::new(3, count as usize, springs.iter().map(Vec::as_slice));
+        let mut values = vec![0.0; pattern.entries()];
+        for spring in springs.iter().filter(|spring| spring.len() == 2) {
+            for (row, column, sign) in [(0, 0, 1.0), (1, 1, 1.0), (1, 0, -1.0)] {
+                let (i, j) = (spring[row], spring[column]);
+                let (at, stride) = (pattern.block_position(i, j).unwrap(), pattern.column_length(j));
+                (0..3).for_each(|k| values[at + k * stride + k] += sign * (1.0 + f64::from(spring[0] % 7)));
+            }
+        }
+        (0..pattern.unknowns()).for_each(|u| values[pattern.diagonal_position(u)] += 0.1);
+        let positions = (0..count).map(|i| Point::<3>::from(place(i).map(f64::from))).collect();
+        (pattern, positions, values)
+    }
+
+    #[test]
+    fn a_factor_shared_by_threads_has_the_same_bits() {
+        let (pattern, positions, values) = cube(14);
+        let analysed = SymbolicFactor::new(&pattern, &positions);
+        assert!(analysed.flops() > SHARED_FLOPS, "{:e}", analysed.flops());
+        let factor = || {
+            let mut cholesky = SparseCholesky::new(&analysed);
+            cholesky.factorise(&pattern, &values).unwrap();
+            cholesky
+        };
+        let mut alone = factor();
+        let mut x: Vec<f64> = (0..pattern.unknowns()).map(|u| (u % 11) as f64 - 5.0).collect();
+        let right = x.clone();
+        alone.solve(&mut x, 1);
+        let mut back = vec![0.0; x.len()];
+        pattern.multiply::<3>(&values, &x, &mut back);
+        assert!(back.iter().zip(&right).all(|(b, r)| (b - r).abs() < 1e-9), "does not solve");
+        for threads in [2, 3] {
+            assert!(within(threads, factor).factor == alone.factor, "{threads} threads");
+        }
     }
 }

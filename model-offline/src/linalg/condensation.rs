@@ -5,8 +5,8 @@
 //! number alone, however large the body is.
 
 use super::cholesky::SparseCholesky;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Mat, Par};
+use super::dense::{products_of_columns, solve_lower};
+use faer::Mat;
 
 /// The factor of the retained unknowns of a matrix.
 #[derive(Debug, Clone)]
@@ -28,11 +28,11 @@ impl CondensedFactor {
         Self { factor, place }
     }
 
-    /// L_S⁻¹ F for functionals F of the retained unknowns, a column each: `f K⁻¹ g` is the product of their columns.
+    /// `f K⁻¹ g` for all pairs of functionals f, g of the retained unknowns.
     ///
     /// # Panics
     /// When a functional takes an unknown that is not retained.
-    pub fn half_solved(&self, functionals: &[Functional]) -> Mat<f64> {
+    pub fn compliance(&self, functionals: &[Functional]) -> Mat<f64> {
         let mut columns = Mat::zeros(self.factor.nrows(), functionals.len());
         for (column, functional) in functionals.iter().enumerate() {
             for &(unknown, weight) in functional {
@@ -40,8 +40,9 @@ impl CondensedFactor {
                 columns[(row as usize, column)] += weight;
             }
         }
-        solve_lower_triangular_in_place(self.factor.as_ref(), columns.as_mut(), Par::Seq);
-        columns
+        // L_S⁻¹ F, a column each, whose products they are.
+        solve_lower(self.factor.as_ref(), columns.as_mut());
+        products_of_columns(&columns)
     }
 }
 
@@ -81,15 +82,15 @@ mod tests {
         let condensed = CondensedFactor::new(&cholesky, 3 * n, 3 * retained.len());
         let functionals: Vec<Functional> =
             vec![vec![(9, 1.0)], vec![(51, 0.5), (54, -2.0)], vec![(121, 1.0), (122, 1.0)], vec![(241, 3.0)]];
-        let half = condensed.half_solved(&functionals);
+        let compliance = condensed.compliance(&functionals);
         for (g, right) in functionals.iter().enumerate() {
             let mut x = vec![0.0; 3 * n];
             right.iter().for_each(|&(u, w)| x[u as usize] += w);
             cholesky.solve(&mut x, 1);
             for (f, left) in functionals.iter().enumerate() {
                 let whole: f64 = left.iter().map(|&(u, w)| w * x[u as usize]).sum();
-                let by_half: f64 = (0..half.nrows()).map(|r| half[(r, f)] * half[(r, g)]).sum();
-                assert!((whole - by_half).abs() < 1e-12, "{f} {g}: {whole} {by_half}");
+                let condensed = compliance[(f, g)];
+                assert!((whole - condensed).abs() < 1e-12, "{f} {g}: {whole} {condensed}");
             }
         }
     }

@@ -2,9 +2,11 @@
 
 pub mod cholesky;
 pub mod condensation;
+pub mod dense;
 mod ordering;
 pub mod pattern;
 
 pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymbolicFactor};
 pub use condensation::CondensedFactor;
+pub use dense::DenseCholesky;
 pub use pattern::Pattern;

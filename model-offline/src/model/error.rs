@@ -21,8 +21,8 @@ pub enum ModelError {
     Mesh(StuffingError),
     /// An inclusion between the nodes.
     #[error(
-        "inclusion {number} is lost between the elements: it is too small or too thin for them; ask for smaller ones, make it \
-         larger, or take it out"
+        "inclusion {number} is lost between the elements: it is too small or too thin for them; raise the level, lower the \
+         spacing or tolerance, make it larger, or take it out"
     )]
     UnseenInclusion {
         /// Which one, from 1 in the scene's order.

@@ -7,10 +7,10 @@
 use super::condensed::{CondensedBody, singular};
 use super::fields::{Fields, Loads, RATES};
 use crate::discretization::Stencil;
+use crate::linalg::DenseCholesky;
 use crate::mechanics::ConstrainedRows;
 use crate::model::{ModelError, TissueModel};
-use faer::linalg::solvers::{Llt, Solve as _};
-use faer::{Mat, Side};
+use faer::Mat;
 use nalgebra::Vector2;
 use std::ops::Range;
 
@@ -65,9 +65,10 @@ impl<'m> Attaching<'m> {
     }
 
     /// Cholesky factor of a paddle's compliance.
-    fn factor(&self, rows: &Range<usize>) -> Result<Llt<f64>, ModelError> {
+    fn factor(&self, rows: &Range<usize>) -> Result<DenseCholesky, ModelError> {
         let own = self.compliance.submatrix(rows.start, rows.start, rows.len(), rows.len());
-        Ok(own.llt(Side::Lower).map_err(|_| singular("the compliance of the paddle is not positive definite"))?)
+        DenseCholesky::new(own.to_owned())
+            .map_err(|_| singular("the compliance of the paddle is not positive definite").into())
     }
 
     /// What the paddle's nodes have to move beyond `fields`, if anything: a column per field.
@@ -92,7 +93,7 @@ impl<'m> Attaching<'m> {
     pub(super) fn target(&self, paddle: usize) -> Result<[Vector2<f64>; RATES], ModelError> {
         let rows = self.rows(paddle);
         let mut forces = self.missing(paddle, |c| self.before(c));
-        self.factor(&rows)?.solve_in_place(forces.as_mut());
+        self.factor(&rows)?.solve(forces.as_mut());
         let target = self.compliance.nrows() - 2;
         Ok(std::array::from_fn(|c| {
             let moved = |axis: usize| -> f64 {
@@ -123,7 +124,7 @@ impl<'m> Attaching<'m> {
             if forces.norm_max() <= ENOUGH {
                 break;
             }
-            factor.solve_in_place(forces.as_mut());
+            factor.solve(forces.as_mut());
             let mut right = vec![0.0; self.columns() * unknowns];
             for (c, right) in right.chunks_exact_mut(unknowns).enumerate() {
                 let column: Vec<f64> = (0..forces.nrows()).map(|r| forces[(r, c)]).collect();

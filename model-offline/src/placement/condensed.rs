@@ -78,7 +78,6 @@ impl<const D: usize> CondensedBody<D> {
             row.nodes.iter().zip(&row.values).map(|(&i, &value)| (i * D as u32 + axis as u32, value)).collect()
         };
         let functionals: Vec<_> = rows.flat_map(|row| (0..D).map(move |axis| weights(row, axis))).collect();
-        let half = self.condensed.half_solved(&functionals);
-        half.transpose() * &half
+        self.condensed.compliance(&functionals)
     }
 }

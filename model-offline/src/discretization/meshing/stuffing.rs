@@ -39,7 +39,10 @@ pub enum StuffingError {
         size: f64,
     },
     /// No tetrahedron lies in the body.
-    #[error("the body is empty, or too thin for the size of elements: ask for smaller ones")]
+    #[error(
+        "the body is empty, or too thin for the size of elements: smaller ones come from a higher level, or a smaller spacing \
+         or tolerance, in [discretization]"
+    )]
     Vanishes,
     /// A region without any of the surface in it.
     #[error(
@@ -50,7 +53,11 @@ pub enum StuffingError {
         patch: usize,
     },
     /// Something is too small, or too sharp, for the elements around it.
-    #[error("elements are too large for what is near {}: ask for smaller ones there", place(.at))]
+    #[error(
+        "elements are too large for what is near {}: smaller ones come from a higher level, or a smaller spacing or tolerance, in \
+         [discretization]; where none helps, surfaces meet there at too small an angle or leave too thin a wall",
+        place(.at)
+    )]
     Unresolved {
         /// Where.
         at: Point<3>,

@@ -7,11 +7,11 @@
 //! of their translations, which does not change the limit of the Jacobian: forces there do no work on it.
 
 use super::controllability::Controllability;
+use crate::linalg::DenseCholesky;
 use crate::model::ModelError;
 use crate::model::space::{Holder, SpaceModel};
 use crate::placement::condensed::{CondensedBody, singular};
-use faer::linalg::solvers::Solve as _;
-use faer::{Mat, Side};
+use faer::Mat;
 use nalgebra::{DMatrix, Vector3};
 use std::collections::BTreeMap;
 
@@ -107,8 +107,7 @@ impl<'m> CondensedRest<'m> {
             (place, _) => self.per_depth[*place][r % 3],
         });
         let refused = |_| singular("the compliance of the paddles is not positive definite");
-        let factor = attached_compliance.llt(Side::Lower).map_err(refused)?;
-        factor.solve_in_place(sides.as_mut());
+        DenseCholesky::new(attached_compliance).map_err(refused)?.solve(sides.as_mut());
         let target = self.compliance.nrows() - 3;
         let answer =
             |t: usize, c: usize| (0..count).map(|r| self.compliance[(row(r), target + t)] * sides[(r, c)]).sum::<f64>();

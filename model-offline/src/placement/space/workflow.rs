@@ -12,6 +12,7 @@ use crate::discretization::{Integration, Method, Resolution, TetMesh};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
 use crate::model::space::meshing::{MeshSize, even_mesh, mesh};
+use crate::parallel;
 use crate::scene::space::SpaceScene;
 use serde::Serialize;
 use std::time::Instant;
@@ -83,7 +84,7 @@ impl SpaceStudy {
         progress: &(dyn Fn() + Sync),
     ) -> Result<Self, ModelError> {
         let start = Instant::now();
-        let Discretised { model, rest, estimate: error_estimate } = discretise(scene)?;
+        let Discretised { model, rest, estimate: error_estimate } = parallel::within(threads, || discretise(scene))?;
         begin(steps(&model));
         let insertions = InsertionModel::new(scene, coarse(scene)?, model.clone(), rest);
         let placement = place_in_space(&insertions, threads, progress)?;

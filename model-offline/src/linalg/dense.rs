@@ -1,0 +1,142 @@
+//! Dense symmetric work on what is left when a body is condensed. All of it is done on as many threads as it is called
+//! [within](crate::parallel::within), and with the same result.
+
+use super::cholesky::NotPositiveDefinite;
+use crate::parallel;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::{factor, solve};
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use rayon::iter::{IndexedParallelIterator as _, ParallelIterator as _};
+
+/// Rows from which on it pays that several threads share a matrix.
+const SHARED_ROWS: usize = 200;
+
+/// How dense work on so many rows that is called from here is shared.
+fn shared(rows: usize) -> Par {
+    shared_by(if rows >= SHARED_ROWS { parallel::here() } else { 1 })
+}
+
+/// The same among so many threads.
+pub(super) fn shared_by(threads: usize) -> Par {
+    if threads > 1 { Par::rayon(threads) } else { Par::Seq }
+}
+
+/// Cholesky factor of a dense matrix.
+#[derive(Debug, Clone)]
+pub struct DenseCholesky {
+    /// Lower triangle; what is above it is not read.
+    factor: Mat<f64>,
+}
+
+impl DenseCholesky {
+    /// Factorises a matrix, of which the lower triangle is read.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`].
+    pub fn new(mut matrix: Mat<f64>) -> Result<Self, NotPositiveDefinite> {
+        let shared = shared(matrix.nrows());
+        let scratch = factor::cholesky_in_place_scratch::<f64>(matrix.nrows(), shared, Default::default());
+        let (mut memory, none) = (MemBuffer::new(scratch), Default::default());
+        factor::cholesky_in_place(matrix.as_mut(), none, shared, MemStack::new(&mut memory), Default::default())
+            .map_err(|_| NotPositiveDefinite)?;
+        Ok(Self { factor: matrix })
+    }
+
+    /// Solves in place, a column per right-hand side.
+    ///
+    /// # Panics
+    /// When `sides` has other rows than the matrix.
+    pub fn solve(&self, sides: MatMut<'_, f64>) {
+        by_panels(sides, |_, panel| {
+            let scratch = solve::solve_in_place_scratch::<f64>(self.factor.nrows(), panel.ncols(), Par::Seq);
+            solve::solve_in_place(self.factor.as_ref(), panel, Par::Seq, MemStack::new(&mut MemBuffer::new(scratch)));
+        });
+    }
+}
+
+/// L⁻¹ B in place, for a lower triangle L.
+pub(super) fn solve_lower(triangle: MatRef<'_, f64>, sides: MatMut<'_, f64>) {
+    by_panels(sides, |_, panel| solve_lower_triangular_in_place(triangle, panel, Par::Seq));
+}
+
+/// Bᵀ B, the whole of a symmetric matrix.
+pub(super) fn products_of_columns(columns: &Mat<f64>) -> Mat<f64> {
+    let count = columns.ncols();
+    let mut products = Mat::zeros(count, count);
+    by_panels(products.as_mut(), |first, panel| {
+        // What is above the panel's own square is known from its mirror image.
+        let (from, own) = (columns.subcols(first, count - first), columns.subcols(first, panel.ncols()));
+        matmul(panel.subrows_mut(first, count - first), Accum::Replace, from.transpose(), own, 1.0, Par::Seq);
+    });
+    for column in 0..count {
+        for row in 0..column {
+            products[(row, column)] = products[(column, row)];
+        }
+    }
+    products
+}
+
+/// Columns that one thread takes at a time.
+const PANEL: usize = 96;
+
+/// Works on panels of columns, given the first column of each; threads share them. Panels are the same for any number of threads,
+/// and so are the results.
+fn by_panels(mut matrix: MatMut<'_, f64>, work: impl Fn(usize, MatMut<'_, f64>) + Sync) {
+    if shared(matrix.nrows()) == Par::Seq {
+        for first in (0..matrix.ncols()).step_by(PANEL) {
+            let count = PANEL.min(matrix.ncols() - first);
+            work(first, matrix.as_mut().subcols_mut(first, count));
+        }
+    } else {
+        matrix.par_col_chunks_mut(PANEL).enumerate().for_each(|(k, panel)| work(PANEL * k, panel));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parallel::within;
+
+    /// A matrix with columns that are far from parallel, and no pattern that a block could repeat.
+    fn columns(rows: usize, count: usize) -> Mat<f64> {
+        Mat::from_fn(rows, count, |r, c| {
+            let off_diagonal = ((r * 37 + c * 91 + r * c) % 113) as f64 / 113.0 - 0.5;
+            if r == c { 20.0 } else { off_diagonal }
+        })
+    }
+
+    #[test]
+    fn products_and_solutions_are_those_of_the_definition_on_one_thread_and_on_several() {
+        let (rows, count) = (700, 640);
+        let columns = columns(rows, count);
+        let alone = products_of_columns(&columns);
+        for (r, c) in [(0, 0), (3, 500), (500, 3), (639, 638), (255, 256)] {
+            let product: f64 = (0..rows).map(|k| columns[(k, r)] * columns[(k, c)]).sum();
+            assert!((alone[(r, c)] - product).abs() < 1e-12 * product.abs().max(1.0), "{r} {c}");
+        }
+        let side = |r: usize, _: usize| (r % 17) as f64 - 8.0;
+        let solve = || {
+            let mut x = Mat::from_fn(count, 1, side);
+            DenseCholesky::new(products_of_columns(&columns)).unwrap().solve(x.as_mut());
+            x
+        };
+        let x = solve();
+        for r in [0, 1, 300, 639] {
+            let back: f64 = (0..count).map(|c| alone[(r, c)] * x[(c, 0)]).sum();
+            assert!((back - side(r, 0)).abs() < 1e-10, "{r}: {back}");
+        }
+        for threads in [2, 3, 4] {
+            assert!(within(threads, || products_of_columns(&columns)) == alone, "{threads}: not the same bits");
+            assert!(within(threads, solve) == x, "{threads}: not the same bits");
+        }
+    }
+
+    #[test]
+    fn an_indefinite_matrix_is_refused() {
+        let mut matrix = Mat::<f64>::identity(5, 5);
+        matrix[(3, 3)] = -1e-3;
+        assert_eq!(DenseCholesky::new(matrix).unwrap_err(), NotPositiveDefinite);
+    }
+}
