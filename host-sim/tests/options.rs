@@ -36,7 +36,7 @@ const AT_WORK: Duration = Duration::from_secs(2);
 const HANGS: Duration = Duration::from_secs(20);
 
 /// What every command is called with to do something short; options that name outputs name them in `OUT`.
-const HOST_SIM: [(&str, &str); 17] = [
+const HOST_SIM: [(&str, &str); 18] = [
     ("run", "--tissue homogeneous --mode lockstep --insertion-time 0.05 --quiet --out OUT/report"),
     ("controller", "--table IN/paper.table --link LINK --patience 0.05 --record OUT/a.rec --json OUT/a.json"),
     ("plant", "--link LINK --paddle 3 --patience 0.05 --insertion-time 0.05 --json OUT/a.json"),
@@ -46,6 +46,7 @@ const HOST_SIM: [(&str, &str); 17] = [
     ("stability", "--quick --out OUT/stability"),
     ("tables", "--out OUT/tables"),
     ("worlds", "--scene paper --seeds 1 --json OUT/a.json"),
+    ("bridge", "--send-to 127.0.0.1:9 --listen 127.0.0.1:0 --link LINK --patience 0.05 --json OUT/a.json"),
     ("rearm", "1"),
     ("replay", "IN/paper.rec"),
     ("board", "IN/paper.rec"),

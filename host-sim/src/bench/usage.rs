@@ -1,5 +1,6 @@
 //! What is asked for and makes no sense, and what to ask for instead.
 
+use std::net::{IpAddr, SocketAddr};
 use std::path::PathBuf;
 
 use model_offline::output::csv::CsvError;
@@ -15,6 +16,33 @@ pub enum UsageError {
     NotInSpace {
         /// The option.
         option: String,
+    },
+    /// Nobody can send to port 0.
+    #[error("--send-to {address}: name the port that the actuators listen on")]
+    NoPort {
+        /// The address.
+        address: SocketAddr,
+    },
+    /// An address that others can reach.
+    #[error(
+        "{option} {address} is not of this machine's loopback: UDP is not authenticated, so that whoever can send there moves \
+         the paddle; add --network if that is meant"
+    )]
+    BeyondLoopback {
+        /// The option.
+        option: &'static str,
+        /// The address.
+        address: IpAddr,
+    },
+    /// One of the addresses is of the other family.
+    #[error("{option} {address} and --listen {listen} are not of one family: give all of them in IPv4, or all in IPv6")]
+    MixedAddresses {
+        /// The option.
+        option: &'static str,
+        /// The address.
+        address: IpAddr,
+        /// The address that is listened on.
+        listen: IpAddr,
     },
     /// The report's directory would lie in one that is not there.
     #[error("--out {}: the directory {} does not exist; make it, or name another", directory.display(), parent.display())]

@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod board;
+mod bridge;
 mod controller;
 mod export;
 mod faults;
@@ -31,6 +32,7 @@ use indicatif::ProgressBar;
 use model_offline::output::terminal;
 
 use self::board::{BoardArgs, board};
+use self::bridge::{BridgeArgs, bridge};
 use self::controller::{ControllerArgs, controller};
 use self::export::{ExportArgs, export};
 use self::faults::{FaultsArgs, faults};
@@ -74,6 +76,11 @@ pub(crate) enum Command {
         after_help = "Example, in two terminals:\n  host-sim controller --table paper.table --mode free-run\n  host-sim plant --scene paper --mode free-run"
     )]
     Plant(Box<PlantArgs>),
+    /// Sensors and actuators outside in the plant's place, by UDP, for a controller in free-run
+    #[command(
+        after_help = "Example, in three terminals:\n  host-sim controller --table paper.table --mode free-run\n  host-sim bridge --send-to 127.0.0.1:47361\n  python3 host-sim/examples/rig.py"
+    )]
+    Bridge(BridgeArgs),
     /// Lets a running controller out of SAFE, once somebody has looked
     #[command(after_help = "Example, beside a controller by hand that has gone to SAFE: host-sim rearm")]
     Rearm(RearmArgs),
@@ -148,6 +155,7 @@ pub(crate) fn execute(command: Command) -> Result<(), SimError> {
         Command::Run(args) => run(&args),
         Command::Controller(args) => controller(&args),
         Command::Plant(args) => plant(&args),
+        Command::Bridge(args) => bridge(&args),
         Command::Rearm(args) => rearm(&args),
         Command::Timing(args) => timing(&args),
         Command::TimingPeer(args) => timing_peer(&args),

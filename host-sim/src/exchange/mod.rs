@@ -1,5 +1,5 @@
 //! What goes between plant and controller: in shared memory five publish–subscribe services of iceoryx2, six with a second paddle, and nothing else,
-//! and the serial line to a controller on a [`board`].
+//! the serial line to a controller on a [`board`], and the datagrams to sensors and actuators outside ([`udp`]).
 //!
 //! | service | from | to | when |
 //! |---|---|---|---|
@@ -16,6 +16,7 @@ mod error;
 mod ports;
 mod space;
 mod stream;
+pub mod udp;
 mod wire;
 
 pub use error::LinkError;

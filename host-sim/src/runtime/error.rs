@@ -4,6 +4,7 @@ use firmware::{Faults, SettingsError};
 
 use crate::exchange::LinkError;
 use crate::exchange::board::BoardError;
+use crate::exchange::udp::UdpError;
 use crate::world::error::WorldError;
 
 /// Which process of a pair.
@@ -47,6 +48,9 @@ pub enum RuntimeError {
     /// The controller on a board cannot be used.
     #[error("the controller on the board cannot be used")]
     Board(#[from] BoardError),
+    /// Datagrams failed.
+    #[error(transparent)]
+    Udp(#[from] UdpError),
     /// The controller process cannot be started.
     #[error("cannot start the controller process: {0}")]
     Spawn(std::io::Error),
@@ -112,6 +116,12 @@ pub enum RuntimeError {
     /// The user, or somebody else, asked for the end.
     #[error("stopped by {signal}; nothing was written")]
     Interrupted {
+        /// Name of the signal.
+        signal: &'static str,
+    },
+    /// The same of a bridge, whose end is told.
+    #[error("stopped by {signal}; the actuators were told to keep their positions")]
+    BridgeStopped {
         /// Name of the signal.
         signal: &'static str,
     },

@@ -199,7 +199,7 @@ pub(super) fn known_key(root: &Path) -> Option<String> {
 ///
 /// # Errors
 /// There is no source of randomness.
-pub(super) fn random_key() -> std::io::Result<String> {
+pub(in crate::exchange) fn random_key() -> std::io::Result<String> {
     let mut bytes = [0; 8];
     File::open("/dev/urandom")?.read_exact(&mut bytes)?;
     Ok(format!("{:016x}", u64::from_le_bytes(bytes)))

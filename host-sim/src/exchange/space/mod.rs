@@ -13,6 +13,7 @@ use iceoryx2::service::Service;
 
 use super::error::LinkError;
 pub(super) use files::Presence;
+pub(super) use files::random_key;
 use files::{Locked, OwnerOnly};
 pub use sweep::sweep;
 

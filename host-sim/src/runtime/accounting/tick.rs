@@ -1,8 +1,8 @@
 //! What the controller saw and answered, tick by tick.
 
 use firmware::Inputs;
+use firmware::contract::PaddleCommand;
 use firmware::contract::frames::MAX_PADDLES;
-use firmware::contract::{NeedleSample, PaddleCommand, PaddleSample, TargetSample};
 
 use crate::exchange::bytes::{ByteReader, ByteWriter};
 
@@ -30,34 +30,10 @@ impl ControllerTick {
         writer.u32(present);
         writer.u64(inputs.tick);
         writer.u64(inputs.time_ns);
-        let needle = inputs.needle.unwrap_or_default();
-        writer.u32(needle.sequence);
-        writer.u32(needle.reserved);
-        writer.u64(needle.time_ns);
-        writer.f64(needle.depth);
-        writer.f64(needle.velocity);
-        let target = inputs.target.unwrap_or_default();
-        writer.u32(target.sequence);
-        writer.u32(target.flags);
-        writer.u64(target.time_ns);
-        target.displacement.into_iter().for_each(|component| writer.f64(component));
-        for paddle in inputs.paddles.map(Option::unwrap_or_default) {
-            writer.u32(paddle.sequence);
-            writer.u32(paddle.paddle_index);
-            writer.u64(paddle.time_ns);
-            paddle.displacement.into_iter().for_each(|component| writer.f64(component));
-        }
-        writer.u32(command.sequence);
-        writer.u32(command.state);
-        writer.u64(command.tick);
-        writer.u64(command.time_ns);
-        writer.u64(command.faults);
-        command.displacement.into_iter().flatten().for_each(|component| writer.f64(component));
-        writer.u32(command.needle_sequence);
-        writer.u32(command.target_sequence);
-        command.paddle_index.into_iter().for_each(|index| writer.u32(index));
-        writer.u32(command.flags);
-        writer.u32(command.reserved);
+        writer.needle(&inputs.needle.unwrap_or_default());
+        writer.target(&inputs.target.unwrap_or_default());
+        inputs.paddles.map(Option::unwrap_or_default).iter().for_each(|paddle| writer.paddle(paddle));
+        writer.command(command);
     }
 
     /// Reads the fixed-size form; `None` for bytes that nobody writes.
@@ -67,33 +43,9 @@ impl ControllerTick {
             return None;
         }
         let (tick, time_ns) = (reader.u64()?, reader.u64()?);
-        let needle = NeedleSample {
-            sequence: reader.u32()?,
-            reserved: reader.u32()?,
-            time_ns: reader.u64()?,
-            depth: reader.f64()?,
-            velocity: reader.f64()?,
-        };
-        let target = TargetSample {
-            sequence: reader.u32()?,
-            flags: reader.u32()?,
-            time_ns: reader.u64()?,
-            displacement: reader.displacement()?,
-        };
-        let paddles = [paddle(reader)?, paddle(reader)?];
-        let command = PaddleCommand {
-            sequence: reader.u32()?,
-            state: reader.u32()?,
-            tick: reader.u64()?,
-            time_ns: reader.u64()?,
-            faults: reader.u64()?,
-            displacement: [reader.displacement()?, reader.displacement()?],
-            needle_sequence: reader.u32()?,
-            target_sequence: reader.u32()?,
-            paddle_index: [reader.u32()?, reader.u32()?],
-            flags: reader.u32()?,
-            reserved: reader.u32()?,
-        };
+        let (needle, target) = (reader.needle()?, reader.target()?);
+        let paddles = [reader.paddle()?, reader.paddle()?];
+        let command = reader.command()?;
         Some(Self {
             inputs: Inputs {
                 tick,
@@ -105,13 +57,4 @@ impl ControllerTick {
             command,
         })
     }
-}
-
-fn paddle(reader: &mut ByteReader<'_>) -> Option<PaddleSample> {
-    Some(PaddleSample {
-        sequence: reader.u32()?,
-        paddle_index: reader.u32()?,
-        time_ns: reader.u64()?,
-        displacement: reader.displacement()?,
-    })
 }
