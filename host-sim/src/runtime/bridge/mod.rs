@@ -28,7 +28,8 @@ use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 
 /// From the start frame to tick 0: time for the controller to fall asleep.
 const LEAD_NS: u64 = 20_000_000;
-/// Between two looks at the socket and the link while neither has anything, ns: the most that this adds to an age.
+/// Between two looks at the socket and the link, ns: the most that this adds to an age. Under a flood, too: whoever runs at a
+/// real-time priority and never sleeps takes the controller's processor.
 const NAP_NS: u64 = 50_000;
 /// Most datagrams between two looks at the commands: a flood must not hold them up.
 const BURST: usize = 64;
@@ -102,8 +103,8 @@ fn serve_in(
         let mut bridge = Bridge::new(socket, *settings, &told);
         request_real_time();
         let ended = bridge.carry(&mut ports, &mut peer);
-        release_real_time();
         bridge.say_last_words();
+        release_real_time();
         ServedController { result: bridge.result(&ended), ended }
     });
     // Whatever has happened, the controller need not wait for its end, and leaves first.
@@ -159,7 +160,8 @@ impl Bridge {
         let (mut next_hello_ns, mut next_look_ns) = (began_ns, began_ns);
         loop {
             signals::check().map_err(stopped)?;
-            let is_busy = self.take_samples(ports)? | self.pass_commands(ports)?;
+            self.take_samples(ports)?;
+            self.pass_commands(ports)?;
             let now_ns = now_ns();
             match self.started_ns {
                 None if now_ns >= next_hello_ns => {
@@ -184,16 +186,14 @@ impl Bridge {
                     return Err(RuntimeError::PeerDied { peer: Role::Controller, how });
                 }
             }
-            if !is_busy {
-                sleep_until(now_ns + NAP_NS);
-            }
+            sleep_until(now_ns + NAP_NS);
         }
     }
 
-    /// Takes what waits at the socket, up to a burst; whether there was anything.
-    fn take_samples(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<bool, RuntimeError> {
-        for nth in 0..BURST {
-            let Some(received) = self.socket.receive()? else { return Ok(nth > 0) };
+    /// Takes what waits at the socket, up to a burst.
+    fn take_samples(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<(), RuntimeError> {
+        for _ in 0..BURST {
+            let Some(received) = self.socket.receive()? else { break };
             let now_ns = now_ns();
             let sample = received.and_then(|datagram| self.admission.admit(&datagram, now_ns));
             match sample {
@@ -201,7 +201,7 @@ impl Bridge {
                 Err(refusal) => self.refused.count(refusal),
             }
         }
-        Ok(true)
+        Ok(())
     }
 
     fn publish(
@@ -234,17 +234,17 @@ impl Bridge {
         Ok(())
     }
 
-    /// Sends on what the controller has said; whether that was anything.
-    fn pass_commands(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<bool, RuntimeError> {
-        for nth in 0..COMMANDS {
-            let Some(command) = ports.command.oldest()? else { return Ok(nth > 0) };
+    /// Sends on what the controller has said.
+    fn pass_commands(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<(), RuntimeError> {
+        for _ in 0..COMMANDS {
+            let Some(command) = ports.command.oldest()? else { break };
             let sent_ns = self.send(command);
             self.heard_ns = sent_ns;
             self.accounts.commands += 1;
             let delay_ns = sent_ns.saturating_sub(command.time_ns);
             self.accounts.largest_delay_ns = self.accounts.largest_delay_ns.max(Some(delay_ns));
         }
-        Ok(true)
+        Ok(())
     }
 
     /// Sends a command; when that was, ns. What the operating system does not take is counted: the next one comes soon.
