@@ -421,7 +421,7 @@ fn silent_sensors_end_in_safe_and_nothing_is_invented() {
 }
 
 #[test]
-fn a_controller_that_is_killed_or_stopped_leaves_no_valid_command() {
+fn a_controller_that_is_killed_leaves_no_valid_command() {
     let (mut stage, mut rig) = resting("killed", &[]);
     rig.rests_until(0, is_running);
     stage.controller.kill().unwrap();
@@ -433,7 +433,10 @@ fn a_controller_that_is_killed_or_stopped_leaves_no_valid_command() {
     assert!(message(&output).contains("controller process"), "{}", message(&output));
     assert!(result.own_commands >= 1 && result.ended.is_some(), "{result:?}");
     assert!(rig.commands().iter().all(|command| !command.is_valid()), "nothing is valid after the last word");
+}
 
+#[test]
+fn nobody_moves_by_the_last_word_of_a_controller_that_is_stopped() {
     let (stage, mut rig) = resting("stopped", &["--patience", "1"]);
     rig.rests_until(0, is_running);
     signal(stage.controller.id(), "STOP");
@@ -444,7 +447,7 @@ fn a_controller_that_is_killed_or_stopped_leaves_no_valid_command() {
 }
 
 #[test]
-fn what_an_earlier_run_said_and_what_others_say_is_refused() {
+fn what_an_earlier_run_said_is_refused() {
     let (stage, mut rig) = resting("first", &[]);
     rig.rests_until(0, is_running);
     signal(stage.bridge.id(), "INT");
@@ -460,7 +463,10 @@ fn what_an_earlier_run_said_and_what_others_say_is_refused() {
     assert!(message(&output).contains("no sample has come"), "{}", message(&output));
     assert_eq!(result.refused.get("other-run"), Some(&(rig.sent.len() as u64)), "{result:?}");
     assert_eq!((result.taken.values().sum::<u64>(), result.commands), (0, 0));
+}
 
+#[test]
+fn what_another_address_says_is_refused() {
     let (stage, mut rig) = resting("foreign", &["--peer", "127.0.0.2", "--patience", "1"]);
     (0..20).for_each(|sequence| rig.send_rest(sequence));
     let (_, result) = stage.end();
