@@ -216,13 +216,29 @@ impl Stage {
         (Self { controller, bridge, json, _folder: folder }, socket)
     }
 
-    /// Waits for the bridge's end.
+    /// Waits for the bridge's end, for a bounded time.
     fn end(mut self) -> (Output, BridgeResult) {
-        let output = self.bridge.wait_with_output().unwrap();
+        let until = Instant::now() + Duration::from_secs(20);
+        let status = loop {
+            if let Some(status) = self.bridge.try_wait().unwrap() {
+                break status;
+            }
+            assert!(Instant::now() < until, "the bridge goes on");
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let mut stderr = Vec::new();
+        self.bridge.stderr.take().unwrap().read_to_end(&mut stderr).unwrap();
         let result = std::fs::read(&self.json).expect("what went over it is written");
-        let _ = self.controller.kill();
-        let _ = self.controller.wait();
-        (output, serde_json::from_slice(&result).unwrap())
+        (Output { status, stdout: Vec::new(), stderr }, serde_json::from_slice(&result).unwrap())
+    }
+}
+
+impl Drop for Stage {
+    fn drop(&mut self) {
+        for child in [&mut self.bridge, &mut self.controller] {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
     }
 }
 
