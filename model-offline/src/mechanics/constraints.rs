@@ -50,6 +50,25 @@ impl ConstrainedRows {
         (0..self.len()).map(|b| self.row(b).0)
     }
 
+    /// Adds `stiffness Λᵀ Λ` to a matrix: springs between what every row interpolates and its place.
+    ///
+    /// # Panics
+    /// When the pattern misses a pair of a row's nodes.
+    pub(crate) fn add_springs<const D: usize>(&self, pattern: &Pattern, stiffness: f64, matrix: &mut [f64]) {
+        for b in 0..self.len() {
+            let (nodes, values) = self.row(b);
+            for (column, &j) in nodes.iter().enumerate() {
+                let stride = pattern.column_length(j);
+                for (&i, value) in nodes[column..].iter().zip(&values[column..]) {
+                    let at = pattern.block_position(i, j).expect("the pattern covers the rows");
+                    for k in 0..D {
+                        matrix[at + k * stride + k] += stiffness * value * values[column];
+                    }
+                }
+            }
+        }
+    }
+
     /// `out = Λ d`, D numbers per row.
     pub fn apply<const D: usize>(&self, d: &[f64], out: &mut [f64]) {
         for (b, out) in out.chunks_exact_mut(D).enumerate() {

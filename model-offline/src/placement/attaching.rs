@@ -38,7 +38,7 @@ impl<'m> Attaching<'m> {
         let (paddles, held) = (model.attachable_rows()?, model.constrained_rows(None)?);
         let (analysis, retained) = model.condensing_analysis()?;
         let sampled = (&**model.rule(), model.tissue());
-        let mut body = CondensedBody::new(sampled, analysis, retained.len(), held).ok()?;
+        let mut body = CondensedBody::new(sampled, analysis, (retained.len(), None), held).ok()?;
         let mut forces = vec![0.0; model.dofs()];
         forces.extend(loads.forces(model));
         let mut values = model.prescribed_values(None, 1.0, Vector2::zeros());

@@ -43,25 +43,44 @@ pub(super) fn singular(detail: &str) -> Failure {
 pub(super) struct CondensedBody<const D: usize> {
     solver: ConstrainedSolver<D>,
     condensed: CondensedFactor,
+    /// Flexibility of the springs of ports, length per force; none without ports.
+    spring: Option<f64>,
 }
 
+/// Stiffness of the springs of ports over the mean diagonal of the tangent. What they yield is known and taken off, so that any
+/// stiffness serves that is neither so soft that it hides what is behind it, nor so stiff that it costs digits.
+const SPRING: f64 = 10.0;
+
 impl<const D: usize> CondensedBody<D> {
-    /// Assembles and factorises, with an analysis that [retains](Analysis::retaining) so many nodes.
+    /// Assembles and factorises, with an analysis that [retains](Analysis::retaining) so many nodes: those of rows, or `ports`, each
+    /// the last node of a row that is joined by a spring.
     ///
     /// # Errors
     /// [`ModelError`] when the tangent at rest is singular with these rows held.
     pub(super) fn new(
         (rule, tissue): (&Quadrature<D>, &Tissue),
         analysis: &Analysis,
-        retained: usize,
+        (retained, ports): (usize, Option<&ConstrainedRows>),
         held: ConstrainedRows,
     ) -> Result<Self, ModelError> {
-        let values = tangent_at_rest(rule, tissue, analysis)?;
+        let mut values = tangent_at_rest(rule, tissue, analysis)?;
+        let spring = ports.map(|ports| {
+            let (pattern, unknowns) = (analysis.pattern(), analysis.pattern().unknowns() - retained * D);
+            let stiffness: f64 = (0..unknowns).map(|u| values[pattern.diagonal_position(u)]).sum();
+            let stiffness = SPRING * stiffness / unknowns as f64;
+            ports.add_springs::<D>(pattern, stiffness, &mut values);
+            1.0 / stiffness
+        });
         let mut solver = ConstrainedSolver::<D>::new(analysis, held).held_tight();
         solver.load(&values);
         solver.factorise().map_err(|error| singular(&error.to_string()))?;
         let condensed = solver.condensed(retained);
-        Ok(Self { solver, condensed })
+        Ok(Self { solver, condensed, spring })
+    }
+
+    /// Numbers of a field: D for every node, then for every port.
+    pub(super) fn unknowns(&self) -> usize {
+        self.solver.pattern().unknowns()
     }
 
     /// Displacements, as nodal coefficients, under forces and values of the held rows: as many fields as there are forces,
@@ -72,12 +91,22 @@ impl<const D: usize> CondensedBody<D> {
         x
     }
 
-    /// Displacements that rows of retained nodes take per force along each other: D numbers per row, in their order.
+    /// Displacements that rows take per force along each other: D numbers per row, in their order. They are rows of retained nodes
+    /// or, where there are ports, those that the ports stand for.
     pub(super) fn compliance<'s>(&self, rows: impl Iterator<Item = &'s Stencil<D>>) -> Mat<f64> {
         let weights = |row: &Stencil<D>, axis: usize| -> Functional {
             row.nodes.iter().zip(&row.values).map(|(&i, &value)| (i * D as u32 + axis as u32, value)).collect()
         };
-        let functionals: Vec<_> = rows.flat_map(|row| (0..D).map(move |axis| weights(row, axis))).collect();
-        self.condensed.compliance(&functionals)
+        let Some(spring) = self.spring else {
+            let functionals: Vec<_> = rows.flat_map(|row| (0..D).map(move |axis| weights(row, axis))).collect();
+            return self.condensed.compliance(&functionals);
+        };
+        // A port yields with its spring.
+        let rows = rows.count() * D;
+        let first = self.unknowns() - rows;
+        let ports: Vec<Functional> = (first..self.unknowns()).map(|u| vec![(u as u32, 1.0)]).collect();
+        let mut compliance = self.condensed.compliance(&ports);
+        (0..rows).for_each(|k| compliance[(k, k)] -= spring);
+        compliance
     }
 }

@@ -54,6 +54,12 @@ impl<const D: usize> Stencil<D> {
             sum + Point::from_column_slice(&coefficients[at..at + D]) * value
         })
     }
+
+    /// The difference between what this interpolates and the value of a node after all of its own.
+    pub(crate) fn ported(&self, port: u32) -> Self {
+        let nodes = self.nodes.iter().copied().chain([port]).collect();
+        Self { nodes, values: self.values.iter().copied().chain([-1.0]).collect(), gradients: Vec::new() }
+    }
 }
 
 /// What to reproduce at a point: the field itself, or one of its first derivatives.

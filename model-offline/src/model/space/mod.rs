@@ -19,7 +19,7 @@ use crate::scene::space::SpaceScene;
 use crate::solver::analysis::Analysis;
 use crate::solver::equilibrium::{DiscreteBody, Equilibrium, Failure, NewtonSettings};
 use nalgebra::{DMatrix, Matrix3xX, Vector3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 
 /// The discrete model of a scene in space: everything that all paddles share. Cheap to clone.
@@ -33,6 +33,19 @@ pub struct SpaceModel {
     target: Stencil<3>,
     overlapping: Vec<[usize; 2]>,
     analysis: Arc<OnceLock<Analysis>>,
+}
+
+/// How a body is condensed to what paddles and target take.
+#[derive(Debug)]
+pub(crate) struct Condensing {
+    /// Sparsity and elimination order.
+    pub(crate) analysis: Analysis,
+    /// Nodes that are eliminated last.
+    pub(crate) retained: usize,
+    /// Where displacements are sums of several unknowns: rows `u(X_b) − p_b` of the nodes of each and of its port p_b, a node
+    /// more, numbered after all others. A port carries nothing but a spring to what it stands for. It keeps what has to be
+    /// eliminated last to one node per displacement, where its kernels' neighbours would be three to five.
+    pub(crate) ports: Option<ConstrainedRows>,
 }
 
 /// Which nodes are held, and the rows `u(X_i) = Σ_I Ψ_I(X_i) d_I` that hold them.
@@ -211,14 +224,34 @@ impl SpaceModel {
             .get_or_init(|| Analysis::new(self.spatial.rule(), self.spatial.positions(), self.constrained_lists()))
     }
 
-    /// The same with the nodes that paddles and target take eliminated last; and those nodes, ascending.
-    pub(crate) fn condensing_analysis(&self) -> (Analysis, Vec<u32>) {
-        let rows = self.held.paddles.iter().flatten().map(|node| &self.held.rows[node]).chain([&self.target]);
-        let mut retained: Vec<u32> = rows.flat_map(|row| row.nodes.iter().copied()).collect();
-        retained.sort_unstable();
-        retained.dedup();
+    /// The nodes of all paddles, each once, in the order of paddles.
+    pub(crate) fn paddles_nodes(&self) -> Vec<u32> {
+        let mut seen = BTreeSet::new();
+        self.held.paddles.iter().flatten().copied().filter(|node| seen.insert(*node)).collect()
+    }
+
+    /// The same condensed to the displacements of the [paddles' nodes](Self::paddles_nodes) and of the target: where those are
+    /// single unknowns, as with elements, their nodes are eliminated last, else ports of theirs.
+    pub(crate) fn condensing_analysis(&self) -> Condensing {
         let (rule, positions) = (self.spatial.rule(), self.spatial.positions());
-        (Analysis::retaining(rule, positions, self.constrained_lists(), &retained), retained)
+        let rows: Vec<&Stencil<3>> =
+            self.paddles_nodes().iter().map(|node| &self.held.rows[node]).chain([&self.target]).collect();
+        if self.spatial.method().integration.is_element() {
+            let retained: BTreeSet<u32> = rows.iter().flat_map(|row| row.nodes.iter().copied()).collect();
+            let retained: Vec<u32> = retained.into_iter().collect();
+            let analysis = Analysis::retaining(rule, positions, self.constrained_lists(), &retained);
+            return Condensing { analysis, retained: retained.len(), ports: None };
+        }
+        let nodes = positions.len() as u32;
+        let retained: Vec<u32> = (nodes..nodes + rows.len() as u32).collect();
+        let ported: Vec<Stencil<3>> = rows.iter().zip(&retained).map(|(row, &port)| row.ported(port)).collect();
+        // A port lies where its row interpolates.
+        let places: Vec<f64> = positions.iter().flat_map(|x| x.iter().copied()).collect();
+        let positions: Vec<Point<3>> =
+            positions.iter().copied().chain(rows.iter().map(|row| row.interpolate(&places))).collect();
+        let lists = self.constrained_lists().chain(ported.iter().map(|row| row.nodes.as_slice()));
+        let analysis = Analysis::retaining(rule, &positions, lists, &retained);
+        Condensing { analysis, retained: retained.len(), ports: Some(ConstrainedRows::new(ported.iter())) }
     }
 
     /// A body at rest with some paddles attached, by their places in the scene's list.

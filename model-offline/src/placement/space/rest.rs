@@ -9,7 +9,7 @@
 use super::controllability::Controllability;
 use crate::linalg::DenseCholesky;
 use crate::model::ModelError;
-use crate::model::space::{Holder, SpaceModel};
+use crate::model::space::{Condensing, Holder, SpaceModel};
 use crate::placement::condensed::{CondensedBody, singular};
 use faer::Mat;
 use nalgebra::{DMatrix, Vector3};
@@ -54,26 +54,18 @@ impl<'m> CondensedRest<'m> {
     /// # Errors
     /// [`ModelError`] when the tangent at rest is singular.
     pub fn new(model: &'m SpaceModel) -> Result<Self, ModelError> {
-        let (analysis, retained) = model.condensing_analysis();
+        let Condensing { analysis, retained, ports } = model.condensing_analysis();
         let held = model.held_rows(&[]);
         let sampled = (&**model.spatial().rule(), model.tissue());
-        let mut body = CondensedBody::<3>::new(sampled, &analysis, retained.len(), held.rows.clone())?;
-        let field = body.fields(&vec![0.0; model.dofs()], &held.values(model.scene().needle.axis, &[]), 1e-14);
-        let mut place = BTreeMap::new();
-        for paddle in 0..model.scene().paddles.len() {
-            for &node in model.paddle_nodes(paddle) {
-                let next = place.len();
-                place.entry(node).or_insert(next);
-            }
-        }
-        let mut nodes = vec![0; place.len()];
-        place.iter().for_each(|(&node, &at)| nodes[at] = node);
+        let mut body = CondensedBody::<3>::new(sampled, &analysis, (retained, ports.as_ref()), held.rows.clone())?;
+        let field = body.fields(&vec![0.0; body.unknowns()], &held.values(model.scene().needle.axis, &[]), 1e-14);
+        let nodes = model.paddles_nodes();
         Ok(Self {
             per_depth: nodes.iter().map(|&node| model.row(node).interpolate(&field)).collect(),
             target_per_depth: model.target_row().interpolate(&field),
             compliance: body.compliance(nodes.iter().map(|&node| model.row(node)).chain([model.target_row()])),
+            place: nodes.iter().enumerate().map(|(at, &node)| (node, at)).collect(),
             model,
-            place,
         })
     }
 

@@ -54,8 +54,8 @@ const BASIS_IN_SPACE: f64 = 2.0;
 /// The same in space: one factorisation, from which all paddles and pairs are condensed. Within a factor of 1.6 of the
 /// time on five bodies of 1,413 to 25,331 nodes of quadratic tetrahedra.
 pub(super) fn cost_in_space(model: &SpaceModel) -> f64 {
-    let (analysis, _) = model.condensing_analysis();
-    let factor = analysis.symbolic();
+    let condensing = model.condensing_analysis();
+    let factor = condensing.analysis.symbolic();
     let entries = factor.entries() as f64;
     let method = model.spatial().method();
     let nodes = model.nodes() as f64;
