@@ -28,7 +28,8 @@ const REFERENCE_SHARE: f64 = 0.5;
 const AT_REST: f64 = 0.15;
 /// Levels that refinement begins with, and ends with.
 const LEVELS: std::ops::RangeInclusive<i32> = 0..=5;
-/// Nodes of the largest model that is factorised: nodal rules couple a few hundred neighbours, elements a few dozen.
+/// Nodes of the largest model that is refined to, a minute or two and about 8 GB: nodal rules couple a few hundred neighbours,
+/// elements a few dozen.
 const MOST_NODES: usize = 20_000;
 const MOST_ELEMENT_NODES: usize = 120_000;
 
