@@ -680,6 +680,37 @@ fn a_scene_that_is_refused_leaves_no_file_and_one_that_is_nearly_known_is_named(
 }
 
 #[test]
+fn edges_are_numbered_as_the_file_counts_them() {
+    const OUTLINE: &str = "[[0.0, 0.0], [100.0, 0.0], [100.0, 60.0], [0.0, 60.0]]";
+    for (outline, sides) in [
+        (OUTLINE, ["bottom", "right", "top", "left"]),
+        ("[[0.0, 0.0], [0.0, 60.0], [100.0, 60.0], [100.0, 0.0]]", ["left", "top", "right", "bottom"]),
+        ("[[100.0, 60.0], [100.0, 0.0], [0.0, 0.0], [0.0, 60.0]]", ["right", "bottom", "left", "top"]),
+    ] {
+        let svg = scene_picture::svg(&read(&[(OUTLINE, outline)]).unwrap());
+        let middle = |[left, top, right, bottom]: [f64; 4]| [0.5 * (left + right), 0.5 * (top + bottom)];
+        let numbers: Vec<(String, [f64; 2])> = texts(&svg)
+            .into_iter()
+            .filter(|(text, _)| text.len() == 2 && text.starts_with('e'))
+            .map(|(text, place)| (text, middle(place)))
+            .collect();
+        let outermost = |axis: usize, sign: f64| {
+            let first = numbers.iter().max_by(|a, b| (sign * a.1[axis]).total_cmp(&(sign * b.1[axis])));
+            first.map(|(text, _)| text.clone())
+        };
+        for (k, side) in sides.into_iter().enumerate() {
+            let found = match side {
+                "left" => outermost(0, -1.0),
+                "right" => outermost(0, 1.0),
+                "top" => outermost(1, -1.0),
+                _ => outermost(1, 1.0),
+            };
+            assert_eq!(found, Some(format!("e{k}")), "{outline}, {side}: {numbers:?}");
+        }
+    }
+}
+
+#[test]
 fn draw_writes_a_whole_picture_or_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let scene = written(folder.path(), "scene.toml", BLOCK);

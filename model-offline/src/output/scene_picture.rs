@@ -21,6 +21,9 @@ const MOST_GAP: f64 = 0.1;
 /// Half the widths of what names keep clear of, px.
 const TARGET: f64 = 12.0;
 const NEEDLE_POINT: f64 = 7.0;
+/// An outline with more edges than this is not made by hand, and shorter ones than this, px, have no room for their number.
+const MOST_EDGES: usize = 32;
+const SHORTEST_EDGE: f64 = 44.0;
 /// Distance of the edge of a body from a paddle's middle, at which its outer side is looked for, px.
 const BESIDE: f64 = 3.0;
 
@@ -32,17 +35,19 @@ pub fn svg(scene: &Scene) -> String {
     let body = map(&picture.plane, unit, |drawing| without_room = picture.draw(drawing));
     let width = body.size[0].max(LEAST_WIDTH);
     let title = format!("Scene {}", scene.name);
-    let heading = heading(&title, &caption(without_room), width);
+    let heading = heading(&title, &caption(without_room, picture.numbers_edges()), width);
     let legend = picture.legend().drawing(width);
     sheet(&title, &[heading, body, legend], 1).file()
 }
 
-fn caption(without_room: usize) -> String {
-    match without_room {
-        0 => "At rest, to scale.".to_owned(),
-        1 => "At rest, to scale. One name found no room.".to_owned(),
-        names => format!("At rest, to scale. {names} names found no room."),
-    }
+fn caption(without_room: usize, edges: bool) -> String {
+    let edges = if edges { " e0, e1, … are edges of the outline, as in “edge = 0”." } else { "" };
+    let names = match without_room {
+        0 => String::new(),
+        1 => " One name found no room.".to_owned(),
+        names => format!(" {names} names found no room."),
+    };
+    format!("At rest, to scale.{edges}{names}")
 }
 
 struct Picture<'a> {
@@ -109,6 +114,7 @@ impl<'a> Picture<'a> {
         names.avoid_around(target, TARGET);
         names.add(target, "target", None);
         self.name_inclusions(&mut names, regions);
+        self.number_edges(&mut names);
         names.draw(drawing, [0.0; 2], self.plane.size)
     }
 
@@ -172,6 +178,30 @@ impl<'a> Picture<'a> {
             // Cut off, it may be no simple polygon.
             let middle = Polygon::new(region).unwrap_or_else(|_| inclusion.outline.clone()).centroid();
             names.add(self.plane.at(middle.into()), what, None);
+        }
+    }
+
+    fn numbers_edges(&self) -> bool {
+        self.outline.len() <= MOST_EDGES
+    }
+
+    /// Numbers of edges as the scene file counts them, on the inner side.
+    fn number_edges(&self, names: &mut Names) {
+        let mut vertices = self.outline.clone();
+        if self.scene.clockwise {
+            vertices.reverse();
+        }
+        let edges = vertices.iter().zip(vertices.iter().cycle().skip(1)).enumerate();
+        for (number, ([ax, ay], [bx, by])) in edges.filter(|_| self.numbers_edges()) {
+            let (way, length) = ([bx - ax, by - ay], (bx - ax).hypot(by - ay));
+            if length < SHORTEST_EDGE {
+                continue;
+            }
+            let middle = [0.5 * (ax + bx), 0.5 * (ay + by)];
+            let normal = [way[1] / length, -way[0] / length];
+            let probe = [0, 1].map(|k| middle[k] + BESIDE * normal[k]);
+            let inward = if self.inside(probe) { normal } else { normal.map(|v| -v) };
+            names.add(middle, format!("e{number}"), Some(inward));
         }
     }
 

@@ -81,6 +81,8 @@ pub struct Scene {
     pub stress_unit: String,
     /// The body.
     pub outline: Polygon,
+    /// Whether the file gives the outline clockwise: `outline` then runs through its vertices backwards.
+    pub clockwise: bool,
     /// What the body is made of.
     pub material: Law,
     /// Regions of another stiffness or material.

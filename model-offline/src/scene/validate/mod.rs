@@ -75,6 +75,7 @@ impl Validator<'_> {
             .map(|i| self.inclusion(i, &outline, needle.shaft.as_ref()))
             .collect::<Checked<_>>()?;
         let scene = Scene {
+            clockwise: outline.vertices()[0] != Point2::from(file.domain.outline.get()[0]),
             name: file.scene.name.clone(),
             length_unit: file.scene.units.length.clone(),
             stress_unit: file.scene.units.stress.clone(),
