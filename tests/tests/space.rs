@@ -60,36 +60,39 @@ fn responses(scene: &SpaceScene, level: i32) -> (usize, Vec<SpaceResponse>) {
 #[test]
 fn quadratic_tetrahedra_reach_the_continuum_limits_of_all_singles_and_pairs() {
     // The worst at level 1 is a pair whose patches touch, where the displacement jumps; all single paddles are within 1 %.
-    reach(&[
-        ("block", false, 0, 0.025),
-        ("block", true, 0, 0.025),
-        ("block", false, 1, 0.015),
-        ("mound", true, 1, 0.04),
-    ]);
+    reach(
+        Integration::FemT10,
+        &[("block", false, 0, 0.025), ("block", true, 0, 0.025), ("block", false, 1, 0.015), ("mound", true, 1, 0.04)],
+    );
 }
 
 #[test]
-#[ignore = "three minutes and 9 GB, optimized"]
-fn finer_quadratic_tetrahedra_are_within_a_percent() {
+#[ignore = "minutes and 16 GB"]
+fn fine_meshes_are_within_a_few_percent() {
     parallel::within(parallel::available(), || {
-        reach(&[("block", false, 2, 0.01), ("block", true, 2, 0.01), ("mound", true, 2, 0.02)]);
+        reach(Integration::FemT10, &[("block", false, 2, 0.01), ("block", true, 2, 0.01), ("mound", true, 2, 0.02)]);
+        reach(
+            Integration::ScniStabilised,
+            &[("block", false, 2, 0.04), ("block", true, 2, 0.04), ("block", true, 3, 0.03)],
+        );
     });
 }
 
-/// Holds quadratic tetrahedra on (scene, inclusions, level) to the continuum limits, within so much.
-fn reach(cases: &[(&str, bool, i32, f64)]) {
+/// Holds a rule on (scene, inclusions, level) to the continuum limits, within so much.
+fn reach(integration: Integration, cases: &[(&str, bool, i32, f64)]) {
     for &(name, inclusions, level, within) in cases {
-        let (scene, limits) = case(name, inclusions, Integration::FemT10);
+        let (scene, limits) = case(name, inclusions, integration);
         let (nodes, found) = responses(&scene, level);
         let errors = errors(&found, &limits);
-        println!("{name} {inclusions} level {level}: {nodes} nodes, {errors:?}");
+        println!("{integration} {name} {inclusions} level {level}: {nodes} nodes, {errors:?}");
         assert!(errors.iter().all(|e| *e < within), "{name} {inclusions} level {level}: {errors:?}");
         let singles = worst_of(&found[..scene.paddles.len()], &limits["single"]);
-        assert!(name == "mound" || level == 0 || singles < 0.01, "{singles}");
+        let quadratic = integration == Integration::FemT10;
+        assert!(!quadratic || name == "mound" || level == 0 || singles < 0.01, "{singles}");
         // Without a paddle, too.
         let none = found.last().unwrap().target_per_depth;
         let limit = Vector3::from_fn(|k, _| limits["no_paddle"][k].as_f64().unwrap());
-        assert!((none - limit).norm() < 0.02 * limit.norm(), "{none} {limit}");
+        assert!((none - limit).norm() < if quadratic { 0.02 } else { 0.04 } * limit.norm(), "{none} {limit}");
     }
 }
 
