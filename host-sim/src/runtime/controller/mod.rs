@@ -132,11 +132,13 @@ impl<'c> ControlLoop<'c> {
             match frame.kind() {
                 Some(ClockKind::Step) => self.tick(ports, frame.tick, frame.time_ns)?,
                 Some(ClockKind::Stop) => return Ok(()),
-                Some(ClockKind::Start) | None => {
-                    return Err(RuntimeError::Protocol {
-                        peer: Role::Plant,
-                        what: format!("clock frame of kind {} in lockstep", frame.kind),
-                    });
+                Some(ClockKind::Start) => {
+                    let what = "it is in free-run, this controller in lockstep: give both the same --mode".to_owned();
+                    return Err(RuntimeError::Protocol { peer: Role::Plant, what });
+                }
+                None => {
+                    let what = format!("clock frame of kind {} in lockstep", frame.kind);
+                    return Err(RuntimeError::Protocol { peer: Role::Plant, what });
                 }
             }
         }
@@ -157,11 +159,15 @@ impl<'c> ControlLoop<'c> {
         let start = loop {
             match ports.clock.oldest()? {
                 Some(frame) if frame.kind() == Some(ClockKind::Start) => break frame.time_ns,
+                // Nothing has begun: a bridge that is told to end before its rig comes.
+                Some(frame) if frame.kind() == Some(ClockKind::Stop) => return Ok(()),
+                Some(frame) if frame.kind() == Some(ClockKind::Step) => {
+                    let what = "it is in lockstep, this controller in free-run: give both the same --mode".to_owned();
+                    return Err(RuntimeError::Protocol { peer: Role::Plant, what });
+                }
                 Some(frame) => {
-                    return Err(RuntimeError::Protocol {
-                        peer: Role::Plant,
-                        what: format!("clock frame of kind {} instead of a start", frame.kind),
-                    });
+                    let what = format!("clock frame of kind {} instead of a start", frame.kind);
+                    return Err(RuntimeError::Protocol { peer: Role::Plant, what });
                 }
                 None => patience.wait::<S>(peer)?,
             }
