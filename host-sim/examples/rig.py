@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """A rig for `host-sim bridge` with nothing attached: it says that everything rests, and prints what it is told.
 
-Usage: python3 rig.py [PORT]    (the port of the bridge's --send-to; 47361)
+Usage: python3 rig.py [PORT [ADDRESS]]    (those of the bridge's --send-to; 47361 127.0.0.1)
 
 Put your sensors where it says 0.0, and your actuators where it prints.
 """
@@ -17,6 +17,7 @@ TARGET = struct.Struct("<II Q 3d")     # number, 1 where it is seen, time, displ
 PADDLE = struct.Struct("<II Q 3d")     # number, index of the paddle, time, displacement
 COMMAND = struct.Struct("<II QQQ 6d II 2I II")
 HELLO = struct.Struct("<II 2I 24s")
+FRAMES = {1: HELLO, 5: COMMAND}        # what the bridge says
 MODES = {1: "HOLD", 2: "RUN", 3: "SAFE"}
 PERIOD = 0.005                         # s, as the controller's --rate 200 has it
 WATCHDOG = 0.1                         # s without a command after which the actuators stay where they are
@@ -29,11 +30,15 @@ def take(data):
     if len(data) < HEADER.size + 4 or zlib.crc32(data[:-4]) != struct.unpack("<I", data[-4:])[0]:
         return None
     magic, version, kind, _, run, number, _ = HEADER.unpack(data[:HEADER.size])
-    return (kind, run, number, data[HEADER.size:-4]) if (magic, version) == (b"SPBR", 1) else None
+    frame = data[HEADER.size:-4]
+    if (magic, version) != (b"SPBR", 1) or kind not in FRAMES or len(frame) != FRAMES[kind].size:
+        return None
+    return kind, run, number, frame
 
 
 link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-link.bind(("127.0.0.1", int(sys.argv[1]) if len(sys.argv) > 1 else 47361))
+port, address = sys.argv[1:3] + ["47361", "127.0.0.1"][len(sys.argv[1:3]):]
+link.bind((address, int(port)))
 taken = None
 while taken is None or taken[0] != 1:  # until the bridge says Hello
     data, bridge = link.recvfrom(2048)
@@ -41,7 +46,7 @@ while taken is None or taken[0] != 1:  # until the bridge says Hello
 _, run, newest, frame = taken
 dimension, count, first, second, unit = HELLO.unpack(frame)
 paddles = (first, second)[:count]
-print(f"{dimension} dimensions, {unit.rstrip(bytes(1)).decode()}, paddles {paddles}", flush=True)
+print(f"{dimension} dimensions, unit of length {unit.rstrip(bytes(1)).decode()}, paddles {paddles}", flush=True)
 link.setblocking(False)
 
 number = 0
@@ -55,7 +60,7 @@ def send(kind, frame):
     number += 1
 
 
-shown, heard, tick, due = None, clock(), 0, time.monotonic()
+shown, heard, held_up, tick, due = None, clock(), False, 0, time.monotonic()
 while clock() - heard < 2_000_000_000:  # until the bridge has been silent for 2 s
     measured = clock()
     send(2, NEEDLE.pack(tick, 0, measured, 0.0, 0.0))
@@ -73,6 +78,8 @@ while clock() - heard < 2_000_000_000:  # until the bridge has been silent for 2
         if taken is None or taken[0] != 5 or taken[1] != run or taken[2] <= newest:
             continue
         newest, heard = taken[2], clock()
+        if held_up:
+            continue
         fields = COMMAND.unpack(taken[3])
         state, goals, valid = fields[1], fields[5:11], fields[15] & 1
         now = (MODES.get(state), "go to" if valid else "keep")
@@ -85,3 +92,8 @@ while clock() - heard < 2_000_000_000:  # until the bridge has been silent for 2
     tick += 1
     due += PERIOD
     time.sleep(max(0.0, due - time.monotonic()))
+    # Where this program itself was held up, what waits is old, and nobody may move by it.
+    held_up = time.monotonic() - due > WATCHDOG
+    if held_up:
+        due, heard, shown = time.monotonic(), clock(), ("-", "keep")
+        print(*shown, flush=True)
