@@ -23,6 +23,32 @@ pub enum UsageError {
         /// The address.
         address: SocketAddr,
     },
+    /// The unspecified address: listened on it is all of this machine's, but nobody sends from it.
+    #[error("{option} {address} is nobody's address: name that of the machine with the rig")]
+    NobodysAddress {
+        /// The option.
+        option: &'static str,
+        /// The address.
+        address: IpAddr,
+    },
+    /// Nobody elsewhere can be reached from the loopback.
+    #[error(
+        "{option} {address} cannot be reached from --listen {listen}: give this machine's own address in the network there"
+    )]
+    FromLoopback {
+        /// The option.
+        option: &'static str,
+        /// The address.
+        address: IpAddr,
+        /// The address that is listened on.
+        listen: IpAddr,
+    },
+    /// The bridge would hear itself and nobody else.
+    #[error("--send-to {address} is where the bridge itself listens: name the port that the actuators listen on")]
+    ToItself {
+        /// The address.
+        address: SocketAddr,
+    },
     /// An address that others can reach.
     #[error(
         "{option} {address} is not of this machine's loopback: UDP is not authenticated, so that whoever can send there moves \

@@ -81,7 +81,7 @@ pub(crate) fn bridge(args: &BridgeArgs) -> Result<(), SimError> {
     let met = |told: &Introduction| {
         let Introduction { dimension, units: [unit, _], paddles, .. } = told;
         let paddles: Vec<_> = paddles.iter().map(u32::to_string).collect();
-        println!("Controller in {dimension} dimensions, in {unit}, paddle {}", paddles.join(" + "));
+        println!("Controller in {dimension} dimensions, unit of length {unit}, paddle {}", paddles.join(" + "));
     };
     let ServedController { result, ended } = serve(socket, &space, &settings, &met)?;
     if let Some(path) = &args.json {
@@ -98,12 +98,24 @@ fn addresses(args: &BridgeArgs) -> Result<Addresses, UsageError> {
     if send_to.port() == 0 {
         return Err(UsageError::NoPort { address: send_to });
     }
+    for (option, address) in [("--send-to", send_to.ip()), ("--peer", peer)] {
+        if address.is_unspecified() {
+            return Err(UsageError::NobodysAddress { option, address });
+        }
+    }
+    let hears_it = listen.ip() == send_to.ip() || listen.ip().is_unspecified() && send_to.ip().is_loopback();
+    if listen.port() == send_to.port() && hears_it {
+        return Err(UsageError::ToItself { address: send_to });
+    }
     for (option, address) in [("--listen", listen.ip()), ("--send-to", send_to.ip()), ("--peer", peer)] {
         if !network && !address.is_loopback() {
             return Err(UsageError::BeyondLoopback { option, address });
         }
         if address.is_ipv4() != listen.is_ipv4() {
             return Err(UsageError::MixedAddresses { option, address, listen: listen.ip() });
+        }
+        if listen.ip().is_loopback() && !address.is_loopback() {
+            return Err(UsageError::FromLoopback { option, address, listen: listen.ip() });
         }
     }
     Ok(Addresses { listen, send_to, peer })
