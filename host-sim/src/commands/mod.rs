@@ -78,7 +78,7 @@ pub(crate) enum Command {
     Plant(Box<PlantArgs>),
     /// Sensors and actuators outside in the plant's place, by UDP, for a controller in free-run
     #[command(
-        after_help = "Example, in three terminals:\n  host-sim controller --table paper.table --mode free-run\n  host-sim bridge --send-to 127.0.0.1:47361\n  python3 host-sim/examples/rig.py"
+        after_help = "Example, in three terminals:\n  host-sim controller --table paper.table --mode free-run --rate 200\n  host-sim bridge --send-to 127.0.0.1:47361\n  python3 host-sim/examples/rig.py"
     )]
     Bridge(BridgeArgs),
     /// Lets a running controller out of SAFE, once somebody has looked
