@@ -452,6 +452,35 @@ fn a_controller_that_is_killed_leaves_no_valid_command() {
 }
 
 #[test]
+fn what_waited_while_the_bridge_was_stopped_moves_nothing() {
+    let (mut stage, mut rig) = resting("waited", &[]);
+    rig.rests_until(0, is_running);
+    signal(stage.bridge.id(), "STOP");
+    // The controller fills the link, and is no more when the bridge goes on.
+    std::thread::sleep(Duration::from_millis(100));
+    stage.controller.kill().unwrap();
+    rig.commands();
+    // The link keeps the newest ones.
+    rig.last_command = None;
+    std::thread::sleep(Duration::from_millis(200));
+    signal(stage.bridge.id(), "CONT");
+    let (_, result) = stage.end();
+    let heard = rig.commands();
+    assert!(!heard.is_empty() && heard.iter().all(|command| !command.is_valid()), "{heard:?}");
+    assert!(result.expired > 0, "{result:?}");
+}
+
+#[test]
+fn who_is_told_to_end_before_the_rig_comes_lets_the_controller_go() {
+    let (mut stage, mut rig) = resting("early", &[]);
+    signal(stage.bridge.id(), "INT");
+    rig.hears_until(Duration::from_secs(1), |command| !command.is_valid());
+    assert!(stage.controller.wait().unwrap().success());
+    let (_, result) = stage.end();
+    assert_eq!((result.taken.values().sum::<u64>(), result.commands), (0, 0));
+}
+
+#[test]
 fn nobody_moves_by_the_last_word_of_a_controller_that_is_stopped() {
     let (stage, mut rig) = resting("stopped", &["--patience", "1"]);
     rig.rests_until(0, is_running);
@@ -498,6 +527,11 @@ fn addresses_that_make_no_sense_are_refused_before_anything_is_opened() {
         (&["--send-to", own, "--peer", "192.0.2.7"], "--network"),
         (&["--send-to", "[::1]:47361"], "one family"),
         (&["--send-to", "127.0.0.1:0"], "port"),
+        (&["--send-to", own, "--listen", own], "itself"),
+        (&["--send-to", own, "--listen", "0.0.0.0:47361", "--network"], "itself"),
+        (&["--send-to", "0.0.0.0:1", "--network"], "nobody's"),
+        (&["--send-to", other, "--network"], "--listen 127.0.0.1"),
+        (&["--send-to", own, "--peer", "0.0.0.0", "--network"], "nobody's"),
         (&["--send-to", own, "--delay", "1001"], "--delay"),
         (&["--send-to", own, "--seconds", "0"], "--seconds"),
         (&["--send-to", "rig:1"], "--send-to"),

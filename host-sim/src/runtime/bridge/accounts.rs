@@ -15,6 +15,8 @@ pub struct BridgeResult {
     pub refused: BTreeMap<String, u64>,
     /// Commands of the controller that were sent on.
     pub commands: u64,
+    /// Valid ones among them that had waited for more than 0.1 s, because the bridge was stopped: they went without VALID.
+    pub expired: u64,
     /// Datagrams that the operating system did not take for sending.
     pub not_sent: u64,
     /// Commands of the bridge's own without VALID: while the controller was silent, and at the end.
@@ -34,12 +36,13 @@ impl BridgeResult {
         };
         let delay = self.largest_delay_ns.map_or("none".to_owned(), |ns| format!("{:.3} ms", ns as f64 * 1e-6));
         format!(
-            "samples taken: {}; missing: {}; refused: {}; commands sent: {} and {} of the bridge's own, not sent: {}; \
+            "samples taken: {}; missing: {}; refused: {}; commands sent: {}, {} of them expired, and {} of the bridge's own, not sent: {}; \
              largest delay from a tick to the sending of its command: {delay}",
             list(&self.taken),
             self.missing,
             list(&self.refused),
             self.commands,
+            self.expired,
             self.own_commands,
             self.not_sent
         )

@@ -2,7 +2,7 @@
 //!
 //! It invents nothing. Samples that do not come are the controller's to notice, by their ages; what comes damaged, late,
 //! again or from elsewhere is counted and left out. Nothing waits in it: of samples the controller takes the newest,
-//! commands are sent on as they come, and what is more than the buffers of kernel and link is lost and counted.
+//! commands are sent on as they come, without VALID if they had to wait, and what is more than the buffers of kernel and link is lost and counted.
 
 pub mod accounts;
 pub mod admission;
@@ -28,9 +28,13 @@ use crate::exchange::{ClockFrame, ClockKind, Departure, PlantPorts, Space};
 
 /// From the start frame to tick 0: time for the controller to fall asleep.
 const LEAD_NS: u64 = 20_000_000;
-/// Between two looks at the socket and the link, ns: the most that this adds to an age. Under a flood, too: whoever runs at a
-/// real-time priority and never sleeps takes the controller's processor.
-const NAP_NS: u64 = 50_000;
+/// Looks at the socket and the link in a period of the controller: the most that one adds to an age is a twentieth of that.
+const LOOKS_PER_PERIOD: u64 = 20;
+/// Shortest time between two looks, ns. It is slept under a flood, too: whoever runs at a real-time priority and never sleeps
+/// takes the controller's processor.
+const SHORTEST_NAP_NS: u64 = 50_000;
+/// Longest time between two looks, ns.
+const LONGEST_NAP_NS: u64 = 500_000;
 /// Most datagrams between two looks at the commands: a flood must not hold them up.
 const BURST: usize = 64;
 /// Most commands between two looks at the datagrams: what the link keeps.
@@ -39,7 +43,8 @@ const COMMANDS: usize = 8;
 const BETWEEN_HELLOS_NS: u64 = 100_000_000;
 /// Between two looks at the controller, ns.
 const BETWEEN_LOOKS_NS: u64 = 16_000_000;
-/// Silence of the controller after which the actuators are told to keep their positions, and how often then, ns.
+/// Silence of the controller after which the actuators are told to keep their positions, and how often then, ns. A command
+/// that has waited longer, because this process was stopped, is not to be moved by either.
 const SILENCE_NS: u64 = 100_000_000;
 /// How often the last word is said: a datagram may be lost.
 const LAST_WORDS: usize = 3;
@@ -130,6 +135,8 @@ struct Bridge {
     last_ns: u64,
     /// Last command of the controller, ns.
     heard_ns: u64,
+    /// From one tick of the controller to the next, ns; the largest number before two were heard of.
+    period_ns: u64,
     /// When the first sample came, ns.
     started_ns: Option<u64>,
 }
@@ -150,6 +157,7 @@ impl Bridge {
             last: PaddleCommand::default(),
             last_ns: now_ns,
             heard_ns: now_ns,
+            period_ns: u64::MAX,
             started_ns: None,
         }
     }
@@ -160,7 +168,7 @@ impl Bridge {
         let (mut next_hello_ns, mut next_look_ns) = (began_ns, began_ns);
         loop {
             signals::check().map_err(stopped)?;
-            self.take_samples(ports)?;
+            let more_wait = self.take_samples(ports)?;
             self.pass_commands(ports)?;
             let now_ns = now_ns();
             match self.started_ns {
@@ -186,14 +194,14 @@ impl Bridge {
                     return Err(RuntimeError::PeerDied { peer: Role::Controller, how });
                 }
             }
-            sleep_until(now_ns + NAP_NS);
+            sleep_until(now_ns + if more_wait { SHORTEST_NAP_NS } else { nap_ns(self.period_ns) });
         }
     }
 
-    /// Takes what waits at the socket, up to a burst.
-    fn take_samples(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<(), RuntimeError> {
+    /// Takes what waits at the socket, up to a burst; whether more may wait.
+    fn take_samples(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<bool, RuntimeError> {
         for _ in 0..BURST {
-            let Some(received) = self.socket.receive()? else { break };
+            let Some(received) = self.socket.receive()? else { return Ok(false) };
             let now_ns = now_ns();
             let sample = received.and_then(|datagram| self.admission.admit(&datagram, now_ns));
             match sample {
@@ -201,7 +209,7 @@ impl Bridge {
                 Err(refusal) => self.refused.count(refusal),
             }
         }
-        Ok(())
+        Ok(true)
     }
 
     fn publish(
@@ -237,7 +245,14 @@ impl Bridge {
     /// Sends on what the controller has said.
     fn pass_commands(&mut self, ports: &mut PlantPorts<ipc::Service>) -> Result<(), RuntimeError> {
         for _ in 0..COMMANDS {
-            let Some(command) = ports.command.oldest()? else { break };
+            let Some(mut command) = ports.command.oldest()? else { break };
+            let ticks = command.tick.saturating_sub(self.last.tick);
+            let since_last_ns = command.time_ns.saturating_sub(self.last.time_ns);
+            self.period_ns = since_last_ns.checked_div(ticks).unwrap_or(self.period_ns);
+            if now_ns().saturating_sub(command.time_ns) > SILENCE_NS {
+                self.accounts.expired += u64::from(command.is_valid());
+                command.flags &= !COMMAND_VALID;
+            }
             let sent_ns = self.send(command);
             self.heard_ns = sent_ns;
             self.accounts.commands += 1;
@@ -321,6 +336,11 @@ impl Bridge {
             ..self.accounts.clone()
         }
     }
+}
+
+/// Between two looks at the socket and the link of a controller of this period, ns.
+fn nap_ns(period_ns: u64) -> u64 {
+    (period_ns / LOOKS_PER_PERIOD).clamp(SHORTEST_NAP_NS, LONGEST_NAP_NS)
 }
 
 /// A signal ends a bridge as it ends everything, but not without a last word.
