@@ -1,6 +1,6 @@
 //! Sparse Cholesky factorisation by faer: symbolic analysis once per pattern, numbers per iteration.
 
-use super::dense::shared_by;
+use super::dense::{NotPositiveDefinite, shared_by};
 use super::ordering::nested_dissection;
 use super::pattern::Pattern;
 use crate::geometry::Point;
@@ -26,11 +26,6 @@ const NODES_ORDERED: usize = 500;
 const DISSECTION_TRIED: usize = 3000;
 /// Operations of a factorisation from which on several threads share it: below, they wait for each other longer than they work.
 const SHARED_FLOPS: f64 = 1e9;
-
-/// The matrix is not positive definite.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the matrix is not positive definite")]
-pub struct NotPositiveDefinite;
 
 /// Elimination order and sparsity of the Cholesky factors of a pattern: made once, shared by all matrices that have the
 /// pattern. Cheap to clone.

@@ -1,7 +1,6 @@
 //! Dense symmetric work on what is left when a body is condensed. All of it is done on as many threads as it is called
 //! [within](crate::parallel::within), and with the same result.
 
-use super::cholesky::NotPositiveDefinite;
 use crate::parallel;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::{factor, solve};
@@ -22,6 +21,11 @@ fn shared(rows: usize) -> Par {
 pub(super) fn shared_by(threads: usize) -> Par {
     if threads > 1 { Par::rayon(threads) } else { Par::Seq }
 }
+
+/// The matrix is not positive definite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the matrix is not positive definite")]
+pub struct NotPositiveDefinite;
 
 /// Cholesky factor of a dense matrix.
 #[derive(Debug, Clone)]

@@ -6,7 +6,7 @@ pub mod dense;
 mod ordering;
 pub mod pattern;
 
-pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymbolicFactor};
+pub use cholesky::{SparseCholesky, SymbolicFactor};
 pub use condensation::CondensedFactor;
-pub use dense::DenseCholesky;
+pub use dense::{DenseCholesky, NotPositiveDefinite};
 pub use pattern::Pattern;
