@@ -23,7 +23,7 @@ pub enum Sample {
 }
 
 /// What this machine's clock shows minus what the sender's does, as far as one way tells: the least difference between
-/// arrival and sending, let up by [`DRIFT_PPM`]. It is too large by the shortest time that a datagram is under way.
+/// arrival and sending, let up by 100 ppm, as two quartzes may part. It is too large by the shortest time that a datagram is under way.
 ///
 /// A datagram that was held up is therefore stamped as old as it is. An arrival alone would make it look fresh, and the
 /// controller, which goes by ages, would follow the past.
