@@ -135,11 +135,12 @@ pub(crate) fn run(cli: Cli) -> Result<(), CliError> {
 }
 
 /// Commands of the other program of this project, for those who mix them up.
-const ELSEWHERE: [&str; 12] = [
+const ELSEWHERE: [&str; 13] = [
     "worlds",
     "run",
     "controller",
     "plant",
+    "bridge",
     "rearm",
     "timing",
     "faults",
