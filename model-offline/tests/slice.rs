@@ -306,6 +306,19 @@ fn the_body_is_needed_for_block_and_one_paddle_will_do() {
     assert!(text.contains("[[inclusion]]") && scene(&fit.written(&body, &text).unwrap()).inclusions.is_empty());
 }
 
+#[test]
+fn a_slice_names_the_inclusions_that_its_plane_misses() {
+    let lump = |y: [f64; 2]| {
+        let [from, to] = y;
+        format!("[[inclusion]]\nbox = {{ min = [0.3, {from}, 0.35], max = [0.6, {to}, 0.75] }}\nstiffness = 9.0\n")
+    };
+    // The plane is y = 2.
+    let lumps = [lump([2.3, 2.9]), lump([1.7, 2.2]), lump([0.5, 1.0])].concat();
+    let cut = slice(&PRISM.replace("[target]", &(lumps + "[target]")), None).unwrap();
+    assert_eq!((cut.inclusions_left_out.as_slice(), cut.scene.inclusions.len()), ([1, 3].as_slice(), 1));
+    assert!(slice(&block(), Some(3)).unwrap().inclusions_left_out.is_empty());
+}
+
 /// A stiff lump beside the plane pushes the target across it, which no slice can know: most of the way orthogonal to the
 /// needle, and next to nothing of the way along it.
 #[test]

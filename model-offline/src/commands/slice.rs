@@ -64,6 +64,7 @@ pub(super) fn document(slice: &Slice) -> Value {
         "paddles": slice.scene.paddles.iter().map(|paddle| paddle.index).collect::<Vec<_>>(),
         "left_out": slice.left_out,
         "pieces_left_out": slice.pieces_left_out,
+        "inclusions_left_out": slice.inclusions_left_out,
     })
 }
 
@@ -82,6 +83,9 @@ pub(super) fn summary(slice: &Slice) -> String {
     let _ = writeln!(out, "paddles in it: {}", paddles.join(", "));
     for left in &slice.left_out {
         let _ = writeln!(out, "paddle {} is left out: {}", left.index, left.reason);
+    }
+    for number in &slice.inclusions_left_out {
+        let _ = writeln!(out, "inclusion {number} is left out: the plane does not meet it");
     }
     if slice.pieces_left_out > 0 {
         let _ = writeln!(out, "{} other pieces of the body are left out", slice.pieces_left_out);

@@ -1,5 +1,6 @@
 //! A scene turned into a discrete model, and bodies that can be driven through an insertion.
 
+mod condensing;
 mod derivatives;
 pub mod driven;
 mod error;
@@ -7,6 +8,7 @@ mod graded;
 pub mod space;
 mod tissue;
 
+pub(crate) use condensing::Condensing;
 pub use derivatives::{ControlDerivatives, Derivatives, control_derivatives};
 pub use driven::DrivenBody;
 pub use error::{BoundaryPart, ModelError, ModelFailure};
@@ -49,7 +51,7 @@ pub struct TissueModel {
     /// Made when the first body needs it, and shared with all models on the same nodes.
     analysis: Arc<OnceLock<Analysis>>,
     /// The same with the nodes eliminated last that paddles and target take.
-    condensing: Arc<OnceLock<(Analysis, Vec<u32>)>>,
+    condensing: Arc<OnceLock<Condensing>>,
 }
 
 /// Where essential boundary conditions are imposed: on nodes, or at boundary points by Nitsche's method.
@@ -359,11 +361,9 @@ impl TissueModel {
         self.analysis.get_or_init(|| {
             let (rule, positions) = (self.rule(), self.positions());
             match (&self.essential, self.condensing.get()) {
-                (_, Some((condensing, _))) => condensing.retaining_none(positions),
-                (EssentialBoundary::Nodes(groups), None) => {
-                    Analysis::new(rule, positions, self.constrained_lists(groups))
-                }
-                (EssentialBoundary::Points(groups), None) => {
+                (_, Some(Condensing { analysis, ports: None, .. })) => analysis.retaining_none(positions),
+                (EssentialBoundary::Nodes(groups), _) => Analysis::new(rule, positions, self.constrained_lists(groups)),
+                (EssentialBoundary::Points(groups), _) => {
                     let constrained = Nitsche::new(&self.planar, &self.tissue, groups.all().cloned());
                     Analysis::new(rule, positions, constrained.node_lists().into_iter())
                 }
@@ -382,32 +382,32 @@ impl TissueModel {
     }
 
     /// The rows of every paddle's nodes, where each paddle can be attached to a body that holds without it. None where
-    /// Nitsche's method imposes the values; where what is held are no single unknowns, since the penalty that then holds them
-    /// would cost the compliance seven digits; or where a node of a paddle is one of the immobile part or of the needle too.
+    /// Nitsche's method imposes the values, or where a node of a paddle is one of the immobile part or of the needle too.
     pub(crate) fn attachable_rows(&self) -> Option<&[Vec<Stencil<2>>]> {
         let EssentialBoundary::Nodes(groups) = &self.essential else { return None };
-        if !ConstrainedRows::new(groups.with_paddle(None)).are_unknowns() {
-            return None;
-        }
         let same = |a: &Stencil<2>, b: &Stencil<2>| a.nodes == b.nodes && a.values == b.values;
         let apart = |row: &Stencil<2>| !groups.with_paddle(None).any(|held| same(held, row));
         groups.paddles.iter().flatten().all(apart).then_some(&groups.paddles)
     }
 
-    /// The same analysis with the nodes that paddles and target take eliminated last; and those nodes, ascending. None
-    /// where Nitsche's method imposes the values.
-    pub(crate) fn condensing_analysis(&self) -> Option<&(Analysis, Vec<u32>)> {
+    /// The same condensed to the displacements of the [paddles' rows](Self::attachable_rows) and of the target: where what is held
+    /// are single unknowns, as with elements, their nodes are eliminated last, else ports of theirs. None where Nitsche's method
+    /// imposes the values.
+    pub(crate) fn condensing_analysis(&self) -> Option<&Condensing> {
         let EssentialBoundary::Nodes(groups) = &self.essential else { return None };
         Some(self.condensing.get_or_init(|| {
-            let rows = groups.paddles.iter().flatten().chain([&self.target]);
-            let retained: BTreeSet<u32> = rows.flat_map(|row| row.nodes.iter().copied()).collect();
-            let retained: Vec<u32> = retained.into_iter().collect();
+            let rows: Vec<&Stencil<2>> = groups.paddles.iter().flatten().chain([&self.target]).collect();
             let (rule, positions) = (self.rule(), self.positions());
+            if !ConstrainedRows::new(groups.all()).are_unknowns() {
+                return Condensing::to_ports(rule, positions, self.constrained_lists(groups), &rows);
+            }
+            let retained: BTreeSet<u32> = rows.iter().flat_map(|row| row.nodes.iter().copied()).collect();
+            let retained: Vec<u32> = retained.into_iter().collect();
             let analysis = match self.analysis.get() {
                 Some(analysis) => analysis.retaining_also(positions, &retained),
                 None => Analysis::retaining(rule, positions, self.constrained_lists(groups), &retained),
             };
-            (analysis, retained)
+            Condensing { analysis, retained: retained.len(), ports: None }
         }))
     }
 

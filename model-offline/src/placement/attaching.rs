@@ -9,15 +9,32 @@ use super::fields::{Fields, Loads, RATES};
 use crate::discretization::Stencil;
 use crate::linalg::DenseCholesky;
 use crate::mechanics::ConstrainedRows;
-use crate::model::{ModelError, TissueModel};
+use crate::model::{Condensing, ModelError, TissueModel};
 use faer::Mat;
 use nalgebra::Vector2;
 use std::ops::Range;
 
 /// What the paddles' nodes may be off their places per unit rate, before the forces on them are corrected.
 const ENOUGH: f64 = 1e-11;
+/// The same for what is always held.
+const HELD_WITHIN: f64 = 1e-12;
 /// Corrections of the forces at most; each gains the digits that the factor holds.
 const MAX_CORRECTIONS: usize = 4;
+
+/// Displacements of the nodes alone under forces on them, so many unknowns per field; see [`CondensedBody::fields`].
+fn nodal_fields(body: &mut CondensedBody<2>, forces: &[f64], values: &[f64], unknowns: usize) -> Vec<f64> {
+    let with_ports = body.unknowns();
+    if with_ports == unknowns {
+        return body.fields(forces, values, HELD_WITHIN);
+    }
+    let mut padded = Vec::with_capacity(forces.len() / unknowns * with_ports);
+    for field in forces.chunks_exact(unknowns) {
+        padded.extend_from_slice(field);
+        padded.resize(padded.len() + with_ports - unknowns, 0.0);
+    }
+    let fields = body.fields(&padded, values, HELD_WITHIN);
+    fields.chunks_exact(with_ports).flat_map(|field| &field[..unknowns]).copied().collect()
+}
 
 /// A body at rest to which paddles are attached.
 #[derive(Debug)]
@@ -36,14 +53,14 @@ impl<'m> Attaching<'m> {
     /// does not hold without paddles.
     pub(super) fn new(model: &'m TissueModel, loads: Loads) -> Option<Self> {
         let (paddles, held) = (model.attachable_rows()?, model.constrained_rows(None)?);
-        let (analysis, retained) = model.condensing_analysis()?;
+        let Condensing { analysis, retained, ports } = model.condensing_analysis()?;
         let sampled = (&**model.rule(), model.tissue());
-        let mut body = CondensedBody::new(sampled, analysis, (retained.len(), None), held).ok()?;
+        let mut body = CondensedBody::new(sampled, analysis, (*retained, ports.as_ref()), held).ok()?;
         let mut forces = vec![0.0; model.dofs()];
         forces.extend(loads.forces(model));
         let mut values = model.prescribed_values(None, 1.0, Vector2::zeros());
         values.resize(values.len() * forces.len() / model.dofs(), 0.0);
-        let unattached = body.fields(&forces, &values, 1e-12);
+        let unattached = nodal_fields(&mut body, &forces, &values, model.dofs());
         let compliance = body.compliance(paddles.iter().flatten().chain([model.target_row()]));
         Some(Self { model, body, paddles, compliance, unattached })
     }
@@ -130,7 +147,8 @@ impl<'m> Attaching<'m> {
                 let column: Vec<f64> = (0..forces.nrows()).map(|r| forces[(r, c)]).collect();
                 rows.add_transpose::<2>(&column, right);
             }
-            for (c, more) in self.body.fields(&right, &still, 1e-12).chunks_exact(unknowns).enumerate() {
+            let more = nodal_fields(&mut self.body, &right, &still, unknowns);
+            for (c, more) in more.chunks_exact(unknowns).enumerate() {
                 fields.field_mut(c).iter_mut().zip(more).for_each(|(x, d)| *x += d);
             }
         }

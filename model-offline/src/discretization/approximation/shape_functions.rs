@@ -1,6 +1,6 @@
 //! Shape functions Ψ_I and their gradients from the moment matrix.
 
-use super::kernel::{NEGLIGIBLE, product_kernel};
+use super::kernel::{NEGLIGIBLE, product_kernel, product_kernel_value};
 use crate::discretization::NodeCloud;
 use crate::discretization::method::Basis;
 use crate::geometry::Point;
@@ -164,24 +164,33 @@ where
         evaluate(self, x, node, candidates, wanted, out)
     }
 
-    /// Moments of the candidates that cover `x`, and their names; offsets in units of `scale`.
+    /// Moments of the candidates that cover `x`, and their names, kernels and, where gradients are wanted, slopes of the kernels
+    /// in place of the shape functions' own; offsets in units of `scale`.
     fn moments<const P: usize>(
         &self,
         x: &Point<D>,
         scale: f64,
         candidates: &[u32],
         wanted: Wanted,
-        nodes: &mut Vec<u32>,
+        out: &mut Stencil<D>,
     ) -> Moments<D, P> {
         let mut moment = SMatrix::<f64, P, P>::zeros();
         let mut moment_slope = [SMatrix::<f64, P, P>::zeros(); D];
         for &i in candidates {
             let offset = x - self.cloud.positions()[i as usize];
-            let (phi, phi_slope) = product_kernel(&offset, self.cloud.half_widths()[i as usize]);
+            let half_width = self.cloud.half_widths()[i as usize];
+            if offset.amax() >= half_width {
+                continue;
+            }
+            let (phi, phi_slope) = match wanted.gradients {
+                true => product_kernel(&offset, half_width),
+                false => (product_kernel_value(&offset, half_width), Point::zeros()),
+            };
             if phi <= NEGLIGIBLE || !self.cloud.sees(x, i) {
                 continue;
             }
-            nodes.push(i);
+            out.nodes.push(i);
+            out.values.push(phi);
             let h = monomials::<D, P>(&(offset / scale));
             for r in 0..P {
                 for c in 0..=r {
@@ -189,6 +198,7 @@ where
                 }
             }
             if wanted.gradients {
+                out.gradients.push(phi_slope);
                 for k in 0..D {
                     let dh = monomial_slope::<D, P>(&(offset / scale), k) / scale;
                     for r in 0..P {
@@ -218,7 +228,7 @@ where
         // says something about the nodes and not about the units.
         let scale = self.cloud.half_widths()[node];
         let Moments { matrix: mut moment, slopes: mut moment_slope } =
-            self.moments::<P>(x, scale, candidates, wanted, &mut out.nodes);
+            self.moments::<P>(x, scale, candidates, wanted, out);
         moment.fill_upper_triangle_with_lower_triangle();
         let failure = |condition: f64| ShapeError {
             node,
@@ -248,17 +258,17 @@ where
                 *slope = -(inverse * (*m * b));
             }
         }
-        for &i in &out.nodes {
+        for (place, &i) in out.nodes.iter().enumerate() {
             let offset = x - self.cloud.positions()[i as usize];
-            let (phi, phi_slope) = product_kernel(&offset, self.cloud.half_widths()[i as usize]);
             let h = monomials::<D, P>(&(offset / scale));
-            let correction = b.dot(&h);
-            out.values.push(correction * phi);
+            let (correction, phi) = (b.dot(&h), out.values[place]);
+            out.values[place] = correction * phi;
             if wanted.gradients {
-                out.gradients.push(Point::from_fn(|k, _| {
+                let phi_slope = out.gradients[place];
+                out.gradients[place] = Point::from_fn(|k, _| {
                     let dh = monomial_slope::<D, P>(&(offset / scale), k) / scale;
                     (b_slope[k].dot(&h) + b.dot(&dh)) * phi + correction * phi_slope[k]
-                }));
+                });
             }
         }
         Ok(())

@@ -25,6 +25,8 @@ use crate::geometry::{Point, Point2, cross};
 pub const STABILISATION: f64 = 1.0;
 /// Triangles below this share of their cell's area have none: the node lies on that edge.
 const DEGENERATE: f64 = 1e-12;
+/// Ends of an edge that differ by less than this, over the support's half-width, are the same: two cells compute them each.
+const SAME_END: f64 = 1e-12;
 
 /// SCNI with the constant stabilisation of weight `alpha`; see the module documentation.
 ///
@@ -94,6 +96,16 @@ struct Subcells<'a, 'c> {
     gradients: Vec<Point<2>>,
     candidates: Vec<u32>,
     stencil: Stencil<2>,
+    /// By node, the edges of its cell that cells before it have integrated already.
+    shared: Vec<Vec<SharedEdge>>,
+}
+
+/// An edge between two cells, as the second of them goes along it.
+struct SharedEdge {
+    from: Point2,
+    to: Point2,
+    /// Nodes whose shape functions do not all vanish along it, ascending, with the means.
+    means: Vec<(u32, f64)>,
 }
 
 impl<'a, 'c> Subcells<'a, 'c> {
@@ -106,6 +118,7 @@ impl<'a, 'c> Subcells<'a, 'c> {
             gradients: Vec::new(),
             candidates: Vec::new(),
             stencil: Stencil::default(),
+            shared: (0..shape.cloud().len()).map(|_| Vec::new()).collect(),
         }
     }
 
@@ -120,6 +133,7 @@ impl<'a, 'c> Subcells<'a, 'c> {
             .filter(move |(area, _)| *area > DEGENERATE * total)
     }
 
+    /// The next cell: nodes are taken in ascending order, each once, so that an edge between two of them is integrated once.
     fn compute(&mut self, node: usize, cell: &NodalCell) -> Result<(), ShapeError> {
         let x = self.shape.cloud().positions()[node];
         let corners: Vec<Point2> = cell.boundary.iter().map(|c| c.0).collect();
@@ -128,11 +142,9 @@ impl<'a, 'c> Subcells<'a, 'c> {
         let n = corners.len();
         // A cell that its node does not see all of has no triangles: the mean gradient serves in all of it.
         let seen = corners.iter().all(|corner| self.shape.cloud().sees(corner, node as u32));
+        let known = std::mem::take(&mut self.shared[node]);
         let edges = (0..n)
-            .map(|k| match cell.boundary[k].1 {
-                Across::Bridge => Ok(vec![0.0; self.candidates.len()]),
-                _ => self.mean_values(node, corners[k], corners[(k + 1) % n]),
-            })
+            .map(|k| self.edge(node, &known, [corners[k], corners[(k + 1) % n]], cell.boundary[k].1))
             .collect::<Result<Vec<_>, _>>()?;
         let spokes = match seen {
             true => (0..n).map(|k| self.mean_values(node, x, corners[k])).collect::<Result<Vec<_>, _>>()?,
@@ -180,6 +192,33 @@ impl<'a, 'c> Subcells<'a, 'c> {
                 *g += m;
             }
         }
+    }
+
+    /// Means of the candidates' shape functions along an edge of a node's cell.
+    fn edge(
+        &mut self,
+        node: usize,
+        known: &[SharedEdge],
+        [a, b]: [Point2; 2],
+        across: Across,
+    ) -> Result<Vec<f64>, ShapeError> {
+        if across == Across::Bridge {
+            return Ok(vec![0.0; self.candidates.len()]);
+        }
+        let same = SAME_END * self.shape.cloud().half_widths()[node];
+        if let Some(edge) = known.iter().find(|e| (e.from - a).amax() <= same && (e.to - b).amax() <= same) {
+            let mut means = edge.means.iter().peekable();
+            let mean = |i: &u32| means.next_if(|(node, _)| node == i).map_or(0.0, |(_, mean)| *mean);
+            return Ok(self.candidates.iter().map(mean).collect());
+        }
+        let values = self.mean_values(node, a, b)?;
+        if let Across::Cell(other) = across
+            && other as usize > node
+        {
+            let means = self.candidates.iter().copied().zip(values.iter().copied()).filter(|(_, mean)| *mean != 0.0);
+            self.shared[other as usize].push(SharedEdge { from: b, to: a, means: means.collect() });
+        }
+        Ok(values)
     }
 
     /// Means of the candidates' shape functions along a segment; `node` is the one that an error names.

@@ -16,6 +16,8 @@ pub struct MeshSize {
     pub rim: f64,
     /// On the surface of inclusions, over the width of the inclusion.
     pub inclusion: f64,
+    /// At the target, over its distance from the body's surface: what is read there is a field that varies over that distance.
+    pub target: f64,
     /// At most, over the longest side of the body's bounding box.
     pub coarsest: f64,
     /// At most, over its shortest side: slabs and plates have more than one element across.
@@ -32,6 +34,8 @@ const MOST_TRIES: usize = 24;
 const SAMPLED: f64 = 0.5;
 /// Points of the body's surface at which a mesh is looked at are this share of the longest edges apart.
 const LOOKED_AT: f64 = 0.5;
+/// A target nearer to the surface than this share of the body's longest side counts as this far from it.
+const DEEP: f64 = 0.1;
 /// Patches at an even spacing have at least this many edges across.
 const ACROSS: f64 = 3.0;
 
@@ -42,6 +46,7 @@ impl MeshSize {
         Self {
             rim: 0.4 * finer,
             inclusion: 0.8 * finer,
+            target: 0.2 * finer.sqrt(),
             coarsest: 0.2 * finer.sqrt(),
             thickest: finer.sqrt(),
             growth: 0.5,
@@ -88,7 +93,8 @@ fn graded(scene: &SpaceScene, size: &MeshSize, at_most: &[f64]) -> Result<TetMes
     let body: &dyn Implicit = scene.body.as_ref();
     let extent = extent(scene);
     let coarsest = (size.coarsest * extent).min(size.thickest * shortest(scene));
-    let mut grading = Grading::new(coarsest, size.growth);
+    let depth = scene.body.level(&scene.target).abs().max(DEEP * extent);
+    let mut grading = Grading::new(coarsest, size.growth).with(&[scene.target], size.target * depth);
     for (k, region) in patches(scene).enumerate() {
         let rim = |spacing: f64| rim_points(body, region, spacing);
         let at_most = at_most.get(k).copied().unwrap_or(f64::INFINITY);

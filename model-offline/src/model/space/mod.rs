@@ -9,6 +9,7 @@ pub mod survey;
 
 use self::middles::Middles;
 use self::patches::{Surface, loose, nodes_of, overlap};
+use super::condensing::Condensing;
 use super::error::{BoundaryPart, ModelError};
 use super::tissue::{Mixing, Phase, mixture};
 use crate::discretization::{Spatial, Stencil, TetMesh};
@@ -33,19 +34,6 @@ pub struct SpaceModel {
     target: Stencil<3>,
     overlapping: Vec<[usize; 2]>,
     analysis: Arc<OnceLock<Analysis>>,
-}
-
-/// How a body is condensed to what paddles and target take.
-#[derive(Debug)]
-pub(crate) struct Condensing {
-    /// Sparsity and elimination order.
-    pub(crate) analysis: Analysis,
-    /// Nodes that are eliminated last.
-    pub(crate) retained: usize,
-    /// Where displacements are sums of several unknowns: rows `u(X_b) − p_b` of the nodes of each and of its port p_b, a node
-    /// more, numbered after all others. A port carries nothing but a spring to what it stands for. It keeps what has to be
-    /// eliminated last to one node per displacement, where its kernels' neighbours would be three to five.
-    pub(crate) ports: Option<ConstrainedRows>,
 }
 
 /// Which nodes are held, and the rows `u(X_i) = Σ_I Ψ_I(X_i) d_I` that hold them.
@@ -242,16 +230,7 @@ impl SpaceModel {
             let analysis = Analysis::retaining(rule, positions, self.constrained_lists(), &retained);
             return Condensing { analysis, retained: retained.len(), ports: None };
         }
-        let nodes = positions.len() as u32;
-        let retained: Vec<u32> = (nodes..nodes + rows.len() as u32).collect();
-        let ported: Vec<Stencil<3>> = rows.iter().zip(&retained).map(|(row, &port)| row.ported(port)).collect();
-        // A port lies where its row interpolates.
-        let places: Vec<f64> = positions.iter().flat_map(|x| x.iter().copied()).collect();
-        let positions: Vec<Point<3>> =
-            positions.iter().copied().chain(rows.iter().map(|row| row.interpolate(&places))).collect();
-        let lists = self.constrained_lists().chain(ported.iter().map(|row| row.nodes.as_slice()));
-        let analysis = Analysis::retaining(rule, &positions, lists, &retained);
-        Condensing { analysis, retained: retained.len(), ports: Some(ConstrainedRows::new(ported.iter())) }
+        Condensing::to_ports(rule, positions, self.constrained_lists(), &rows)
     }
 
     /// A body at rest with some paddles attached, by their places in the scene's list.

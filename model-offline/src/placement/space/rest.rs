@@ -8,8 +8,8 @@
 
 use super::controllability::Controllability;
 use crate::linalg::DenseCholesky;
-use crate::model::ModelError;
-use crate::model::space::{Condensing, Holder, SpaceModel};
+use crate::model::space::{Holder, SpaceModel};
+use crate::model::{Condensing, ModelError};
 use crate::placement::condensed::{CondensedBody, singular};
 use faer::Mat;
 use nalgebra::{DMatrix, Vector3};

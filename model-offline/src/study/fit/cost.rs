@@ -36,7 +36,7 @@ fn shape_functions(model: &TissueModel) -> f64 {
         _ if method.integration.is_element() => return PER_ELEMENT_NODE * nodes,
         Integration::Dni => 1.0,
         Integration::Scni => 8.0,
-        Integration::ScniStabilised | Integration::Mscni => 16.0,
+        Integration::ScniStabilised | Integration::Mscni => 12.0,
         Integration::Nsni => 11.0,
         _ => 15.0,
     };

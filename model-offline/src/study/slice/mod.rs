@@ -60,6 +60,8 @@ pub struct Slice {
     pub left_out: Vec<LeftOut>,
     /// Pieces of the body beside the one with the target, which the slice does not have.
     pub pieces_left_out: usize,
+    /// Inclusions that the plane does not meet, counted from 1 in the scene's order.
+    pub inclusions_left_out: Vec<usize>,
 }
 
 /// A paddle that a slice does not have.
@@ -262,9 +264,12 @@ impl Body<'_> {
     fn slice(&self, text: &str, through: Through, plane: CutPlane) -> Result<Slice, SliceError> {
         let cut = self.cut(plane)?;
         let text = file::text(self.scene, text, &cut)?;
+        let met = |place: usize| cut.inclusions.iter().any(|(other, _)| *other == place);
+        let missed = (0..self.scene.inclusions.len()).filter(|place| !met(*place));
+        let inclusions_left_out = missed.map(|place| place + 1).collect();
         let Cut { plane, left_out, pieces_left_out, .. } = cut;
         match Scene::parse(&text, "<slice>") {
-            Ok(scene) => Ok(Slice { scene, text, plane, through, left_out, pieces_left_out }),
+            Ok(scene) => Ok(Slice { scene, text, plane, through, left_out, pieces_left_out, inclusions_left_out }),
             Err(error) => Err(SliceError::Invalid { plane: self.name(&plane), source: Box::new(error) }),
         }
     }
