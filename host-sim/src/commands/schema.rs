@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use host_sim::bench::result::RunResult;
 use host_sim::bench::timing::TimingResult;
-use host_sim::record::export::mcap;
+use host_sim::record::export::messages;
 use schemars::schema_for;
 
 /// What a schema is about.
@@ -24,7 +24,7 @@ pub(crate) fn schema(subject: Subject) -> serde_json::Value {
         Subject::Result => schema_for!(RunResult).to_value(),
         Subject::Timing => schema_for!(TimingResult).to_value(),
         Subject::Mcap => {
-            mcap::schemas().into_iter().map(|(topic, _, schema)| (topic.to_owned(), schema.to_value())).collect()
+            messages::schemas().into_iter().map(|(topic, _, schema)| (topic.to_owned(), schema.to_value())).collect()
         }
     }
 }

@@ -3,4 +3,5 @@
 pub mod csv;
 pub mod foxglove;
 pub mod mcap;
+pub mod messages;
 pub mod paraview;

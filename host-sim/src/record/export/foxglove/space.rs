@@ -44,6 +44,26 @@ impl<'b> SpaceStage<'b> {
         Self { geometry, paddles: paddles.to_vec(), bodies, values, scale }
     }
 
+    /// A body that is somewhere at this time, ns, with what is inside. Colours end at its own largest value, or at `scale`
+    /// where that is larger; where they end is `scale` from then on.
+    pub fn seen(&self, time_ns: u64, state: &SpaceState, scale: &mut f64) -> SceneUpdate {
+        let values = orthogonal(&self.geometry, state);
+        *scale = values.iter().copied().fold(*scale, f64::max);
+        self.with_inside(time_ns, state, &values, *scale)
+    }
+
+    fn with_inside(&self, time_ns: u64, state: &SpaceState, values: &[f64], scale: f64) -> SceneUpdate {
+        let now = moved(&self.geometry, state);
+        let inside = |(i, surface): (usize, &Vec<[u32; 3]>)| {
+            let mut inclusion = SceneEntity::new(&format!("inclusion {}", i + 1), time_ns);
+            inclusion.triangles.push(TriangleListPrimitive::of(surface, now, Color { a: INSIDE, ..ORANGE }).0);
+            inclusion
+        };
+        let mut entities = vec![self.body(time_ns, state, values, scale)];
+        entities.extend(self.geometry.inclusions.iter().enumerate().map(inside));
+        SceneUpdate::of(entities)
+    }
+
     fn bounds(&self) -> [Point<3>; 2] {
         let nodes: Vec<Point<3>> = self.geometry.nodes.iter().map(|x| Point::from(*x)).collect();
         box_of(&nodes).map_or([Point::zeros(); 2], |(low, high)| [low, high])
@@ -60,7 +80,7 @@ impl<'b> SpaceStage<'b> {
     }
 
     /// The surface in the colours of the field, what of it cannot move and what the needle moves in their own: together all of it.
-    fn body(&self, time_ns: u64, state: &SpaceState, values: &[f64]) -> SceneEntity {
+    fn body(&self, time_ns: u64, state: &SpaceState, values: &[f64], scale: f64) -> SceneEntity {
         let geometry = &self.geometry;
         let now = moved(geometry, state);
         let patches = [(&geometry.immobile, Color { a: HELD, ..BLACK }), (&geometry.needle, GREY)];
@@ -68,20 +88,14 @@ impl<'b> SpaceStage<'b> {
         let free: Vec<[u32; 3]> = geometry.outside.iter().filter(|t| !of_patches.contains(t)).copied().collect();
         let (mut skin, nodes) = TriangleListPrimitive::of(&free, now, Color { a: SKIN, ..GREY });
         skin.colors =
-            nodes.iter().map(|node| self.colour(values.get(*node as usize).copied().unwrap_or(0.0))).collect();
+            nodes.iter().map(|node| colour(values.get(*node as usize).copied().unwrap_or(0.0), scale)).collect();
         let mut body = SceneEntity::new("body", time_ns);
         let field = "displacement orthogonal to the needle, dark to bright";
-        let range = format!("0 to {}", in_unit(self.scale, &geometry.units[0]));
+        let range = format!("0 to {}", in_unit(scale, &geometry.units[0]));
         body.metadata.push(KeyValuePair { key: field.to_owned(), value: range });
         body.triangles.push(skin);
         body.triangles.extend(patches.map(|(patch, color)| TriangleListPrimitive::of(patch, now, color).0));
         body
-    }
-
-    /// Colour of a value of the field.
-    fn colour(&self, value: f64) -> Color {
-        let [r, g, b] = band_colour(if self.scale > 0.0 { value / self.scale } else { 0.0 });
-        Color { r, g, b, a: SKIN }
     }
 
     /// A patch a little off the surface, where the paddle has moved it.
@@ -110,6 +124,12 @@ impl<'b> SpaceStage<'b> {
     }
 }
 
+/// Colour of a value of the field, of which this is the largest.
+fn colour(value: f64, largest: f64) -> Color {
+    let [r, g, b] = band_colour(if largest > 0.0 { value / largest } else { 0.0 });
+    Color { r, g, b, a: SKIN }
+}
+
 /// Where the nodes of a body are.
 fn moved<'a>(geometry: &'a SpaceGeometry, state: &'a SpaceState) -> impl Fn(u32) -> Point<3> + Copy + 'a {
     |node| Point::<3>::from(geometry.nodes[node as usize]) + Point::from(state.displacements[node as usize])
@@ -131,15 +151,7 @@ impl Scenery for SpaceStage<'_> {
 
     fn body_at(&self, truth: &Truth) -> Option<SceneUpdate> {
         let (body, values) = self.bodies.iter().zip(&self.values).find(|(body, _)| body.truth.tick == truth.tick)?;
-        let now = moved(&self.geometry, &body.state);
-        let inside = |(i, surface): (usize, &Vec<[u32; 3]>)| {
-            let mut inclusion = SceneEntity::new(&format!("inclusion {}", i + 1), truth.time_ns);
-            inclusion.triangles.push(TriangleListPrimitive::of(surface, now, Color { a: INSIDE, ..ORANGE }).0);
-            inclusion
-        };
-        let mut entities = vec![self.body(truth.time_ns, &body.state, values)];
-        entities.extend(self.geometry.inclusions.iter().enumerate().map(inside));
-        Some(SceneUpdate::of(entities))
+        Some(self.with_inside(truth.time_ns, &body.state, values, self.scale))
     }
 
     /// From where the paddles are seen.

@@ -51,7 +51,7 @@ fn the_layout_names_what_there_is() {
     let panels = layout["configById"].as_object().unwrap();
     let text = layout["layout"].to_string();
     assert!(panels.len() == 4 && panels.keys().all(|panel| text.contains(panel.as_str())), "{text}");
-    let topics = super::super::mcap::schemas().map(|(topic, ..)| topic);
+    let topics = super::super::messages::schemas().map(|(topic, ..)| topic);
     let paths = panels.values().flat_map(|panel| panel["paths"].as_array().into_iter().flatten());
     for path in paths {
         let topic = path["value"].as_str().unwrap().split('.').next().unwrap();
