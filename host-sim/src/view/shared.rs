@@ -1,5 +1,6 @@
 //! What the loop and the view share.
 
+use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -7,9 +8,11 @@ use hyper::body::Bytes;
 use serde::{Deserialize, Serialize};
 
 use super::body::ShownBody;
+use crate::record::export::messages::Said;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::plant::observer::Answer;
 use crate::runtime::time::mode::RunMode;
-use crate::world::truth::Truth;
+use crate::world::truth::{NeedleMoment, Truth};
 
 /// One file: no network but the events of its own address.
 pub(super) const PAGE: &str = include_str!("page.html");
@@ -88,6 +91,12 @@ pub(super) struct ViewState {
     /// Target displacement orthogonal to the needle, length: with a sign in the plane.
     pub(super) error: f64,
     pub(super) answer: Option<Answer>,
+    /// Samples and the command of the last tick that was answered.
+    pub(super) exchanged: Option<ControllerTick>,
+    /// What a needle that slips met last.
+    pub(super) needle: Option<NeedleMoment>,
+    /// What the controller said of itself, with the time, ns: the newest [`CHANGES`] changes.
+    pub(super) changes: VecDeque<(u64, Said)>,
     /// Largest orthogonal error of every tick since the needle moves, length: a page that comes late knows it, too.
     pub(super) largest: f64,
     /// What a page that comes late has missed.
@@ -97,6 +106,9 @@ pub(super) struct ViewState {
     /// Latest start of a tick after its release since the state before, ns; free-run only.
     pub(super) late_ns: u64,
 }
+
+/// Changes of the controller's mode or faults that are kept.
+pub(super) const CHANGES: usize = 64;
 
 /// States of the present insertion as [time in s, orthogonal error, longest solve in µs, lateness in µs], and the target's
 /// way: evenly thinned out where they become many.

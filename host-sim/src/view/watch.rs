@@ -1,12 +1,15 @@
 //! The loop's end: leaves a state for the page now and then, and holds time where the page wants it held.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::Vector3;
 
 use super::body::{ShownBody, SpaceShown};
-use super::shared::{FRAME_NS, Shared, ViewState};
+use super::shared::{CHANGES, FRAME_NS, Shared, ViewState};
+use crate::record::export::messages::Said;
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::plant::observer::{Moment, ObservedInsertion, Observer, PlanarBody};
 use crate::runtime::signals;
 use crate::runtime::time::clock::{now_ns, sleep_until};
@@ -70,6 +73,18 @@ pub(super) struct Watch {
     expected_ns: Option<u64>,
     /// Whether time is held after the tick that was offered last.
     held: bool,
+    /// What the controller said last of itself.
+    said: Option<Said>,
+    /// Changes that no state has yet, with their times, ns.
+    changes: VecDeque<(u64, Said)>,
+}
+
+/// Keeps the newest changes. Allocates nothing.
+fn remember(changes: &mut VecDeque<(u64, Said)>, change: (u64, Said)) {
+    if changes.len() == CHANGES {
+        changes.pop_front();
+    }
+    changes.push_back(change);
 }
 
 impl Watch {
@@ -107,6 +122,7 @@ impl Watch {
                 mode: Some(mode),
                 body: Some(body),
                 coefficients,
+                changes: VecDeque::with_capacity(CHANGES),
                 ..ViewState::default()
             };
         }
@@ -121,6 +137,16 @@ impl Watch {
             largest: 0.0,
             expected_ns: None,
             held: false,
+            said: None,
+            changes: VecDeque::with_capacity(CHANGES),
+        }
+    }
+
+    /// Remembers what the controller says of itself where that is new, until a state is left.
+    fn hear(&mut self, exchanged: &ControllerTick) {
+        let now = Said::from(&exchanged.command);
+        if self.said.replace(now) != Some(now) {
+            remember(&mut self.changes, (exchanged.inputs.time_ns, now));
         }
     }
 
@@ -135,7 +161,7 @@ impl Watch {
 
     /// Leaves a state if one is due and nobody reads the last one, with what is copied into it. Waits for nobody, unless time is
     /// held after this tick: then the page is to show this one, and no earlier one.
-    fn leave(&mut self, moment: &Moment, copy: impl FnOnce(&mut Vec<f64>)) {
+    fn leave(&mut self, moment: &Moment, copy: impl FnOnce(&mut ViewState)) {
         let now = now_ns();
         self.solve_ns = self.solve_ns.max(now.saturating_sub(moment.began_ns));
         if self.mode == RunMode::FreeRun {
@@ -149,6 +175,9 @@ impl Watch {
         if moment.is_counted {
             self.largest = self.largest.max(error.abs());
         }
+        if let Some(exchanged) = &moment.exchanged {
+            self.hear(exchanged);
+        }
         self.held = self.mode == RunMode::Lockstep && self.shared.is_paused();
         if now < self.due_ns && !self.held {
             return;
@@ -156,13 +185,15 @@ impl Watch {
         let free = if self.held { Some(self.shared.state()) } else { self.shared.try_state() };
         let Some(mut state) = free else { return };
         self.due_ns = now + FRAME_NS;
-        copy(&mut state.coefficients);
+        copy(&mut state);
+        self.changes.drain(..).for_each(|change| remember(&mut state.changes, change));
         state.number += 1;
         state.held = self.held;
         state.time_s = moment.time_s;
         state.truth = moment.truth;
         state.error = error;
         state.answer = moment.answer;
+        state.exchanged = moment.exchanged;
         state.largest = self.largest;
         state.solve_ns = std::mem::take(&mut self.solve_ns);
         state.late_ns = std::mem::take(&mut self.late_ns);
@@ -191,7 +222,15 @@ impl Watch {
 
 impl<'m> Observer<TissuePlant<'m>> for Watch {
     fn offer(&mut self, tissue: &TissuePlant<'m>, moment: &Moment) {
-        self.leave(moment, |coefficients| tissue.copy_coefficients(coefficients));
+        self.leave(moment, |state| {
+            tissue.copy_coefficients(&mut state.coefficients);
+            // Few scenes have one, and then a reading was made for it just now.
+            if let Some(newest) = tissue.needle().last()
+                && state.needle.as_ref().is_none_or(|shown| shown.since_start_s < newest.since_start_s)
+            {
+                state.needle = Some(newest.clone());
+            }
+        });
     }
 
     fn ends_early(&self) -> bool {
@@ -239,7 +278,7 @@ mod tests {
         };
         let mut watch = Watch::new(&shared, insertion);
         let truth = Truth { tick: 1, ..Truth::default() };
-        let moment = Moment { truth, time_s: 0.0, began_ns: 0, is_counted: true, answer: None };
+        let moment = Moment { truth, time_s: 0.0, began_ns: 0, is_counted: true, answer: None, exchanged: None };
         let reader = shared.state();
         watch.offer(&tissue, &moment);
         assert_eq!((reader.number, shared.dropped()), (0, 1));

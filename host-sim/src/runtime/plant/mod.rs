@@ -10,12 +10,13 @@ pub mod rehearsal;
 use std::time::{Duration, Instant};
 
 use firmware::contract::PaddleCommand;
-use firmware::{Faults, Mode};
+use firmware::{Faults, Inputs, Mode};
 use iceoryx2::service::Service;
 
 use self::ages::InputAges;
 use self::observer::{Answer, Moment, Observer};
 use super::accounting::accounts::Published;
+use super::accounting::tick::ControllerTick;
 use super::error::RuntimeError;
 use super::signals;
 use super::time::clock::now_ns;
@@ -37,6 +38,9 @@ pub struct PlantLoop<T, const D: usize = 2> {
     solving: Duration,
     observer: Option<Box<dyn Observer<T>>>,
     answer: Option<Answer>,
+    /// The newest sample of every sensor.
+    told: Inputs,
+    exchanged: Option<ControllerTick>,
     ages: InputAges,
 }
 
@@ -46,7 +50,18 @@ impl<T: TissueResponse<D>, const D: usize> PlantLoop<T, D> {
         let truths = Vec::with_capacity(simulation.ticks() as usize);
         let duration_ns = simulation.duration_ns();
         let ages = InputAges::default();
-        Self { world, duration_ns, truths, first_ns: None, solving: Duration::ZERO, observer: None, answer: None, ages }
+        Self {
+            world,
+            duration_ns,
+            truths,
+            first_ns: None,
+            solving: Duration::ZERO,
+            observer: None,
+            answer: None,
+            told: Inputs::default(),
+            exchanged: None,
+            ages,
+        }
     }
 
     /// Somebody looks on from now.
@@ -90,7 +105,7 @@ impl<T: TissueResponse<D>, const D: usize> PlantLoop<T, D> {
         if let Some(observer) = &mut self.observer {
             let time_s = self.world.since_start_s(time_ns);
             let is_counted = self.world.needle_started_ns().is_some() && time_s >= self.world.drive.wait_s();
-            let moment = Moment { truth, time_s, began_ns, is_counted, answer: self.answer };
+            let moment = Moment { truth, time_s, began_ns, is_counted, answer: self.answer, exchanged: self.exchanged };
             observer.offer(&self.world.tissue, &moment);
         }
         self.truths.push(truth);
@@ -107,8 +122,13 @@ impl<T: TissueResponse<D>, const D: usize> PlantLoop<T, D> {
         ports.needle.send(needle)?;
         ports.send_paddles(&paddles)?;
         self.ages.needle(needle.sequence, needle.time_ns);
+        let before = self.told.paddles;
+        self.told.time_ns = time_ns;
+        self.told.needle = Some(needle);
+        self.told.paddles = std::array::from_fn(|place| paddles[place].or(before[place]));
         for sample in self.world.target_samples(&truth) {
             self.ages.target(sample.sequence, sample.time_ns);
+            self.told.target = Some(sample);
             ports.target.send(sample)?;
         }
         Ok(())
@@ -123,6 +143,8 @@ impl<T: TissueResponse<D>, const D: usize> PlantLoop<T, D> {
         if let Some(command) = command {
             self.answer =
                 Some(Answer { mode: Mode::from_wire(command.state), faults: Faults::from_bits(command.faults) });
+            self.exchanged =
+                Some(ControllerTick { inputs: Inputs { tick: command.tick, ..self.told }, command: *command });
         }
         let waited_ns = time_ns - self.first_ns.unwrap_or(time_ns);
         match command {

@@ -3,6 +3,7 @@
 use firmware::{Faults, Mode};
 use model_offline::model::TissueModel;
 
+use crate::runtime::accounting::tick::ControllerTick;
 use crate::runtime::time::mode::RunMode;
 use crate::world::space::{PreparedBody, SpaceTissue};
 use crate::world::tissue::TissuePlant;
@@ -21,6 +22,8 @@ pub struct Moment {
     pub is_counted: bool,
     /// What the controller's last command said; none before the first one.
     pub answer: Option<Answer>,
+    /// What controller and plant told each other last, up to the tick before; none before the first command.
+    pub exchanged: Option<ControllerTick>,
 }
 
 /// What a command says of the controller.
