@@ -9,9 +9,11 @@ pub(super) fn first_knobs(loop_settings: &LoopSettings) -> Knobs {
     Knobs { needle_speed: 1.0, target_rate, latency, noise: 1.0, stiffness: 1.0 }
 }
 
-/// Says where a page is: the one line that even a quiet run must say, since without it nobody gets in.
+/// Says where a page is, and where Foxglove connects to: what even a quiet run must say, since without it nobody gets in.
 pub(super) fn said(view: View) -> View {
     println!("Live view: {}", view.address());
+    #[cfg(feature = "foxglove")]
+    println!("Foxglove: {}", view.foxglove_address());
     view
 }
 

@@ -150,6 +150,7 @@ fn requests() -> impl Strategy<Value = (String, Vec<String>, Vec<u8>)> {
     let target = prop_oneof![
         Just("/T/".to_owned()),
         Just("/T/request".to_owned()),
+        Just("/T/foxglove".to_owned()),
         Just("//T/".to_owned()),
         Just("http://H/T/request".to_owned()),
         Just("*".to_owned()),

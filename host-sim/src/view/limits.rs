@@ -4,14 +4,24 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+#[cfg(feature = "foxglove")]
+use model_offline::output::table_text::hex;
+#[cfg(feature = "foxglove")]
+use sha2::{Digest as _, Sha256};
 use tokio::time::Instant;
 
 /// Connections at a time; more are closed at once.
 pub(super) const MAX_CONNECTIONS: usize = 64;
 /// Pages that may look on at the same time.
 pub(super) const MAX_LOOKERS: usize = 4;
+/// Foxglove's clients at the same time.
+#[cfg(feature = "foxglove")]
+pub(super) const MAX_CLIENTS: usize = 4;
+/// Time for them to say goodbye at the end.
+#[cfg(feature = "foxglove")]
+const GOODBYE: Duration = Duration::from_secs(1);
 /// Time of a connection without any progress.
-const PATIENCE: Duration = Duration::from_secs(5);
+pub(super) const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Who may come in, and how many are in.
 #[derive(Debug)]
@@ -20,6 +30,8 @@ pub(super) struct Gate {
     pub(super) port: u16,
     lookers: AtomicUsize,
     connections: AtomicUsize,
+    #[cfg(feature = "foxglove")]
+    clients: AtomicUsize,
 }
 
 /// A place that is free again when this is dropped.
@@ -38,7 +50,14 @@ impl Drop for Slot {
 impl Gate {
     /// Opens for who knows the token.
     pub(super) fn new(token: String, port: u16) -> Self {
-        Self { token, port, lookers: AtomicUsize::new(0), connections: AtomicUsize::new(0) }
+        Self {
+            token,
+            port,
+            lookers: AtomicUsize::new(0),
+            connections: AtomicUsize::new(0),
+            #[cfg(feature = "foxglove")]
+            clients: AtomicUsize::new(0),
+        }
     }
 
     fn take(self: &Arc<Self>, of: fn(&Self) -> &AtomicUsize, most: usize) -> Option<Slot> {
@@ -55,6 +74,27 @@ impl Gate {
     /// A place for a connection, if there is one.
     pub(super) fn connect(self: &Arc<Self>) -> Option<Slot> {
         self.take(|gate| &gate.connections, MAX_CONNECTIONS)
+    }
+
+    /// A place for a client of Foxglove's, if there is one.
+    #[cfg(feature = "foxglove")]
+    pub(super) fn join(self: &Arc<Self>) -> Option<Slot> {
+        self.take(|gate| &gate.clients, MAX_CLIENTS)
+    }
+
+    /// What tells this run from others, to whom knows its token.
+    #[cfg(feature = "foxglove")]
+    pub(super) fn session(&self) -> String {
+        hex(&Sha256::digest(&self.token)[..8])
+    }
+
+    /// Waits until all clients are gone, but not for long.
+    #[cfg(feature = "foxglove")]
+    pub(super) fn see_off(&self) {
+        let until = std::time::Instant::now() + GOODBYE;
+        while self.clients.load(Ordering::Acquire) > 0 && std::time::Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 }
 

@@ -13,6 +13,8 @@
 mod attacks;
 mod body;
 mod events;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 mod insertions;
 mod limits;
 mod page;

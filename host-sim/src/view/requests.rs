@@ -11,6 +11,8 @@ use hyper::{Method, Request, Response, StatusCode, header};
 use serde::Deserialize;
 
 use super::events::Events;
+#[cfg(feature = "foxglove")]
+use super::foxglove::HandshakeRefusal;
 use super::limits::{Deadline, Gate};
 use super::shared::{KnobOutOfRange, Knobs, Shared};
 
@@ -80,9 +82,9 @@ fn plain(status: StatusCode, text: impl Into<Bytes>) -> Response<HttpReply> {
     whole(status, "text/plain; charset=utf-8", text)
 }
 
-/// The path after the token; none for other hosts, other origins, and a wrong token. A page elsewhere that rebinds its
-/// name to 127.0.0.1 still sends its own name as Host.
-fn path<'r, B>(request: &'r Request<B>, gate: &Gate) -> Option<&'r str> {
+/// The path after the token, and whether the request comes from no other origin; none for other hosts, and a wrong token.
+/// A page elsewhere that rebinds its name to 127.0.0.1 still sends its own name as Host.
+fn path<'r, B>(request: &'r Request<B>, gate: &Gate) -> Option<(&'r str, bool)> {
     let value = |name: header::HeaderName| {
         let mut found = request.headers().get_all(name).iter();
         (found.next().map(|value| value.to_str().unwrap_or_default()), found.next().is_some())
@@ -91,16 +93,32 @@ fn path<'r, B>(request: &'r Request<B>, gate: &Gate) -> Option<&'r str> {
     if ![format!("127.0.0.1:{}", gate.port), format!("localhost:{}", gate.port)].iter().any(|known| known == host) {
         return None;
     }
-    if let (Some(origin), several) = value(header::ORIGIN)
-        && (several || origin.strip_prefix("http://") != Some(host))
-    {
-        return None;
-    }
+    let is_ours = match value(header::ORIGIN) {
+        (Some(origin), several) => !several && origin.strip_prefix("http://") == Some(host),
+        (None, _) => true,
+    };
     if request.uri().authority().is_some() {
         return None;
     }
     let path = request.uri().path_and_query()?.as_str();
-    path.strip_prefix('/')?.strip_prefix(gate.token.as_str())?.strip_prefix('/')
+    let path = path.strip_prefix('/')?.strip_prefix(gate.token.as_str())?.strip_prefix('/')?;
+    Some((path, is_ours))
+}
+
+/// A WebSocket for whom has the token, wherever its page comes from: Foxglove's web application and a Lichtblick of one's own have
+/// origins of theirs. It shows, and changes nothing.
+#[cfg(feature = "foxglove")]
+fn websocket(request: Request<Incoming>, gate: &Arc<Gate>, shared: Arc<Shared>) -> Response<HttpReply> {
+    match super::foxglove::upgrade(request, gate, shared) {
+        Ok(headers) => {
+            let mut response = plain(StatusCode::SWITCHING_PROTOCOLS, "");
+            response.headers_mut().clear();
+            response.headers_mut().extend(headers.map(|(name, value)| (Some(name), value)));
+            response
+        }
+        Err(refusal @ HandshakeRefusal::Full) => plain(StatusCode::SERVICE_UNAVAILABLE, format!("{refusal}\n")),
+        Err(refusal) => plain(StatusCode::BAD_REQUEST, format!("{refusal}\n")),
+    }
 }
 
 /// Answers a request. A body is read only from who has the token, and never more than a button sends.
@@ -110,7 +128,12 @@ pub(super) async fn answer(
     shared: Arc<Shared>,
     deadline: Arc<Deadline>,
 ) -> Result<Response<HttpReply>, Infallible> {
-    let Some(path) = path(&request, &gate) else {
+    let asked = path(&request, &gate);
+    #[cfg(feature = "foxglove")]
+    if asked.is_some_and(|(path, _)| path == super::foxglove::PATH) {
+        return Ok(websocket(request, &gate, shared));
+    }
+    let Some((path, true)) = asked else {
         let text = "forbidden: open the address that host-sim printed, with its token\n";
         return Ok(plain(StatusCode::FORBIDDEN, text));
     };

@@ -42,6 +42,8 @@ const LAST_WORDS: Duration = Duration::from_millis(150);
 pub struct View {
     shared: Arc<Shared>,
     address: String,
+    #[cfg(feature = "foxglove")]
+    gate: Arc<Gate>,
 }
 
 impl View {
@@ -79,12 +81,17 @@ impl View {
         let shared = Arc::new(shared);
         let address = format!("http://127.0.0.1:{port}/{token}/");
         let gate = Arc::new(Gate::new(token, port));
-        let for_thread = Arc::clone(&shared);
+        let for_thread = (Arc::clone(&gate), Arc::clone(&shared));
         std::thread::Builder::new()
             .name("view".to_owned())
-            .spawn(move || runtime.block_on(accept(listener, gate, for_thread)))
+            .spawn(move || runtime.block_on(accept(listener, for_thread)))
             .map_err(RuntimeError::Spawn)?;
-        Ok(Self { shared, address })
+        Ok(Self {
+            shared,
+            address,
+            #[cfg(feature = "foxglove")]
+            gate,
+        })
     }
 
     /// What the loop shares with it.
@@ -96,6 +103,12 @@ impl View {
     pub fn address(&self) -> &str {
         &self.address
     }
+
+    /// Where Foxglove and Lichtblick look on, with the token that lets them in.
+    #[cfg(feature = "foxglove")]
+    pub fn foxglove_address(&self) -> String {
+        self.address.replacen("http://", "ws://", 1) + super::foxglove::PATH
+    }
 }
 
 impl Drop for View {
@@ -103,6 +116,8 @@ impl Drop for View {
     fn drop(&mut self) {
         self.shared.end();
         std::thread::sleep(LAST_WORDS);
+        #[cfg(feature = "foxglove")]
+        self.gate.see_off();
     }
 }
 
@@ -126,7 +141,7 @@ fn token() -> std::io::Result<String> {
     Ok(hex(&bytes))
 }
 
-async fn accept(listener: TcpListener, gate: Arc<Gate>, shared: Arc<Shared>) {
+async fn accept(listener: TcpListener, (gate, shared): (Arc<Gate>, Arc<Shared>)) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
     loop {
         match listener.accept().await {
@@ -143,7 +158,7 @@ async fn accept(listener: TcpListener, gate: Arc<Gate>, shared: Arc<Shared>) {
     }
 }
 
-/// One connection, until it is answered or its time is over.
+/// One connection, until it is answered or its time is over; what is agreed upon to go on is served elsewhere.
 async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, place: Slot) {
     let deadline = Arc::new(Deadline::new());
     let for_answer = Arc::clone(&deadline);
@@ -152,7 +167,7 @@ async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, pla
     let mut http = http1::Builder::new();
     http.timer(TokioTimer::new()).header_read_timeout(HEADER_TIME).keep_alive(false);
     http.max_headers(MAX_HEADERS).max_buf_size(MAX_HEADER_BYTES);
-    let mut answered = pin!(http.serve_connection(TokioIo::new(stream), service));
+    let mut answered = pin!(http.serve_connection(TokioIo::new(stream), service).with_upgrades());
     let mut passed = pin!(deadline.passed());
     // Whoever went away, or sends what is no request, does not want an answer.
     std::future::poll_fn(|context| {
