@@ -231,6 +231,15 @@ fn nothing_that_a_client_says_changes_anything() {
     assert_eq!(short.ask(&json!({"op": "x".repeat(10_000)}))["op"], "status", "is read");
 }
 
+/// Answers that nobody reads do not pile up: the server stops to listen, and drops who goes on.
+#[test]
+fn a_client_that_pings_and_does_not_read_is_dropped() {
+    let view = View::start(0, KNOBS).unwrap();
+    let mut watcher = Watcher::connect(&view.foxglove_address(), "foxglove.sdk.v1");
+    let many = (0..500_000).take_while(|_| watcher.ping(&[7; 120])).count();
+    assert!(many < 500_000, "60 MB of answers wait somewhere");
+}
+
 #[test]
 fn clients_have_places_and_give_them_back() {
     let view = View::start(0, KNOBS).unwrap();

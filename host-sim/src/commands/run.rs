@@ -58,11 +58,11 @@ pub(crate) struct RunArgs {
     /// Directory for the report, created whole
     #[arg(long, default_value = "stillpoint-report", value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Serve a page on this machine's loopback that shows the runs with a controller; afterwards go on inserting under
-    /// the page's knobs until it says finish, or Ctrl-C
+    /// Serve a page on this machine's loopback that shows the runs with a controller, and the same to Foxglove and
+    /// Lichtblick; afterwards go on inserting under the page's knobs until it says finish, or Ctrl-C
     #[arg(long)]
     pub(crate) view: bool,
-    /// Port of the page [default: any free one]
+    /// Port of both [default: any free one]
     #[arg(long, value_name = "PORT", requires = "view", default_value_t = 0, hide_default_value = true)]
     pub(crate) view_port: u16,
     /// Also write every controlled insertion as MCAP, for Foxglove and Lichtblick

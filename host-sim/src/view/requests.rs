@@ -65,6 +65,8 @@ fn whole(status: StatusCode, kind: &'static str, text: impl Into<Bytes>) -> Resp
     let mut response = Response::new(HttpReply::Whole(Full::new(text.into())));
     *response.status_mut() = status;
     let fixed = [
+        // One request per connection. Hyper's own setting would say so of a WebSocket, too, which some clients refuse then.
+        (header::CONNECTION, "close"),
         (header::CONTENT_TYPE, kind),
         (header::CONTENT_SECURITY_POLICY, POLICY),
         (header::CACHE_CONTROL, "no-store"),

@@ -165,7 +165,7 @@ async fn connection(stream: TcpStream, gate: Arc<Gate>, shared: Arc<Shared>, pla
     let service =
         service_fn(move |request| answer(request, Arc::clone(&gate), Arc::clone(&shared), Arc::clone(&for_answer)));
     let mut http = http1::Builder::new();
-    http.timer(TokioTimer::new()).header_read_timeout(HEADER_TIME).keep_alive(false);
+    http.timer(TokioTimer::new()).header_read_timeout(HEADER_TIME);
     http.max_headers(MAX_HEADERS).max_buf_size(MAX_HEADER_BYTES);
     let mut answered = pin!(http.serve_connection(TokioIo::new(stream), service).with_upgrades());
     let mut passed = pin!(deadline.passed());

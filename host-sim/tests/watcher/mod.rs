@@ -109,6 +109,11 @@ impl Watcher {
         self.socket.send(Message::binary(bytes.to_vec())).unwrap();
     }
 
+    /// Whether a ping is taken.
+    pub(crate) fn ping(&mut self, bytes: &[u8]) -> bool {
+        self.socket.send(Message::Ping(bytes.to_vec().into())).is_ok()
+    }
+
     /// Says something that is answered by a status.
     pub(crate) fn ask(&mut self, asked: &Value) -> Value {
         self.say(&asked.to_string());

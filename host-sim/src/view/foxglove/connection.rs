@@ -83,7 +83,11 @@ async fn converse(socket: &mut Socket, mut teller: Teller, session: &str) -> Res
             Event::Said(Some(Err(_))) => return Err(Gone),
             Event::Said(Some(Ok(Message::Text(text)))) => teller.hear(&text),
             Event::Said(Some(Ok(Message::Binary(_)))) => teller.hear(""),
-            Event::Said(Some(Ok(_))) => continue,
+            // What is answered to a ping is taken before the next one is read, so that answers do not pile up.
+            Event::Said(Some(Ok(_))) => {
+                timely(socket.flush()).await?;
+                continue;
+            }
         };
         if let Err(refusal) = refusal {
             refused += 1;
@@ -113,7 +117,12 @@ async fn next(socket: &mut Socket) -> Option<Result<Message, Error>> {
 
 /// Sends a message. Nothing else is made or read until the other side has taken it; whoever takes none for long is dropped.
 async fn say(socket: &mut Socket, message: Message) -> Result<(), Gone> {
-    match timeout(PATIENCE, socket.send(message)).await {
+    timely(socket.send(message)).await
+}
+
+/// What is to be done in time.
+async fn timely(doing: impl Future<Output = Result<(), Error>>) -> Result<(), Gone> {
+    match timeout(PATIENCE, doing).await {
         Ok(Ok(())) => Ok(()),
         _ => Err(Gone),
     }
