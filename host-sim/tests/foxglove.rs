@@ -5,7 +5,7 @@
 mod watcher;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use firmware::contract::frames::COMMAND_VALID;
@@ -323,6 +323,16 @@ fn space_is_told_and_nobody_waits_for_a_client_that_does_not_read() {
     assert_eq!(slow.rest(), None, "no goodbye to who does not listen");
 }
 
+/// Ends the program, whatever the test does.
+struct RunningProgram(Child);
+
+impl Drop for RunningProgram {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
 /// The program itself: addresses, an insertion, and the end.
 #[test]
 fn a_run_tells_both_addresses_and_closes_at_its_end() {
@@ -345,6 +355,7 @@ fn a_run_tells_both_addresses_and_closes_at_its_end() {
         .spawn()
         .unwrap();
     let mut said = BufReader::new(child.stdout.take().unwrap());
+    let mut program = RunningProgram(child);
     let mut address = |prefix: &str| {
         let mut line = String::new();
         said.read_line(&mut line).unwrap();
@@ -376,7 +387,7 @@ fn a_run_tells_both_addresses_and_closes_at_its_end() {
     page.read_to_string(&mut granted).unwrap();
     assert!(granted.starts_with("HTTP/1.1 204"), "{granted}");
     assert_eq!(watcher.rest(), Some(1001));
-    assert!(child.wait().unwrap().success());
+    assert!(program.0.wait().unwrap().success());
 }
 
 /// The check of schemas itself.

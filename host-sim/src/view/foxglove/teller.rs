@@ -77,7 +77,7 @@ impl MessageSink for Due {
 /// An insertion's scene.
 #[derive(Debug)]
 enum ShownStage {
-    Plane { stage: Stage, orthogonal: SMatrix<f64, 2, 1>, unit: String },
+    Plane { stage: Box<Stage>, orthogonal: SMatrix<f64, 2, 1>, unit: String },
     Space { stage: Box<SpaceStage<'static>>, body: Arc<SpaceShown>, scale: f64 },
 }
 
@@ -85,7 +85,7 @@ impl ShownStage {
     fn new(body: &ShownBody) -> Self {
         match body {
             ShownBody::Plane(model, paddle) => Self::Plane {
-                stage: Stage::new(model.scene(), *paddle),
+                stage: Box::new(Stage::new(model.scene(), *paddle)),
                 orthogonal: model.scene().needle.orthogonal(),
                 unit: model.scene().length_unit.clone(),
             },
@@ -100,7 +100,7 @@ impl ShownStage {
     fn tell(&mut self, due: &mut Due, state: &ViewState, began_ns: u64) -> Result<(), Infallible> {
         match self {
             Self::Plane { stage, orthogonal, unit } => {
-                tell_scene(due, &state.truth, stage, began_ns)?;
+                tell_scene(due, &state.truth, stage.as_ref(), began_ns)?;
                 tell_samples(due, state, &Series { orthogonal, paddles: 1, length: unit })
             }
             Self::Space { stage, body, scale } => {
