@@ -38,13 +38,7 @@ fn moment(tick: u64) -> Moment {
     let truth =
         Truth { tick, time_ns, depth: 0.01 * tick as f64, target: [by, 2.0 * by, 0.0], paddles: [[by, 0.0, 0.0]; 2] };
     let sequence = tick as u32;
-    let sample = |paddle_index| PaddleSample {
-        sequence,
-        paddle_index,
-        time_ns,
-        displacement: [by, 0.0, 0.0],
-        ..PaddleSample::default()
-    };
+    let sample = |paddle_index| PaddleSample { sequence, paddle_index, time_ns, displacement: [by, 0.0, 0.0] };
     let inputs = Inputs {
         tick,
         time_ns,
