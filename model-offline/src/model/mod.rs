@@ -382,9 +382,15 @@ impl TissueModel {
     }
 
     /// The rows of every paddle's nodes, where each paddle can be attached to a body that holds without it. None where
-    /// Nitsche's method imposes the values, or where a node of a paddle is one of the immobile part or of the needle too.
+    /// Nitsche's method imposes the values; where what is held are no single unknowns and the rule has ghost modes, in which the
+    /// springs of ports cost seven digits (`scni` on `paper-hull`); or where a node of a paddle is one of the immobile part or of
+    /// the needle too.
     pub(crate) fn attachable_rows(&self) -> Option<&[Vec<Stencil<2>>]> {
         let EssentialBoundary::Nodes(groups) = &self.essential else { return None };
+        let is_stable = self.planar.method().integration.is_stable();
+        if !is_stable && !ConstrainedRows::new(groups.with_paddle(None)).are_unknowns() {
+            return None;
+        }
         let same = |a: &Stencil<2>, b: &Stencil<2>| a.nodes == b.nodes && a.values == b.values;
         let apart = |row: &Stencil<2>| !groups.with_paddle(None).any(|held| same(held, row));
         groups.paddles.iter().flatten().all(apart).then_some(&groups.paddles)

@@ -17,7 +17,8 @@ pub struct MeshSize {
     /// On the surface of inclusions, over the width of the inclusion.
     pub inclusion: f64,
     /// At the target, over its distance from the body's surface: what is read there is a field that varies over that distance.
-    pub target: f64,
+    /// None: whatever is around it.
+    pub target: Option<f64>,
     /// At most, over the longest side of the body's bounding box.
     pub coarsest: f64,
     /// At most, over its shortest side: slabs and plates have more than one element across.
@@ -46,7 +47,8 @@ impl MeshSize {
         Self {
             rim: 0.4 * finer,
             inclusion: 0.8 * finer,
-            target: 0.2 * finer.sqrt(),
+            // Coarser meshes are those that insertions are followed on: there nothing is gained by it.
+            target: (level > 0).then(|| 0.2 * finer.sqrt()),
             coarsest: 0.2 * finer.sqrt(),
             thickest: finer.sqrt(),
             growth: 0.5,
@@ -93,8 +95,11 @@ fn graded(scene: &SpaceScene, size: &MeshSize, at_most: &[f64]) -> Result<TetMes
     let body: &dyn Implicit = scene.body.as_ref();
     let extent = extent(scene);
     let coarsest = (size.coarsest * extent).min(size.thickest * shortest(scene));
-    let depth = scene.body.level(&scene.target).abs().max(DEEP * extent);
-    let mut grading = Grading::new(coarsest, size.growth).with(&[scene.target], size.target * depth);
+    let mut grading = Grading::new(coarsest, size.growth);
+    if let Some(share) = size.target {
+        let depth = scene.body.level(&scene.target).abs().max(DEEP * extent);
+        grading = grading.with(&[scene.target], share * depth);
+    }
     for (k, region) in patches(scene).enumerate() {
         let rim = |spacing: f64| rim_points(body, region, spacing);
         let at_most = at_most.get(k).copied().unwrap_or(f64::INFINITY);
