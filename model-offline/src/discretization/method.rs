@@ -66,12 +66,6 @@ impl Integration {
         }
     }
 
-    /// Whether it is known to give every deformation of a lattice energy, so that no field is held by the boundary alone; of NSNI
-    /// it is not said.
-    pub fn is_stable(self) -> bool {
-        self.is_element() || matches!(self, Self::ScniStabilised | Self::Mscni | Self::Gauss)
-    }
-
     /// Whether it integrates over nodal cells.
     pub fn is_nodal(self) -> bool {
         matches!(self, Self::Dni | Self::Scni | Self::ScniStabilised | Self::Mscni | Self::Nsni)
