@@ -30,6 +30,8 @@ const EXTREMES: [&str; 16] = [
 ];
 /// Values per option where not all are tried.
 const TRIED: usize = 3;
+/// Calls at once.
+const AT_ONCE: usize = 3;
 /// What is at work for so long has taken its options; it is then told to end.
 const AT_WORK: Duration = Duration::from_secs(2);
 /// What has been told to end and does not.
@@ -229,35 +231,37 @@ fn values(n: usize) -> Vec<&'static str> {
 fn no_option_takes_a_value_that_it_cannot_bear() {
     let folder = tempfile::tempdir().unwrap();
     inputs(folder.path());
-    let (mut calls, mut wrong) = (0, Vec::new());
-    for program in programs() {
-        let tree = tree(&program);
+    let programs = programs();
+    let mut calls: Vec<(&Program, String, &str, String, &str)> = Vec::new();
+    for program in &programs {
+        let tree = tree(program);
         assert!(tree.len() > 8, "{tree:?}");
-        for (command, options) in tree.iter().filter(|(command, _)| command != "help") {
-            let base = program.commands.iter().find(|(name, _)| name == command);
+        for (command, options) in tree.into_iter().filter(|(command, _)| command != "help") {
+            let base = program.commands.iter().find(|(name, _)| *name == command);
             let (_, base) = base.unwrap_or_else(|| panic!("say how to call `{command}` in this test"));
-            for (n, option) in options.iter().enumerate() {
-                for value in values(n) {
-                    calls += 1;
-                    let out = folder.path().join(format!("out-{calls}"));
-                    std::fs::create_dir(&out).unwrap();
-                    let link = format!("options-{}-{calls}", std::process::id());
-                    let base = base
-                        .replace("OUT", out.to_str().unwrap())
-                        .replace("IN/", &format!("{}/", folder.path().display()));
-                    let base: Vec<_> = base.replace("LINK", &link).split_whitespace().map(str::to_owned).collect();
-                    let mut words = without(&base, option);
-                    words.push(if option.starts_with("--") {
-                        format!("{option}={value}")
-                    } else {
-                        format!("{option}{value}")
-                    });
-                    wrong.extend(attempt(&program, command, &words, &out).err());
-                    let _ = std::fs::remove_dir_all(&out);
-                }
+            for (n, option) in options.into_iter().enumerate() {
+                calls.extend(
+                    values(n).into_iter().map(|value| (program, command.clone(), *base, option.clone(), value)),
+                );
             }
         }
     }
+    let one = |k: usize| {
+        let (program, command, base, option, value) = &calls[k];
+        let out = folder.path().join(format!("out-{k}"));
+        std::fs::create_dir(&out).unwrap();
+        let link = format!("options-{}-{k}", std::process::id());
+        let base = base.replace("OUT", out.to_str().unwrap()).replace("IN/", &format!("{}/", folder.path().display()));
+        let base: Vec<_> = base.replace("LINK", &link).split_whitespace().map(str::to_owned).collect();
+        let mut words = without(&base, option);
+        words.push(if option.starts_with("--") { format!("{option}={value}") } else { format!("{option}{value}") });
+        let went = attempt(program, command, &words, &out).err();
+        let _ = std::fs::remove_dir_all(&out);
+        went
+    };
+    // Most of them wait: for a peer, or to be told to end.
+    let wrong: Vec<String> = model_offline::parallel::map(calls.len(), AT_ONCE, one).into_iter().flatten().collect();
+    let calls = calls.len();
     assert!(calls > 100, "only {calls} calls: is the completion script read as it is written?");
     assert!(wrong.is_empty(), "{} of {calls} calls:\n{}", wrong.len(), wrong.join("\n"));
     println!("{calls} calls");

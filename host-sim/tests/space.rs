@@ -2,8 +2,9 @@
 
 mod scenes;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::LazyLock;
 
 use host_sim::record::recording::{Record, Recording};
 use host_sim::runtime::accounting::tick::ControllerTick;
@@ -147,18 +148,26 @@ fn bodies_are_where_needle_and_paddles_are(page: &str, result: &Value) {
 /// The same seed gives the same insertion, bit by bit; another one another.
 #[test]
 fn an_insertion_follows_its_seed() {
-    let directory = tempfile::tempdir().unwrap();
-    let scene = with_pairs(directory.path(), "[[5, 6]]");
-    let series = |seed: &str| {
-        let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep", "--seed", seed];
-        let output = run_scene(&scene, directory.path(), &options);
-        assert!(output.status.success(), "{output:?}");
-        result(directory.path())["cases"][0]["dynamic"]["series"].clone()
-    };
-    let first = series("1");
-    assert_eq!(first, series("1"));
-    assert_ne!(first, series("2"));
+    let series = |directory: &Path| result(directory)["cases"][0]["dynamic"]["series"].clone();
+    let other = tempfile::tempdir().unwrap();
+    let scene = with_pairs(other.path(), "[[5, 6]]");
+    let output = run_scene(&scene, other.path(), &[&SHORT_OPTIONS[..], &["--seed", "2"]].concat());
+    assert!(output.status.success(), "{output:?}");
+    // That the same seed gives the same, bit by bit, is seen where one process does what two did.
+    assert_ne!(series(other.path()), series(&SHORT));
 }
+
+/// A short insertion of the pair 5 + 6 in `scan`, homogeneous, seed 1.
+const SHORT_OPTIONS: [&str; 6] = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep"];
+
+/// The folder of that run, which several tests look at and none changes: scene, report and result.
+static SHORT: LazyLock<PathBuf> = LazyLock::new(|| {
+    let directory = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap().keep();
+    let scene = with_pairs(&directory, "[[5, 6]]");
+    let output = run_scene(&scene, &directory, &SHORT_OPTIONS);
+    assert!(output.status.success(), "{output:?}");
+    directory
+});
 
 /// A scene in space.
 fn read(path: &Path) -> SpaceScene {
@@ -187,16 +196,11 @@ fn columns(bytes: &[u8]) -> std::collections::BTreeMap<String, Vec<String>> {
 #[test]
 fn a_recorded_pair_is_replayed_and_exported() {
     let directory = tempfile::tempdir().unwrap();
-    let scene = with_pairs(directory.path(), "[[5, 6]]");
-    let output = run_scene(
-        &scene,
-        directory.path(),
-        &["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep"],
-    );
-    assert!(output.status.success(), "{output:?}");
-    let report = directory.path().join("report");
-    let dynamic = result(directory.path())["cases"][0]["dynamic"].clone();
-    let path = report.join(dynamic["recording"]["file"].as_str().unwrap());
+    let scene = SHORT.join("pairs.toml");
+    let report = SHORT.join("report");
+    let dynamic = result(&SHORT)["cases"][0]["dynamic"].clone();
+    let path = directory.path().join("short.rec");
+    std::fs::copy(report.join(dynamic["recording"]["file"].as_str().unwrap()), &path).unwrap();
     let mut recording = Recording::read(&path).unwrap();
     let ticks = recording.records.len();
     assert_eq!(dynamic["recording"]["ticks"], ticks);
@@ -260,12 +264,9 @@ fn in_mcap(path: &Path, recording: &Recording) {
 #[test]
 fn two_processes_do_what_one_does() {
     let directory = tempfile::tempdir().unwrap();
-    let path = with_pairs(directory.path(), "[[5, 6]]");
-    let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep"];
-    let output = run_scene(&path, directory.path(), &options);
-    assert!(output.status.success(), "{output:?}");
-    let dynamic = result(directory.path())["cases"][0]["dynamic"].clone();
-    let file = directory.path().join("report").join(dynamic["recording"]["file"].as_str().unwrap());
+    let path = SHORT.join("pairs.toml");
+    let dynamic = result(&SHORT)["cases"][0]["dynamic"].clone();
+    let file = SHORT.join("report").join(dynamic["recording"]["file"].as_str().unwrap());
     let recording = Recording::read(&file).unwrap();
 
     let scene = read(&path);

@@ -78,8 +78,8 @@ fn what_is_no_result_or_not_in_it_is_refused() {
         std::fs::write(&file, value.to_string()).unwrap();
         file
     };
-    assert!(refused(&with(&|v| v["geometry"] = serde_json::Value::Null), &[]).contains("neither a result of"));
-    assert!(refused(&with(&|v| *v = 3.into()), &[]).contains("neither a result of"));
+    assert!(refused(&with(&|v| v["geometry"] = serde_json::Value::Null), &[]).contains("no result of"));
+    assert!(refused(&with(&|v| *v = 3.into()), &[]).contains("no result of"));
     let short = with(&|v| v["node_displacements"].as_array_mut().unwrap().truncate(5));
     assert!(refused(&short, &[]).contains("nodes has a place"));
     let short = with(&|v| v["strain"].as_array_mut().unwrap().truncate(5));
@@ -216,4 +216,73 @@ tolerance = 0.1
     model_offline().arg("draw").arg(&ball).arg("-o").arg(&ball).assert().code(2);
     let words = refused(&ball, &["--field", "strain"]);
     assert!(words.contains("a scene at rest has none"), "{words}");
+}
+
+/// A study of `place`, changed and written again.
+fn studied(folder: &Path, name: &str, scene: &str, change: impl FnOnce(&mut serde_json::Value)) -> PathBuf {
+    let result = folder.join(name);
+    let mut place = model_offline();
+    place.args(["place", scene, "--spacing", "0.2", "--quiet", "--json"]).arg(&result).assert().success();
+    let mut value: serde_json::Value = serde_json::from_slice(&std::fs::read(&result).unwrap()).unwrap();
+    change(&mut value);
+    std::fs::write(&result, value.to_string()).unwrap();
+    result
+}
+
+#[test]
+fn a_placement_study_is_drawn_alone_and_beside_an_earlier_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = studied(folder.path(), "study.json", "paper", |_| ());
+    let value: serde_json::Value = serde_json::from_slice(&std::fs::read(&study).unwrap()).unwrap();
+    let out = folder.path().join("study.svg");
+    let draw = |arguments: &[&std::ffi::OsStr]| {
+        model_offline().arg("draw").arg(&study).args(arguments).arg("-o").arg(&out).assert().success();
+        std::fs::read_to_string(&out).unwrap()
+    };
+    let alone = draw(&[]);
+    let [moved, held] = ["dynamic", "static"].map(|how| value["optimum"][how].as_u64().unwrap());
+    assert!(alone.contains(&format!("Moved: paddle {moved} needs the least travel")), "{:?}", texts(&alone));
+    assert!(alone.contains(&format!("Held: paddle {held} moves the target least")), "{:?}", texts(&alone));
+    // The bars stand in the relation of the numbers.
+    let paddles = value["paddles"].as_array().unwrap();
+    let heights = |svg: &str| -> Vec<f64> {
+        let document = roxmltree::Document::parse(svg).unwrap();
+        let bars = document.descendants().filter(|node| node.has_tag_name("rect"));
+        let bars = bars.filter(|node| node.attribute("class").is_some_and(|class| class.contains("c-blue")));
+        bars.filter_map(|node| node.attribute("height")?.parse().ok()).filter(|height| *height > 20.0).collect()
+    };
+    let found = heights(&alone);
+    assert_eq!(found.len(), paddles.len());
+    let measure = |paddle: &serde_json::Value| paddle["controllability_measure"].as_f64().unwrap();
+    for (height, paddle) in found.iter().zip(paddles) {
+        let ratio = [height / found[0], measure(paddle) / measure(&paddles[0])];
+        assert!((ratio[0] - ratio[1]).abs() < 0.02 * ratio[1], "{ratio:?}");
+    }
+    // An earlier study in which another paddle was the best, and one could not control the target.
+    let earlier = studied(folder.path(), "before.json", "paper", |value| {
+        value["optimum"]["dynamic"] = 1.into();
+        value["paddles"][4]["controllability_measure"] = serde_json::Value::Null;
+    });
+    let beside = draw(&["--beside".as_ref(), earlier.as_os_str()]);
+    let told = format!("paddle {moved} is the best to move, in place of paddle 1");
+    assert!(texts(&beside).join(" ").contains(&told), "{:?}", texts(&beside));
+    assert!(texts(&beside).join(" ").contains("Open markers: before (paper, inclusion)"), "{:?}", texts(&beside));
+    // One that cannot control the target has a place where failures stand, not none.
+    let cannot = studied(folder.path(), "cannot.json", "paper", |value| {
+        value["paddles"][4]["controllability_measure"] = serde_json::Value::Null;
+    });
+    model_offline().arg("draw").arg(&cannot).arg("-o").arg(&out).assert().success();
+    let failed = |svg: &str| texts(svg).iter().any(|text| text == "failed");
+    assert!(failed(&std::fs::read_to_string(&out).unwrap()) && !failed(&alone));
+    // What is no study, or no use for one.
+    assert!(refused(&study, &["--field", "strain"]).contains("leave them out"));
+    let solution = solved(folder.path(), &[]);
+    assert!(refused(&solution, &["--beside", study.to_str().unwrap()]).contains("is no result of `place`"));
+    assert!(refused(&study, &["--beside", solution.to_str().unwrap()]).contains("is no result of `place`"));
+    let none = studied(folder.path(), "none.json", "paper", |value| value["paddles"] = serde_json::json!([]));
+    assert!(refused(&none, &[]).contains("0 paddles"));
+    let negative = studied(folder.path(), "negative.json", "paper", |value| {
+        value["paddles"][0]["static"]["max_orthogonal"] = (-1.0).into();
+    });
+    assert!(refused(&negative, &[]).contains("a size in it is -1"));
 }

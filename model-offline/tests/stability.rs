@@ -298,6 +298,7 @@ fn the_study_of_a_body_in_space_is_written_like_that_of_the_plane() {
     let (scene, out) = (folder.path().join("stout.toml"), folder.path().join("out"));
     // A block with an inclusion, in millimetres.
     let text = COLUMN_IN_SPACE.replace("50.0]", "12.5]").replace("25.0]", "6.25]").replace("50.0,", "12.5,");
+    let text = text.replace("increments = 10", "increments = 3");
     let inclusion = "[[inclusion]]\nsphere = { centre = [103.0, 2.0, 8.0], radius = 1.5 }\nstiffness = 10.0\n";
     std::fs::write(&scene, text.replace("[immobile]", &format!("{inclusion}[immobile]"))).unwrap();
     let study = |arguments: &[&str]| {

@@ -1,6 +1,7 @@
 //! What the verification suites share: reproducible scatter, bodies to test on, and golden data.
 
 pub mod continuum;
+pub mod estimates;
 
 use model_offline::geometry::{Point, Point2, Polygon};
 

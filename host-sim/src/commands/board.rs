@@ -11,6 +11,7 @@ use host_sim::exchange::board::Control;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
+use host_sim::report::board_chart;
 
 use model_offline::output::check_outputs;
 
@@ -25,6 +26,9 @@ pub(crate) struct BoardArgs {
     /// Write the measured figures here, as a budget
     #[arg(long, value_name = "FILE")]
     pub(crate) write_budget: Option<PathBuf>,
+    /// Draw the measured figures
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
     /// Measure everything twice and fail if any figure differs
     #[arg(long)]
     pub(crate) twice: bool,
@@ -35,7 +39,8 @@ pub(crate) struct BoardArgs {
 /// # Errors
 /// [`SimError::Measure`], [`SimError::File`], [`SimError::Record`].
 pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
-    check_outputs(&[&args.recording], &[("--write-budget", args.write_budget.as_deref())])?;
+    let outputs = [("--write-budget", args.write_budget.as_deref()), ("--svg", args.svg.as_deref())];
+    check_outputs(&[&args.recording], &outputs)?;
     let recording = Recording::read(&args.recording)?;
     let budget = args.budget.as_deref().map(read_budget).transpose()?;
     let scenarios = measure::scenarios(&recording)?;
@@ -66,6 +71,9 @@ pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
     if let Some(path) = &args.write_budget {
         let text = format!("{HEAD}{}", toml::to_string(&measured).unwrap_or_default());
         write_bytes(path, text.as_bytes())?;
+    }
+    if let Some(path) = &args.svg {
+        write_bytes(path, board_chart::figure(&measured).svg().as_bytes())?;
     }
     if complaints.is_empty() { Ok(()) } else { Err(MeasureError::Budget { complaints }.into()) }
 }

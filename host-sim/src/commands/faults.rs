@@ -16,6 +16,7 @@ use host_sim::bench::paper_table::{brick_table, paper_table};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
+use host_sim::report::faults_chart;
 use host_sim::runtime::signals;
 use host_sim::world::error::OptionRange;
 
@@ -42,7 +43,7 @@ pub(crate) struct FaultsArgs {
     /// Instead, switch off one monitor of the controller after the other, and show which rows in lockstep notice
     #[arg(long, conflicts_with_all = ["only", "seeds", "effort", "out"])]
     pub(crate) monitors_off: bool,
-    /// Write faults.csv and faults.json into this directory
+    /// Write faults.csv, faults.json and faults.svg into this directory
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
     /// Also write the result here, as JSON
@@ -52,6 +53,9 @@ pub(crate) struct FaultsArgs {
 
 /// Part of the repetitions; ten times as many is already an hour.
 const EFFORT: OptionRange = OptionRange::new("--effort", 0.0, 10.0, "");
+
+/// What `--out` gets.
+const FILES: [&str; 3] = ["faults.csv", "faults.json", "faults.svg"];
 
 /// Random schedules without `--seeds`.
 const DEFAULT_SEEDS: u64 = 1000;
@@ -78,9 +82,9 @@ fn tried_on<const D: usize, const N: usize, const P: usize>(
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
     }
-    let files = ["faults.csv", "faults.json"].map(|name| args.out.as_ref().map(|directory| directory.join(name)));
-    let [csv, own] = files.each_ref().map(Option::as_deref);
-    check_outputs(&[], &[("--out", csv), ("--out", own), ("--json", args.json.as_deref())])?;
+    let files = FILES.map(|name| args.out.as_ref().map(|directory| directory.join(name)));
+    let [csv, own, svg] = files.each_ref().map(Option::as_deref);
+    check_outputs(&[], &[("--out", csv), ("--out", own), ("--out", svg), ("--json", args.json.as_deref())])?;
     let table = signals::ends_at_once(made)?;
     if args.monitors_off {
         return without_monitors(args, &table);
@@ -138,8 +142,10 @@ fn without_monitors<const D: usize, const N: usize, const P: usize>(
 
 fn write(args: &FaultsArgs, result: &FaultsResult) -> Result<(), SimError> {
     if let Some(directory) = &args.out {
-        write_bytes(&directory.join("faults.csv"), &result.csv())?;
-        write_json(&directory.join("faults.json"), result)?;
+        let [csv, json, svg] = FILES.map(|name| directory.join(name));
+        write_bytes(&csv, &result.csv())?;
+        write_json(&json, result)?;
+        write_bytes(&svg, faults_chart::figure(result).svg().as_bytes())?;
     }
     if let Some(path) = &args.json {
         write_json(path, result)?;

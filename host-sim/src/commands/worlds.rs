@@ -6,8 +6,9 @@ use clap::Args;
 use host_sim::SimError;
 use host_sim::bench::comparison::Progress as _;
 use host_sim::bench::worlds::{compare, count};
-use host_sim::record::files::write_json;
+use host_sim::record::files::{write_bytes, write_json};
 use host_sim::report::studies::worlds::summary;
+use host_sim::report::studies::worlds_chart::figure;
 use host_sim::runtime::signals;
 use model_offline::output::check_outputs;
 use model_offline::parallel;
@@ -28,6 +29,9 @@ pub(crate) struct WorldsArgs {
     /// Also write the result here, as JSON
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
+    /// Draw peaks over all worlds
+    #[arg(long, value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
     /// No progress and no summary
     #[arg(long)]
     pub(crate) quiet: bool,
@@ -41,7 +45,7 @@ pub(crate) fn worlds(args: &WorldsArgs) -> Result<(), SimError> {
     signals::install();
     let scene = Scene::read(args.scene.as_deref().unwrap_or(Path::new("breast")))?;
     let inputs: Vec<&Path> = args.scene.iter().map(PathBuf::as_path).collect();
-    check_outputs(&inputs, &[("--json", args.json.as_deref())])?;
+    check_outputs(&inputs, &[("--json", args.json.as_deref()), ("--svg", args.svg.as_deref())])?;
     let bar = super::progress_bar(args.quiet);
     bar.begin(count());
     let threads = parallel::threads(args.threads);
@@ -49,6 +53,9 @@ pub(crate) fn worlds(args: &WorldsArgs) -> Result<(), SimError> {
     bar.finish_and_clear();
     if let Some(path) = &args.json {
         write_json(path, &result)?;
+    }
+    if let Some(path) = &args.svg {
+        write_bytes(path, figure(&result).svg().as_bytes())?;
     }
     if !args.quiet {
         print!("{}", summary(&result));

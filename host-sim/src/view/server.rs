@@ -15,6 +15,7 @@ use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
+use rustix::net::sockopt::set_socket_send_buffer_size;
 use tokio::net::TcpStream;
 
 use super::limits::{Deadline, Gate, Slot};
@@ -33,6 +34,10 @@ const MAX_HEADERS: usize = 64;
 const MAX_HEADER_BYTES: usize = 16 * 1024;
 /// Time for the whole header.
 const HEADER_TIME: Duration = Duration::from_secs(2);
+
+/// What the kernel is asked to keep of what a connection has not taken yet, bytes: with more, a slow one would be shown a past
+/// that nobody can tell from the present.
+const UNSENT: usize = 64 * 1024;
 
 /// Time for the last words to every page: a few looks at what is new.
 const LAST_WORDS: Duration = Duration::from_millis(150);
@@ -76,6 +81,8 @@ impl View {
         let failed = |source| SimError::ViewPort { port, source };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port)).map_err(failed)?;
         listener.set_nonblocking(true).map_err(failed)?;
+        // Connections have it from here.
+        set_socket_send_buffer_size(&listener, UNSENT).map_err(|errno| failed(errno.into()))?;
         let port = listener.local_addr().map_err(failed)?.port();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(failed)?;
         let shared = Arc::new(shared);

@@ -116,7 +116,6 @@ impl Watch {
             let mut state = shared.state();
             *state = ViewState {
                 insertion: state.insertion + 1,
-                number: state.number,
                 title,
                 live: shared.restarts_are_allowed(),
                 mode: Some(mode),
@@ -220,6 +219,18 @@ impl Watch {
     }
 }
 
+impl Drop for Watch {
+    /// What the controller said since the last state was left is not lost with the insertion.
+    fn drop(&mut self) {
+        if self.changes.is_empty() {
+            return;
+        }
+        let mut state = self.shared.state();
+        self.changes.drain(..).for_each(|change| remember(&mut state.changes, change));
+        state.number += 1;
+    }
+}
+
 impl<'m> Observer<TissuePlant<'m>> for Watch {
     fn offer(&mut self, tissue: &TissuePlant<'m>, moment: &Moment) {
         self.leave(moment, |state| {
@@ -261,15 +272,18 @@ mod tests {
     use super::*;
     use crate::view::Knobs;
     use crate::world::tissue::WantedPlant;
+    use firmware::contract::PaddleCommand;
+    use firmware::{Inputs, Mode};
     use model_offline::model::TissueModel;
     use model_offline::scene::Scene;
+
+    const KNOBS: Knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
 
     #[test]
     fn the_loop_never_waits_for_a_reader() {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
         let tissue = TissuePlant::new(&model, None, WantedPlant::Full).unwrap();
-        let knobs = Knobs { needle_speed: 1.0, target_rate: 50.0, latency: 20.0, noise: 1.0, stiffness: 1.0 };
-        let shared = Arc::new(Shared::new(knobs));
+        let shared = Arc::new(Shared::new(KNOBS));
         let insertion = ObservedInsertion {
             body: PlanarBody { model: &model, paddle: 0 },
             mode: RunMode::Lockstep,
@@ -287,5 +301,64 @@ mod tests {
         let state = shared.newer(0, 0).unwrap();
         assert_eq!((state.number, state.truth.tick, state.coefficients.len()), (1, 1, model.dofs()));
         assert!(shared.newer(state.insertion, state.number).is_none());
+    }
+
+    /// An insertion that has begun and has no tick yet is not shown: a state of time 0 would be a jump back of the clock.
+    #[test]
+    fn an_insertion_is_not_shown_before_its_first_tick() {
+        let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+        let tissue = TissuePlant::new(&model, None, WantedPlant::Full).unwrap();
+        let shared = Arc::new(Shared::new(KNOBS));
+        let insertion = || ObservedInsertion {
+            body: PlanarBody { model: &model, paddle: 0 },
+            mode: RunMode::FreeRun,
+            period_ns: 1_000_000,
+            title: String::new(),
+        };
+        let truth = Truth { tick: 7, time_ns: 5_000_000_000, ..Truth::default() };
+        let moment = Moment { truth, time_s: 0.0, began_ns: 0, is_counted: true, answer: None, exchanged: None };
+        let mut first = Watch::new(&shared, insertion());
+        first.offer(&tissue, &moment);
+        let seen = shared.newer(0, 0).unwrap();
+        drop(first);
+        let mut second = Watch::new(&shared, insertion());
+        for (insertion, number) in [(0, 0), (seen.insertion, seen.number)] {
+            assert!(shared.newer(insertion, number).is_none());
+        }
+        second.offer(&tissue, &moment);
+        let state = shared.newer(seen.insertion, seen.number).unwrap();
+        assert_eq!((state.insertion, state.number, state.truth.tick), (seen.insertion + 1, 1, 7));
+    }
+
+    /// What the controller says after the last state that was left is told all the same.
+    #[test]
+    fn the_last_words_of_an_insertion_are_not_lost() {
+        let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
+        let tissue = TissuePlant::new(&model, None, WantedPlant::Full).unwrap();
+        let shared = Arc::new(Shared::new(KNOBS));
+        let insertion = ObservedInsertion {
+            body: PlanarBody { model: &model, paddle: 0 },
+            mode: RunMode::Lockstep,
+            period_ns: 1_000_000,
+            title: String::new(),
+        };
+        let mut watch = Watch::new(&shared, insertion);
+        let says = |tick: u64, mode: Mode| {
+            let command = PaddleCommand { tick, state: mode as u32, ..PaddleCommand::default() };
+            let inputs = Inputs { tick, time_ns: tick * 1_000_000, ..Inputs::default() };
+            let truth = Truth { tick, time_ns: inputs.time_ns, ..Truth::default() };
+            let exchanged = Some(ControllerTick { inputs, command });
+            Moment { truth, time_s: 0.0, began_ns: 0, is_counted: true, answer: None, exchanged }
+        };
+        watch.offer(&tissue, &says(1, Mode::Run));
+        // At once: no state is due for them.
+        watch.offer(&tissue, &says(2, Mode::Hold));
+        watch.offer(&tissue, &says(3, Mode::Safe));
+        let before = shared.newer(0, 0).unwrap();
+        assert_eq!((before.changes.len(), before.truth.tick), (1, 1));
+        drop(watch);
+        let after = shared.newer(before.insertion, before.number).unwrap();
+        let times: Vec<u64> = after.changes.iter().map(|(time_ns, _)| time_ns / 1_000_000).collect();
+        assert_eq!((times, after.truth.tick), (vec![1, 2, 3], 1));
     }
 }

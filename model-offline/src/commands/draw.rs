@@ -5,12 +5,13 @@ use super::common::SceneArgs;
 use super::common::warned;
 use super::error::CliError;
 use model_offline::output::field_picture::{self, Field};
+use model_offline::output::placement_picture::{self, DrawnStudy, read_study};
 use model_offline::output::result_file::{Which, read_body};
 use model_offline::output::space_picture::{self, SpaceGeometry};
 use model_offline::output::{PictureFormat, check_outputs, scene_picture, write_picture};
 use model_offline::placement::space::workflow::coarse;
 use model_offline::scene::space::SpaceScene;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `draw`.
 #[derive(Debug, clap::Args)]
@@ -20,7 +21,8 @@ pub(super) struct DrawArgs {
     /// Where to write the picture: a .svg, .png or .pdf file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// What the colours of a result show; a result is a .json file of `solve --json` or `host-sim run` in place of a scene.
+    /// What the colours of a result show; a result is a .json file of `solve --json`, `place --json` or `host-sim run` in place
+    /// of a scene.
     #[arg(long, value_parser = field)]
     field: Option<Field>,
     /// Number of the case of a result of `host-sim run` [default: 1]
@@ -32,6 +34,9 @@ pub(super) struct DrawArgs {
     /// The state nearest to this needle depth, length units [default: the deepest]
     #[arg(long, value_name = "LENGTH")]
     depth: Option<f64>,
+    /// An earlier result of `place --json`, whose values are drawn beside those of this one.
+    #[arg(long, value_name = "FILE")]
+    beside: Option<PathBuf>,
 }
 
 fn field(word: &str) -> Result<Field, String> {
@@ -47,10 +52,10 @@ pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
     if is_result {
         return draw_result(args);
     }
-    if args.field.is_some() || args.case.is_some() || args.strategy.is_some() || args.depth.is_some() {
+    if args.picks_a_state() || args.beside.is_some() {
         return Err(CliError::usage(
-            "--field, --case, --strategy and --depth are for results, and a scene at rest has none",
-            "draw DIR/result.json of `host-sim run`, or what `solve SCENE --depth D --json FILE` writes",
+            "--field, --case, --strategy, --depth and --beside are for results, and a scene at rest has none",
+            "draw DIR/result.json of `host-sim run`, or what `solve SCENE --depth D --json FILE` or `place SCENE --json FILE` writes",
         ));
     }
     if let Some(scene) = args.scene.read_in_space()? {
@@ -72,6 +77,39 @@ fn draw_in_space(args: &DrawArgs, scene: &SpaceScene) -> Result<(), CliError> {
     Ok(())
 }
 
+impl DrawArgs {
+    /// Whether one of the options is given that choose a state, or what of it is shown.
+    fn picks_a_state(&self) -> bool {
+        self.field.is_some() || self.case.is_some() || self.strategy.is_some() || self.depth.is_some()
+    }
+}
+
+/// A placement study, alone or beside an earlier one.
+fn draw_study(args: &DrawArgs, study: &DrawnStudy) -> Result<(), CliError> {
+    if args.picks_a_state() {
+        return Err(CliError::usage(
+            "--field, --case, --strategy and --depth are for results that have states; `place` writes numbers over paddles",
+            "leave them out, or draw what `solve SCENE --depth D --json FILE` writes",
+        ));
+    }
+    let Some(path) = &args.beside else {
+        return Ok(write_picture(&args.output, &placement_picture::svg(study, None))?);
+    };
+    check_outputs(&[path], &[("--output", Some(&args.output))])?;
+    let Some(earlier) = read_study(path)? else {
+        return Err(no_study("--beside", path));
+    };
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    Ok(write_picture(&args.output, &placement_picture::svg(study, Some((&name, &earlier))))?)
+}
+
+fn no_study(what: &str, path: &Path) -> CliError {
+    CliError::usage(
+        format!("{what}: {} is no result of `place`", path.display()),
+        "--beside compares two results of `model-offline place SCENE --json FILE`",
+    )
+}
+
 fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
     let result = &args.scene.scene;
     if args.scene.leaves_out_inclusions() {
@@ -79,6 +117,12 @@ fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
             "--without-inclusion is for scenes: a result is of the tissue that it is of",
             "give --case for another one, or solve without the inclusion",
         ));
+    }
+    if let Some(study) = read_study(result)? {
+        return draw_study(args, &study);
+    }
+    if args.beside.is_some() {
+        return Err(no_study("with --beside", result));
     }
     if let Some(depth) = args.depth.filter(|depth| !depth.is_finite() || *depth < 0.0) {
         return Err(CliError::usage(format!("--depth is {depth}"), "give a depth of 0 or more"));

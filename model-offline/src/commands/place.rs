@@ -105,6 +105,7 @@ fn document(
     json!({
         "scene": scene.name,
         "tissue": scene.tissue(),
+        "units": [&scene.length_unit, &scene.stress_unit],
         "nodes": study.model.nodes(),
         "dofs": study.model.dofs(),
         "integration": scene.discretization.method.integration,

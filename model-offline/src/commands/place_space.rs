@@ -56,6 +56,7 @@ fn document(study: &SpaceStudy) -> Value {
         "scene": scene.name,
         "dimension": 3,
         "tissue": scene.tissue(),
+        "units": [&scene.length_unit, &scene.stress_unit],
         "nodes": study.model.nodes(),
         "dofs": study.model.dofs(),
         "integration": scene.discretization.method.integration,

@@ -6,6 +6,7 @@ pub mod csv;
 pub mod field_picture;
 mod geometry;
 mod picture_file;
+pub mod placement_picture;
 mod preflight;
 pub mod result_file;
 pub mod scene_picture;

@@ -50,7 +50,7 @@ pub enum ResultError {
         source: std::io::Error,
     },
     /// It is no result.
-    #[error("{}: neither a result of `model-offline solve --json` nor of `host-sim run`: {reason}", path.display())]
+    #[error("{}: no result of `model-offline solve --json`, `model-offline place --json` or `host-sim run`: {reason}", path.display())]
     #[diagnostic(help(
         "a comparison's is DIR/result.json; results of `solve` of older versions have no geometry: solve again"
     ))]
@@ -119,6 +119,16 @@ struct Frame {
     von_mises: Vec<f64>,
 }
 
+/// The JSON of a file.
+///
+/// # Errors
+/// [`ResultError`].
+pub(super) fn read_value(path: &Path) -> Result<serde_json::Value, ResultError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ResultError::Read { path: path.to_owned(), source })?;
+    serde_json::from_str(&text)
+        .map_err(|error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() })
+}
+
 /// Strategies in the order in which they are looked for.
 const STRATEGIES: [&str; 4] = ["dynamic", "dynamic-free-run", "static", "none"];
 
@@ -127,10 +137,9 @@ const STRATEGIES: [&str; 4] = ["dynamic", "dynamic-free-run", "static", "none"];
 /// # Errors
 /// [`ResultError`].
 pub fn read_body(path: &Path, which: &Which) -> Result<ResultBody, ResultError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ResultError::Read { path: path.to_owned(), source })?;
     let no_result =
         |error: serde_json::Error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() };
-    let value: serde_json::Value = serde_json::from_str(&text).map_err(no_result)?;
+    let value = read_value(path)?;
     let is_compared = value.get("cases").is_some();
     let body = if is_compared {
         compared(path, serde_json::from_value(value).map_err(no_result)?, which)?

@@ -2,6 +2,7 @@
 
 use super::Scene;
 use super::import::{ImportError, Imported, ImportedNeedle, Role};
+use super::sensor::millimetres;
 use crate::geometry::{Point2, Polygon, distance_to_polyline, segments_meet};
 use crate::material::Preset;
 use std::fmt::Write as _;
@@ -17,12 +18,23 @@ pub struct StarterNames {
     pub stress: String,
 }
 
+/// Longer side of the starter block where its unit is known, mm; in other units as many of them.
+const BLOCK_MM: f64 = 100.0;
+
+impl StarterNames {
+    /// Longer side of the starter block, in its unit: 100 mm where the unit is known.
+    pub fn block(&self) -> f64 {
+        millimetres(&self.length).map_or(BLOCK_MM, |unit_mm| BLOCK_MM / unit_mm)
+    }
+}
+
 /// Paddle positions that are suggested at most.
 const PADDLES: usize = 5;
 /// A needle's contact as part of the edge that it enters.
 const CONTACT: f64 = 0.3;
 
-/// The text of a valid, commented scene. Without an import: a block of 100 by 60 with one inclusion.
+/// The text of a valid, commented scene. Without an import: a block of 100 by 60 mm with one inclusion, in units that are not
+/// known of 100 by 60.
 ///
 /// What holds the body, where the needle goes in and where paddles may sit is a suggestion where the import does not
 /// give it: the lowest edge is immobile, the needle enters at the highest edge, paddles sit on the longest of the
@@ -31,8 +43,10 @@ pub fn starter(names: &StarterNames, imported: Option<&Imported>) -> String {
     let block = || {
         let rectangle =
             |a: [f64; 2], b: [f64; 2]| Polygon::new([a, [b[0], a[1]], b, [a[0], b[1]]].map(Point2::from).to_vec()).ok();
-        let outline = rectangle([0.0, 0.0], [100.0, 60.0])?;
-        Some(Imported::of(outline, rectangle([55.0, 25.0], [75.0, 45.0]).into_iter().collect()))
+        let side = |part: f64| names.block() * part;
+        let outline = rectangle([0.0, 0.0], [side(1.0), side(0.6)])?;
+        let inclusion = rectangle([side(0.55), side(0.25)], [side(0.75), side(0.45)]);
+        Some(Imported::of(outline, inclusion.into_iter().collect()))
     };
     let Some(imported) = imported.cloned().or_else(block) else {
         return String::new();
@@ -344,6 +358,17 @@ mod tests {
     fn the_starter_is_a_valid_scene() {
         let scene = Scene::parse(&starter(&names(), None), "starter").unwrap();
         assert_eq!((scene.paddles.len(), scene.inclusions.len(), scene.length_unit.as_str()), (4, 1, "mm"));
+    }
+
+    #[test]
+    fn the_block_is_as_large_in_every_unit_that_is_known() {
+        for (length, side) in [("mm", 100.0), ("cm", 10.0), ("m", 0.1), ("um", 1e5), ("furlong", 100.0)] {
+            let scene =
+                Scene::parse(&starter(&StarterNames { length: length.into(), ..names() }, None), "starter").unwrap();
+            let width = scene.outline.vertices().iter().map(|p| p.x).fold(0.0, f64::max);
+            assert!((width / side - 1.0).abs() < 1e-12, "{length}: {width}");
+            assert!(scene.needle.depth < 0.1 * side && scene.target.x < side);
+        }
     }
 
     /// Every outline gives a scene that passes validation: polygons of 3 to 40 corners, long and short, small and

@@ -4,3 +4,4 @@ pub mod loop_stability;
 pub mod loop_stability_chart;
 pub mod tables;
 pub mod worlds;
+pub mod worlds_chart;

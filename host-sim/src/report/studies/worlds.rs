@@ -84,7 +84,7 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
 }
 
 /// Needle, tissue and patient.
-fn in_words(effects: &[Effect]) -> [&'static str; 3] {
+pub(super) fn in_words(effects: &[Effect]) -> [&'static str; 3] {
     let has = |effect: Effect| effects.contains(&effect);
     [
         if has(Effect::Shaft) { "shaft" } else { "patch" },

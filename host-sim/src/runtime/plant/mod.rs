@@ -143,8 +143,9 @@ impl<T: TissueResponse<D>, const D: usize> PlantLoop<T, D> {
         if let Some(command) = command {
             self.answer =
                 Some(Answer { mode: Mode::from_wire(command.state), faults: Faults::from_bits(command.faults) });
-            self.exchanged =
-                Some(ControllerTick { inputs: Inputs { tick: command.tick, ..self.told }, command: *command });
+            // As the controller records it: by its own tick and that one's time.
+            let inputs = Inputs { tick: command.tick, time_ns: command.time_ns, ..self.told };
+            self.exchanged = Some(ControllerTick { inputs, command: *command });
         }
         let waited_ns = time_ns - self.first_ns.unwrap_or(time_ns);
         match command {

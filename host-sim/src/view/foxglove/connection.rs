@@ -9,6 +9,7 @@ use std::time::Duration;
 use futures_util::{SinkExt as _, Stream as _};
 use hyper::upgrade::Upgraded;
 use hyper_util::rt::TokioIo;
+use tokio::task::yield_now;
 use tokio::time::{Interval, MissedTickBehavior, interval, timeout};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
@@ -63,7 +64,7 @@ async fn converse(socket: &mut Socket, mut teller: Teller, session: &str) -> Res
     let mut looks = interval(Duration::from_nanos(FRAME_NS / 2));
     looks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     say(socket, Message::text(protocol::server_info(session).to_string())).await?;
-    say(socket, Message::text(protocol::advertise().to_string())).await?;
+    say(socket, Message::text(protocol::advertise())).await?;
     let mut refused = 0;
     loop {
         let refusal = match poll_fn(|context| poll_event(socket, &mut looks, context)).await {
@@ -89,6 +90,8 @@ async fn converse(socket: &mut Socket, mut teller: Teller, session: &str) -> Res
                 continue;
             }
         };
+        // Others have their turn after every request, and the clock moves on: without, a look is not known to be due.
+        yield_now().await;
         if let Err(refusal) = refusal {
             refused += 1;
             if refused > MAX_REFUSED {

@@ -1,5 +1,7 @@
 //! What is said on a connection, in Foxglove's words.
 
+use std::sync::LazyLock;
+
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
@@ -36,9 +38,24 @@ pub(super) struct Wanted {
     pub(super) channel_id: u64,
 }
 
-/// Topics and their channels.
-pub(super) fn channels() -> impl Iterator<Item = (u64, &'static str)> {
-    messages::schemas().into_iter().zip(1..).map(|((topic, ..), channel)| (channel, topic))
+/// Topics, their schemas' names, and their schemas. Made once: a client that asks much is to cost little.
+static TOPICS: LazyLock<Vec<(&str, &str, schemars::Schema)>> =
+    LazyLock::new(|| messages::schemas().into_iter().collect());
+
+/// What a client is told of them.
+static ADVERTISED: LazyLock<String> = LazyLock::new(|| {
+    let channel = |((topic, name, schema), id): (&(&str, &str, schemars::Schema), u64)| {
+        json!({"id": id, "topic": topic, "encoding": "json", "schemaName": name, "schemaEncoding": "jsonschema",
+            "schema": schema.as_value().to_string()})
+    };
+    let channels: Vec<Value> = TOPICS.iter().zip(1..).map(channel).collect();
+    json!({"op": "advertise", "channels": channels}).to_string()
+});
+
+/// The topic of a channel.
+pub(super) fn topic(channel: u64) -> Option<&'static str> {
+    let place = usize::try_from(channel.checked_sub(1)?).ok()?;
+    TOPICS.get(place).map(|(topic, ..)| *topic)
 }
 
 /// The first words to a client: the same `session` as long as this program runs.
@@ -48,13 +65,8 @@ pub(super) fn server_info(session: &str) -> Value {
 }
 
 /// Every channel with its schema.
-pub(super) fn advertise() -> Value {
-    let channel = |((topic, name, schema), id): ((&str, &str, schemars::Schema), u64)| {
-        json!({"id": id, "topic": topic, "encoding": "json", "schemaName": name, "schemaEncoding": "jsonschema",
-            "schema": schema.as_value().to_string()})
-    };
-    let channels: Vec<Value> = messages::schemas().into_iter().zip(1..).map(channel).collect();
-    json!({"op": "advertise", "channels": channels})
+pub(super) fn advertise() -> &'static str {
+    &ADVERTISED
 }
 
 /// Something was not done.

@@ -193,8 +193,7 @@ impl Teller {
 
     fn subscribe(&mut self, Wanted { id, channel_id }: Wanted) -> Result<(), SubscriptionRefusal> {
         let subscriptions = &mut self.due.subscriptions;
-        let known = protocol::channels().find(|(channel, _)| *channel == channel_id);
-        let (_, topic) = known.ok_or(SubscriptionRefusal::Channel)?;
+        let topic = protocol::topic(channel_id).ok_or(SubscriptionRefusal::Channel)?;
         if subscriptions.contains_key(topic) || subscriptions.values().any(|known| known.id == id) {
             return Err(SubscriptionRefusal::Taken);
         }

@@ -36,7 +36,7 @@ pub(super) fn ask(input: impl BufRead, screen: impl Write, names: &StarterNames)
          Lengths in {unit}, from the lower left corner. Enter takes what stands in brackets."
     )?;
     let above_zero = |value: f64| (value <= 0.0).then(|| "it must be above 0".to_owned());
-    let width = asked.number("width of the block", 100.0, above_zero)?;
+    let width = asked.number("width of the block", names.block(), above_zero)?;
     let height = asked.number("height of the block", rounded(0.6 * width), above_zero)?;
     let outline = rectangle(width, height);
     let material = asked.material(&names.stress)?;
