@@ -39,15 +39,75 @@ impl Source<'_> {
         let start = span.start.min(self.text.len());
         let before = &self.text[..self.text.floor_char_boundary(start)];
         let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        let end = span.end.clamp(start, self.text.len());
+        let (shown, at) = excerpt(self.text, start..end);
         SceneError {
             file: self.file.to_owned(),
             line: before.matches('\n').count() + 1,
             column: before[line_start..].chars().count() + 1,
             message: message.into(),
             help: help.into(),
-            source_text: Arc::new(NamedSource::new(self.file, self.text.to_owned())),
-            at: (start, span.end.min(self.text.len()).saturating_sub(start)).into(),
+            source_text: Arc::new(NamedSource::new(self.file, shown)),
+            at: (at.start, at.len()).into(),
         }
+    }
+}
+
+/// Bytes of a line that are shown whole, and of a longer one on either side of what is at fault.
+const LONGEST: usize = 240;
+const BESIDE: usize = 80;
+const CUT: &str = " … ";
+
+/// The text with its long lines cut, and where in it the part at fault is: a mesh of a line would fill screens.
+fn excerpt(text: &str, fault: Range<usize>) -> (String, Range<usize>) {
+    let (mut shown, mut at, mut begin) = (String::new(), 0..0, 0);
+    for line in text.split_inclusive('\n') {
+        let (before, end) = (shown.len(), begin + line.len());
+        let is_here = (begin..end).contains(&fault.start) || (end == text.len() && fault.start == end);
+        let from = if is_here { fault.start - begin } else { 0 };
+        let kept = if line.len() > LONGEST {
+            let first = line.floor_char_boundary(from.saturating_sub(BESIDE));
+            let last = line.ceil_char_boundary((from.max(first) + BESIDE).min(line.len()));
+            shown.push_str(if first > 0 { CUT } else { "" });
+            shown.push_str(line[first..last].trim_end_matches('\n'));
+            shown.push_str(if last < line.len() { CUT } else { "" });
+            shown.push_str(if line.ends_with('\n') { "\n" } else { "" });
+            first..last
+        } else {
+            shown.push_str(line);
+            0..line.len()
+        };
+        if is_here {
+            let lead = if kept.start > 0 { CUT.len() } else { 0 };
+            let start = before + lead + from - kept.start;
+            let length = if kept.len() < line.len() { fault.len().min(kept.end - from) } else { fault.len() };
+            at = start..start + length;
+        }
+        begin = end;
+    }
+    let end = at.end.min(shown.len());
+    (shown, at.start..end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn long_lines_are_cut_around_what_is_at_fault() {
+        let long = format!("box = {}é wrong é{}", "1, ".repeat(10_000), "2, ".repeat(10_000));
+        let text = format!("first\n{long}\n{}\nlast wrong", "x".repeat(5_000));
+        for start in [text.find("wrong").unwrap(), text.rfind("wrong").unwrap()] {
+            let (shown, at) = excerpt(&text, start..start + 5);
+            assert_eq!(&shown[at], "wrong");
+            assert!(shown.len() < 700 && shown.lines().count() == 4, "{} {}", shown.len(), shown.lines().count());
+        }
+        let (shown, at) = excerpt(&text, text.len()..text.len());
+        assert_eq!(at, shown.len()..shown.len());
+        // What spans lines, and short texts, stay.
+        let short = "a = 1\nb = [\n2]\n";
+        assert_eq!(excerpt(short, 10..14), (short.to_owned(), 10..14));
+        assert_eq!(excerpt("", 0..0), (String::new(), 0..0));
     }
 }
 
