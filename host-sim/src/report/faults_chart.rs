@@ -1,6 +1,7 @@
 //! The catalogue of faults as a figure: how soon each is found, and where the controller ends.
 
 use firmware::Mode;
+use model_offline::output::chart::number::count;
 use model_offline::output::chart::{Axis, Colour, Figure, Marker, Panel, Series};
 
 use crate::bench::faults::evidence::RowVerdict;
@@ -32,8 +33,9 @@ pub fn figure(result: &FaultsResult) -> Figure {
     Figure {
         title,
         caption: format!(
-            "Rows by number, as the command prints them; seed {}. Longest time to the answer over all trials of a row, in periods; \
-             what is found on the very tick stands at the lower end. Rows without a point have nothing to detect.",
+            "Rows by number, as the command prints them; seed {}. Longest time from the beginning of a fault to its answer over all \
+             trials of a row, in periods: a gap is known by the sample after it, a limit when it is reached; what is \
+             found on the very tick stands at the lower end. Rows without a point have nothing to detect.",
             result.seed
         ),
         panels: vec![panel(&result.rows)],
@@ -42,9 +44,9 @@ pub fn figure(result: &FaultsResult) -> Figure {
 }
 
 fn panel(rows: &[RowResult]) -> Panel {
-    let slowest = rows.iter().filter_map(|row| Some((row.ticks_to_detect?, row.id))).max();
+    let slowest = rows.iter().filter_map(|row| Some((row.ticks_to_detect?, row))).max_by_key(|(ticks, _)| *ticks);
     let title = match slowest {
-        Some((ticks, id)) => format!("The slowest to be found is row {id}, after {ticks} ticks"),
+        Some((ticks, row)) => format!("Longest until the answer: row {}, {}: {} ticks", row.id, row.name, count(ticks)),
         None => "Nothing was to be found".to_owned(),
     };
     let ids = rows.iter().map(|row| f64::from(row.id));
@@ -82,7 +84,14 @@ mod tests {
     use super::*;
 
     fn row(id: u32, ticks_to_detect: Option<u64>, state: Mode, result: RowVerdict) -> RowResult {
-        RowResult { id, ticks_to_detect, final_state: Some(state), result, ..RowResult::default() }
+        RowResult {
+            id,
+            name: "stale".to_owned(),
+            ticks_to_detect,
+            final_state: Some(state),
+            result,
+            ..RowResult::default()
+        }
     }
 
     #[test]
@@ -101,7 +110,7 @@ mod tests {
         let told = "2 of 4 faults are answered as they must be, 3 samples unaccounted for, 1 failed, 1 not run";
         assert_eq!(figure.title, told);
         let panel = &figure.panels[0];
-        assert_eq!(panel.title, "The slowest to be found is row 7, after 250 ticks");
+        assert_eq!(panel.title, "Longest until the answer: row 7, stale: 250 ticks");
         let [run, safe] = &panel.series[..] else { panic!("{} series", panel.series.len()) };
         assert_eq!((run.points.clone(), safe.points.clone()), (vec![(1.0, AT_ONCE)], vec![(7.0, 250.0)]));
         assert!(run.failures[0].0 == 9.0 && run.failures[0].1.is_nan());

@@ -3,6 +3,7 @@
 use super::common::RunArgs;
 use super::error::CliError;
 use super::json::write_json;
+use super::place_text::in_lengths_of;
 use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::space::SpaceStudy;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
@@ -86,11 +87,12 @@ fn summary(study: &SpaceStudy) -> String {
     let studies = all.iter().map(|(_, answer)| &answer.static_study).chain([&placement.no_paddle.static_study]);
     let digits = decimals(smallest_told(studies.map(|study| study.max_orthogonal)), 6);
     let mut out = format!(
-        "{} · {} tissue · {} nodes · {:.1} s\n\n paddles   1/σ_min(NᵀJ)   ‖J⁺N‖       ±   max orthogonal (static)\n",
+        "{} · {} tissue · {} nodes · {:.1} s{}\n\n paddles   1/σ_min(NᵀJ)   ‖J⁺N‖       ±   max orthogonal (static)\n",
         scene.name,
         scene.tissue(),
         study.model.nodes(),
-        study.wall_s
+        study.wall_s,
+        in_lengths_of(&scene.length_unit)
     );
     let errors = study.error_estimate.as_ref().map(|estimate| &estimate.by_set);
     let mut order: Vec<usize> = (0..placement.paddles.len()).collect();

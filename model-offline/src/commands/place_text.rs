@@ -20,12 +20,13 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
     let (scene, optimum) = (study.model.scene(), study.placement.optimum);
     let known = accuracy.and_then(|a| a.as_ref().ok());
     let mut out = format!(
-        "{} · {} tissue · {} nodes · {:.0} ms\n\n paddle   ‖J⁻¹n‖         ±   J⁻¹n                  \
+        "{} · {} tissue · {} nodes · {:.0} ms{}\n\n paddle   ‖J⁻¹n‖         ±   J⁻¹n                  \
          max orthogonal (static)        ±   of no paddle\n",
         scene.name,
         scene.tissue(),
         study.model.nodes(),
-        1e3 * study.wall_s
+        1e3 * study.wall_s,
+        in_lengths_of(&scene.length_unit)
     );
     let studies = study.placement.paddles.iter().map(|paddle| &paddle.static_study);
     let largest = studies.chain([&study.placement.no_paddle.static_study]).map(|study| study.max_orthogonal);
@@ -40,6 +41,11 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
     let _ = writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {none}");
     out.push_str(&notes(study, accuracy));
     out
+}
+
+/// In what lengths are told, at the end of a line; nothing for scenes without units.
+pub(super) fn in_lengths_of(unit: &str) -> String {
+    if unit == "1" { String::new() } else { format!(" · lengths in {unit}") }
 }
 
 fn paddle_row(paddle: &PaddleResult, errors: Option<&PaddleErrors>, optimum: Optimum, digits: usize) -> String {

@@ -11,7 +11,7 @@
 //! | `/log` | change of the controller's mode or faults, in Foxglove's schema | tick |
 //!
 //! Times are those of the recording: nanoseconds since the start of the run in lockstep, of the machine's steady clock in
-//! free-run. A metadata record `stillpoint` says which, with seed and hashes.
+//! free-run. A metadata record `stillpoint` says which, with seed, hashes, the unit of length, and the scene where it is known.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -164,8 +164,11 @@ pub fn encode<const D: usize, const N: usize>(
         }
     }
     forces_until(&mut output, u64::MAX)?;
+    let mut metadata = facts(recording);
+    metadata.insert("length_unit".to_owned(), series.length.to_owned());
+    metadata.extend(known.stage.map(|stage| ("scene".to_owned(), stage.scene().to_owned())));
     let mut writer = output.writer;
-    writer.write_metadata(&Metadata { name: "stillpoint".to_owned(), metadata: facts(recording) })?;
+    writer.write_metadata(&Metadata { name: "stillpoint".to_owned(), metadata })?;
     writer.finish()?;
     Ok(writer.into_inner().into_inner())
 }

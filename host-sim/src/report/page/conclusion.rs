@@ -40,7 +40,10 @@ fn reduction(run: &RunResult) -> Option<String> {
     let held = factors(run, |case| case.improvement).map(|times| format!("{times} than the best static paddle's"));
     let both: Vec<String> = [none, held].into_iter().flatten().collect();
     let why = below_noise(run).map_or_else(String::new, |why| format!("; {why}"));
-    (!both.is_empty()).then(|| format!("The dynamic paddle's largest error is {}{why}.", both.join(" and ")))
+    let factors = || run.cases.iter().filter_map(|case| case.improvement);
+    let still = factors().next().is_some() && factors().all(|factor| factor < 1.0);
+    let advice = if still { ": hold it still here" } else { "" };
+    (!both.is_empty()).then(|| format!("The dynamic paddle's largest error is {}{why}{advice}.", both.join(" and ")))
 }
 
 /// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.

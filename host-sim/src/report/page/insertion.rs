@@ -73,7 +73,10 @@ fn short_name(case: &CaseResult) -> String {
 fn error_panel(run: &RunResult, case: &CaseResult) -> Panel {
     let title = case.improvement.filter(|factor| factor.is_finite()).map_or_else(
         || format!("Tissue {}: all strategies", short_name(case)),
-        |factor| format!("Tissue {}: static error {} × dynamic", short_name(case), number(factor, 2)),
+        |factor| match factor < 1.0 {
+            true => format!("Tissue {}: dynamic error {} × static", short_name(case), number(1.0 / factor, 2)),
+            false => format!("Tissue {}: static error {} × dynamic", short_name(case), number(factor, 2)),
+        },
     );
     let depth = Axis::linear("needle depth", &run.units[0]).range(0.0, run.settings.depth);
     let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));

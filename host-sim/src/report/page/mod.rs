@@ -62,9 +62,9 @@ fn head(run: &RunResult) -> Markup {
             } }
             tbody { @for case in &run.cases { tr {
                 td { (case.tissue) }
-                td { (largest(case.strategies.none.as_ref())) }
-                td { (largest(case.strategies.static_paddle.as_ref())) }
-                td.best { (largest(case.strategies.controlled())) }
+                td { (largest(without_paddle(run, case))) }
+                td.best[!moving_pays(case)] { (largest(case.strategies.static_paddle.as_ref())) }
+                td.best[moving_pays(case)] { (largest(case.strategies.controlled())) }
                 td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td { (case.improvement_over_none.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td.left { (case.table_tissue) }
@@ -84,6 +84,16 @@ fn head(run: &RunResult) -> Markup {
         }
         nav { ol { @for (id, title) in PARTS { li { a href=(format!("#{id}")) { (title) } } } } }
     }
+}
+
+/// The insertion without a paddle: what a table knows makes no difference to it.
+fn without_paddle<'r>(run: &'r RunResult, case: &CaseResult) -> Option<&'r StrategyResult> {
+    run.cases.iter().filter(|other| other.tissue == case.tissue).find_map(|other| other.strategies.none.as_ref())
+}
+
+/// Whether the controlled paddle leaves less than the one that is held, as far as both are known.
+fn moving_pays(case: &CaseResult) -> bool {
+    case.improvement.is_none_or(|factor| factor >= 1.0)
 }
 
 fn largest(strategy: Option<&StrategyResult>) -> String {
@@ -106,13 +116,13 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
     html! {
         figure.scene { (inline(&scene::at_rest(run))) figcaption {
             "At rest: outline, nodes (dots), immobile boundary (hatched), needle with its contact and direction, paddle \
-             positions with their numbers (the best dynamic one blue, with a star)"
+             positions with their numbers (the best dynamic one blue, with a star, the best static one orange, the others grey)"
             @if !run.geometry.inclusions.is_empty() { ", inclusion of the tissue “inclusion”" }
             ", target (ring with cross). Equal scales on both axes."
         } }
         h3 { "The body under each strategy" }
-        p { "At the end of the insertion, or wherever the slider is. Colour is the size of the displacement from rest; \
-             dashed is the outline at rest. Displacements are drawn as they are, not enlarged." }
+        p { "At the end of the insertion, or wherever the slider is. Colour is what is chosen below, the size of the \
+             displacement from rest at first; dashed is the outline at rest. Displacements are drawn as they are, not enlarged." }
         (controls(run, surface))
         @for (i, case) in run.cases.iter().enumerate() {
             div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
@@ -173,8 +183,8 @@ fn controllability_part(run: &RunResult) -> Markup {
 
 fn insertion_part(run: &RunResult, cases: &[CaseCharts]) -> Markup {
     html! {
-        p { "Signed displacement of the true target orthogonal to the needle. The dynamic error is far smaller than the \
-             others, so it is also drawn alone, on its own scale." }
+        p { "Signed displacement of the true target orthogonal to the needle. The dynamic error is also drawn alone, \
+             on its own scale." }
         @for (case, drawn) in run.cases.iter().zip(cases) {
             h3 { "Tissue: " (case_name(case)) }
             (charts(&drawn.drawings()))

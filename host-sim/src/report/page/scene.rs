@@ -55,10 +55,13 @@ pub(super) fn at_rest(run: &RunResult) -> Drawing {
     drawing.polyline("contact", &view.path(&geometry.needle_contact));
     needle(&mut drawing, &view, geometry, 0.0);
     let dynamic: BTreeSet<u32> = run.placements.iter().filter_map(|placement| placement.best_dynamic).collect();
+    let held: BTreeSet<u32> = run.placements.iter().map(|placement| placement.best_static).collect();
     for paddle in &geometry.paddles {
-        let best = dynamic.contains(&paddle.index);
-        let (class, number) =
-            if best { ("paddle best", format!("{}★", paddle.index)) } else { ("paddle", paddle.index.to_string()) };
+        let (class, number) = match paddle.index {
+            index if dynamic.contains(&index) => ("paddle best", format!("{index}★")),
+            index if held.contains(&index) => ("paddle", index.to_string()),
+            index => ("paddle other", index.to_string()),
+        };
         let [mut from, mut to] = paddle.segment;
         // Neighbours share a node: a gap shows where one ends.
         (from, to) = (along(from, sub(to, from), 0.1), along(to, sub(to, from), -0.1));
@@ -172,7 +175,8 @@ impl Surface {
         if let Some(paddle) = geometry.paddles.iter().find(|paddle| Some(paddle.index) == strategy.paddle) {
             let segment = paddle.segment.map(|point| view.at([point[0] + moved[0], point[1] + moved[1]]));
             drawing.open_group("tool");
-            drawing.line("paddle best", segment[0], segment[1]);
+            // As in the charts: orange is held still, blue is moved.
+            drawing.line(if moved == [0.0; 2] { "paddle" } else { "paddle best" }, segment[0], segment[1]);
             let [x, y] = view.at(beside(geometry, view.extent, &paddle.segment));
             drawing.text("title halo", [x, y + 4.5], Anchor::Middle, &paddle.index.to_string());
             drawing.close_group();

@@ -381,6 +381,18 @@ fn the_conclusion_says_what_spoils_it() {
         (case.improvement, case.improvement_over_none) = (Some(0.5), Some(0.2));
     }
     assert!(said(&run).contains("5.0 times larger than without a paddle"), "{}", said(&run));
+    // Whoever reads that is told what to do, and what is best is marked: the paddle that is held.
+    assert!(said(&run).contains("hold it still here") && !said(&good).contains("hold it still"), "{}", said(&run));
+    let marked = |run: &RunResult, column: usize| {
+        let page = render(run);
+        let rows = page.split("<tbody>").nth(1).unwrap().split("</tbody>").next().unwrap().to_owned();
+        rows.split("<tr>").skip(1).all(|row| row.split("<td").nth(column).unwrap().starts_with(" class=\"best\""))
+    };
+    assert!(marked(&good, 4) && !marked(&good, 3) && marked(&run, 3) && !marked(&run, 4));
+    // Without a paddle it makes no difference what a table knows.
+    let page = render(&good);
+    let rows = page.split("<tbody>").nth(1).unwrap().split("</tbody>").next().unwrap();
+    assert!(rows.split("<tr>").skip(1).all(|row| !row.split("<td").nth(2).unwrap().contains('–')), "{rows}");
 }
 
 /// A target that moves by less than a measurement is off is no matter of feedback, and whoever reads that it got worse reads why.

@@ -85,7 +85,14 @@ impl Layout {
         let labels = y.ticks.iter().map(|tick| tick.1.as_str()).chain(failed.then_some("failed"));
         let left = labels.map(|label| text_width(label, TEXT)).fold(LEFT, f64::max) + TICK + 2.0;
         let rows = x.ticks.iter().map(|tick| tick.1.split('\n').count()).max().unwrap_or(0);
-        let size = [(width - left - RIGHT).max(40.0), PLOT];
+        // Half of a tick's label at the end of the axis is beyond it.
+        let room = width - left - RIGHT;
+        let beyond = |(value, label): &(f64, String)| {
+            let widest = label.lines().map(|line| text_width(line, TEXT)).fold(0.0, f64::max);
+            0.5 * widest - (1.0 - x.fraction(*value)) * room
+        };
+        let right = x.ticks.iter().map(beyond).filter(|beyond| beyond.is_finite()).fold(RIGHT, f64::max);
+        let size = [(width - left - right).max(40.0), PLOT];
         Self {
             title: wrap(&panel.title, width, TITLE),
             ordinate: wrap(&y.label, width, TEXT),

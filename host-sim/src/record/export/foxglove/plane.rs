@@ -19,6 +19,8 @@ const AROUND: f64 = 1.4;
 /// A planar scene with one of its paddles.
 #[derive(Clone, Debug)]
 pub struct Stage {
+    /// Name of the scene.
+    pub name: String,
     /// The scene at rest; its nodes are not looked at.
     pub geometry: Geometry,
     /// Index of the attached paddle.
@@ -28,7 +30,7 @@ pub struct Stage {
 impl Stage {
     /// Of a scene with this paddle.
     pub fn new(scene: &Scene, paddle: u32) -> Self {
-        Self { geometry: Geometry::new(scene, &[]), paddle }
+        Self { name: scene.name.clone(), geometry: Geometry::new(scene, &[]), paddle }
     }
 
     fn bounds(&self) -> [[f64; 2]; 2] {
@@ -50,6 +52,10 @@ impl Stage {
 }
 
 impl Scenery for Stage {
+    fn scene(&self) -> &str {
+        &self.name
+    }
+
     /// The body's outline at rest, inclusions, the immobile part, the target at rest.
     fn at_rest(&self, time_ns: u64) -> SceneUpdate {
         let geometry = &self.geometry;

@@ -15,6 +15,9 @@ const TARGET: f64 = 0.03;
 
 /// A scene to be seen along a recording.
 pub trait Scenery: Debug {
+    /// Name of the scene.
+    fn scene(&self) -> &str;
+
     /// What does not move, from this time on, ns.
     fn at_rest(&self, time_ns: u64) -> SceneUpdate;
 

@@ -136,6 +136,10 @@ fn moved<'a>(geometry: &'a SpaceGeometry, state: &'a SpaceState) -> impl Fn(u32)
 }
 
 impl Scenery for SpaceStage<'_> {
+    fn scene(&self) -> &str {
+        &self.geometry.name
+    }
+
     /// The target at rest: all else moves.
     fn at_rest(&self, time_ns: u64) -> SceneUpdate {
         SceneUpdate::of(vec![self.tools().target_at_rest(time_ns)])
