@@ -281,7 +281,7 @@ fn a_new_scene_in_space_can_be_checked_and_placed() {
     assert_eq!(run(&["new", "--dimension", "3", "-o", "a.toml", "--length", "cm"], folder.path()).0, 0);
     let (code, told, said) = run(&["check", "a.toml"], folder.path());
     assert!(code == 0 && told.contains("no warnings"), "{told} {said}");
-    let call = ["place", "a.toml", "--json", "a.json", "--quiet", "--integration", "fem-t4", "--spacing", "20"];
+    let call = ["place", "a.toml", "--json", "a.json", "--quiet", "--integration", "fem-t4", "--spacing", "2"];
     let (code, _, said) = run(&call, folder.path());
     assert_eq!((code, said.as_str()), (0, ""));
     assert_eq!(read("a.json", folder.path())["pairs"].as_array().unwrap().len(), 6);
