@@ -118,14 +118,14 @@ fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
             "give --case for another one, or solve without the inclusion",
         ));
     }
+    if let Some(depth) = args.depth.filter(|depth| !depth.is_finite() || *depth < 0.0) {
+        return Err(CliError::usage(format!("--depth is {depth}"), "give a depth of 0 or more"));
+    }
     if let Some(study) = read_study(result)? {
         return draw_study(args, &study);
     }
     if args.beside.is_some() {
         return Err(no_study("with --beside", result));
-    }
-    if let Some(depth) = args.depth.filter(|depth| !depth.is_finite() || *depth < 0.0) {
-        return Err(CliError::usage(format!("--depth is {depth}"), "give a depth of 0 or more"));
     }
     let which = Which { case: args.case, strategy: args.strategy.clone(), depth: args.depth };
     let body = read_body(result, &which)?;
