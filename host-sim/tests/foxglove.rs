@@ -148,8 +148,19 @@ fn the_plane_is_told_as_it_is_and_to_late_comers_at_once() {
     }
     std::thread::sleep(Duration::from_millis(50));
     observer.offer(&tissue, &moment(5));
-    let expected =
-        ["/needle", "/target", "/paddle", "/second_paddle", "/command", "/truth", "/scene/rest", "/scene", "/tf"];
+    let expected = [
+        "/needle",
+        "/target",
+        "/paddle",
+        "/second_paddle",
+        "/command",
+        "/truth",
+        "/scene/rest",
+        "/scene",
+        "/pose/needle",
+        "/pose/target",
+        "/tf",
+    ];
     for subprotocol in ["foxglove.sdk.v1", "foxglove.websocket.v1"] {
         let mut late = Watcher::connect(&view.foxglove_address(), subprotocol);
         late.subscribe(&topics());
@@ -165,6 +176,19 @@ fn the_plane_is_told_as_it_is_and_to_late_comers_at_once() {
         let of_scene: Vec<&Value> =
             scene.message["entities"].as_array().unwrap().iter().map(|entity| &entity["id"]).collect();
         assert_eq!(of_scene, ["needle", "paddle", "target"]);
+        // Straight down from the middle of the block's upper side, and the target from its own middle; x along the insertion.
+        for (topic, at, along) in
+            [("/pose/needle", [0.5, 0.95], [0.0, -1.0]), ("/pose/target", [0.505, 0.51], [1.0, 0.0])]
+        {
+            let told = told.iter().find(|told| told.topic == topic).unwrap();
+            let pose = |part: &str, k: &str| told.message["pose"][part][k].as_f64().unwrap();
+            let [z, w] = ["z", "w"].map(|k| pose("orientation", k));
+            let turned = [1.0 - 2.0 * z * z, 2.0 * z * w];
+            for (k, name) in ["x", "y"].into_iter().enumerate() {
+                assert!((pose("position", name) - at[k]).abs() < 1e-12, "{}", told.message);
+                assert!((turned[k] - along[k]).abs() < 1e-12, "{}", told.message);
+            }
+        }
         let log = late.until(|told| told.iter().filter(|told| told.topic == "/log").count() == 2);
         let said: Vec<(u64, &str)> = log
             .iter()

@@ -456,6 +456,9 @@ fn valid_points_keep_their_digits() {
         let points = by_points(&scene, &text(&[]));
         assert!(points.contains(to.trim_start_matches("segment = ")), "{to}: {points}");
     }
+    // A film of tissue beside the boundary is nothing but a rounding.
+    let film = read(&[(CONTACT, "[[40.0, 59.9995], [60.0, 59.99999]]")]).unwrap();
+    assert_eq!(film.needle.contact, [[40.0, 60.0], [60.0, 60.0]].map(Point2::from));
     let outside = read(&[(CONTACT, "[[40.0, 60.05], [60.0, 59.95]]")]).unwrap();
     assert_eq!(outside.needle.contact, [[40.0, 60.0], [60.0, 60.0]].map(Point2::from));
     let shaft = |entry: &str| {

@@ -37,6 +37,7 @@ pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
                 "depth": scene.needle.depth,
                 "has_inclusions": !scene.inclusions.is_empty(),
                 "paddles": body.paddles.len(),
+                "indices": body.paddles,
             })
         }
     };
@@ -52,11 +53,11 @@ pub(super) fn scene(state: &ViewState, shared: &Shared) -> Value {
     told
 }
 
-fn planar_scene(model: &TissueModel, paddle: u32) -> Value {
+fn planar_scene(model: &TissueModel, index: u32) -> Value {
     let scene = model.scene();
     let nodes = path(model.positions());
     let outline = path(scene.outline.vertices());
-    let paddle = scene.paddles.iter().find(|known| known.index == paddle);
+    let paddle = scene.paddles.iter().find(|known| known.index == index);
     json!({
         "name": scene.name,
         "unit": scene.length_unit,
@@ -70,6 +71,7 @@ fn planar_scene(model: &TissueModel, paddle: u32) -> Value {
         "depth": scene.needle.depth,
         "target": [scene.target.x, scene.target.y],
         "paddle": paddle.map(|paddle| path(&paddle.segment)),
+        "indices": [index],
     })
 }
 

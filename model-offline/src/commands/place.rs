@@ -119,6 +119,7 @@ fn document(
         "paddles": paddles,
         "no_paddle": no_paddle,
         "optimum": study.placement.optimum,
+        "as_good": known.map(|known| known.errors.as_good(&study.placement)),
         "warnings": scene.told_warnings(),
         "table_failure": table.and_then(|table| table.as_ref().err()).map(ToString::to_string),
     })

@@ -3,7 +3,7 @@
 use super::common::warned;
 use model_offline::model::ModelError;
 use model_offline::number::{decimals, length, smallest_told};
-use model_offline::placement::accuracy::{PaddleErrors, StaticErrors};
+use model_offline::placement::accuracy::{AsGood, PaddleErrors, StaticErrors};
 use model_offline::placement::study::{Optimum, StaticStudy};
 use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PaddleResult, PlacementStudy};
@@ -83,6 +83,10 @@ fn static_part(
 fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
     let optimum = study.placement.optimum;
     let dynamic = optimum.dynamic_paddle.map_or(NONE.to_owned(), |index| index.to_string());
+    let as_good = match accuracy {
+        Some(Ok(known)) => known.errors.as_good(&study.placement),
+        _ => AsGood::default(),
+    };
     let mut out = String::new();
     if let Some(e) = study.error_estimate {
         let _ = writeln!(
@@ -92,7 +96,14 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
             100.0 * e.target_displacement
         );
     }
-    let _ = writeln!(out, "\nbest static paddle: {}; best dynamic paddle: {dynamic}", optimum.static_paddle);
+    let _ = writeln!(
+        out,
+        "\nbest static paddle: {}{}; best dynamic paddle: {dynamic}{}",
+        optimum.static_paddle,
+        also(&as_good.static_paddles),
+        also(&as_good.dynamic_paddles)
+    );
+    out.push_str(&compared_to(study).unwrap_or_default());
     for line in study.verdict() {
         let _ = writeln!(out, "{line}");
     }
@@ -105,6 +116,27 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
     }
     out.push_str(&warned(&study.model.scene().told_warnings()));
     out
+}
+
+/// Paddles that the errors do not tell from the best.
+fn also(paddles: &[u32]) -> String {
+    let names: Vec<String> = paddles.iter().map(ToString::to_string).collect();
+    match names.len() {
+        0 => String::new(),
+        1 => format!(" ({} is as good within the errors)", names[0]),
+        _ => format!(" ({} are as good within the errors)", names.join(", ")),
+    }
+}
+
+/// To which depth static paddles are compared, where none got to the end.
+fn compared_to(study: &PlacementStudy) -> Option<String> {
+    let all = || study.placement.paddles.iter().map(|paddle| &paddle.static_study);
+    if all().any(|study| study.failure.is_none()) {
+        return None;
+    }
+    let shortest = all().min_by_key(|study| study.depth.len())?;
+    let depth = shortest.depth.last().map_or("zero, by what is at rest".to_owned(), |depth| length(*depth));
+    Some(format!("no static paddle reaches the full depth: the best one is best to depth {depth}, which all reach\n"))
 }
 
 /// Where the errors come from, and what they do not cover.

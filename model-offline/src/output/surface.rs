@@ -1,5 +1,6 @@
 //! Nodes as a surface of triangles: what pictures of results colour.
 
+use serde::Serialize;
 use spade::{DelaunayTriangulation, HasPosition, Point2, Triangulation as _};
 
 /// Triangles smaller than this part of the largest one are slivers along the edge.
@@ -52,6 +53,32 @@ pub fn edges(polygon: &[[f64; 2]]) -> impl Iterator<Item = ([f64; 2], [f64; 2])>
     polygon.iter().copied().zip(polygon.iter().copied().cycle().skip(1))
 }
 
+/// A point between nodes: three of them, and so much of each.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Interpolated {
+    corners: [usize; 3],
+    weights: [f64; 3],
+}
+
+impl Interpolated {
+    /// Of a point of the body at rest: linear in its triangle, and beyond the edge as in the nearest one; none without
+    /// triangles.
+    pub fn new(rest: &[[f64; 2]], triangles: &[[usize; 3]], point: [f64; 2]) -> Option<Self> {
+        let of = |corners: &[usize; 3]| {
+            let weights = barycentric(corners.map(|corner| rest[corner]), point);
+            Self { corners: *corners, weights }
+        };
+        let least = |of: &Self| of.weights.iter().copied().fold(f64::INFINITY, f64::min);
+        // The one whose least weight is largest holds the point, or is nearest in its own measure.
+        triangles.iter().map(of).max_by(|a, b| least(a).total_cmp(&least(b)))
+    }
+
+    /// The same of what these nodes have.
+    pub fn of(&self, nodes: &[[f64; 2]]) -> [f64; 2] {
+        [0, 1].map(|k| self.corners.iter().zip(self.weights).map(|(corner, weight)| weight * nodes[*corner][k]).sum())
+    }
+}
+
 /// How points between nodes move with them.
 #[derive(Debug)]
 pub(super) struct Motion<'a> {
@@ -61,19 +88,11 @@ pub(super) struct Motion<'a> {
 }
 
 impl Motion<'_> {
-    /// Where a point of the body at rest is now: linear in its triangle, and beyond the edge as in the nearest one.
+    /// Where a point of the body at rest is now.
     pub(super) fn of(&self, point: [f64; 2]) -> [f64; 2] {
-        let weights = |corners: &[usize; 3]| barycentric(corners.map(|corner| self.rest[corner]), point);
-        let least = |weights: &[f64; 3]| weights.iter().copied().fold(f64::INFINITY, f64::min);
-        let candidates = self.triangles.iter().map(|corners| (corners, weights(corners)));
-        // The one whose least weight is largest holds the point, or is nearest in its own measure.
-        let Some((corners, weights)) = candidates.max_by(|a, b| least(&a.1).total_cmp(&least(&b.1))) else {
-            return point;
-        };
-        [0, 1].map(|k| {
-            let displaced = corners.iter().zip(weights).map(|(c, w)| w * (self.moved[*c][k] - self.rest[*c][k]));
-            point[k] + displaced.sum::<f64>()
-        })
+        let Some(between) = Interpolated::new(self.rest, self.triangles, point) else { return point };
+        let (rest, moved) = (between.of(self.rest), between.of(self.moved));
+        [0, 1].map(|k| point[k] + moved[k] - rest[k])
     }
 }
 

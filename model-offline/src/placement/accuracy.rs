@@ -51,6 +51,46 @@ pub struct Accuracy {
     pub second_nodes: Option<usize>,
 }
 
+/// Paddles that are as good as the best ones, as far as their errors tell; by index, without the best.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct AsGood {
+    /// By the largest orthogonal displacement with the paddle static, of those that got as deep as the best one.
+    #[serde(rename = "static")]
+    pub static_paddles: Vec<u32>,
+    /// By the controllability measure.
+    #[serde(rename = "dynamic")]
+    pub dynamic_paddles: Vec<u32>,
+}
+
+impl Accuracy {
+    /// Who cannot be told from the best. A paddle whose error is not known is not among them, and tells nothing as the best.
+    pub fn as_good(&self, placement: &Placement) -> AsGood {
+        let optimum = placement.optimum;
+        let all = || placement.paddles.iter().zip(&self.paddles);
+        let best = placement.paddles.iter().find(|paddle| paddle.index == optimum.static_paddle);
+        let deep = best.map_or(0, |paddle| paddle.static_study.depth.len());
+        let held = all().filter(|(paddle, _)| paddle.static_study.depth.len() == deep).map(|(paddle, errors)| {
+            (paddle.index, paddle.static_study.max_orthogonal, errors.static_study.max_orthogonal)
+        });
+        let moved = all().map(|(paddle, errors)| {
+            let measure = paddle.controllability_measure;
+            (paddle.index, measure, errors.controllability_measure.map(|error| error * measure))
+        });
+        AsGood {
+            static_paddles: not_told_from(optimum.static_paddle, held),
+            dynamic_paddles: optimum.dynamic_paddle.map_or_else(Vec::new, |best| not_told_from(best, moved)),
+        }
+    }
+}
+
+/// Of paddles with what is to be small and its error, those whose range meets that of the best one.
+fn not_told_from(best: u32, all: impl Iterator<Item = (u32, f64, Option<f64>)>) -> Vec<u32> {
+    let known: Vec<(u32, f64, f64)> = all.filter_map(|(index, value, error)| Some((index, value, error?))).collect();
+    let Some((_, value, error)) = known.iter().find(|paddle| paddle.0 == best) else { return Vec::new() };
+    let reaches = |paddle: &&(u32, f64, f64)| paddle.0 != best && paddle.1 - paddle.2 <= value + error;
+    known.iter().filter(reaches).map(|paddle| paddle.0).collect()
+}
+
 /// Estimates the errors of a placement in `scene`, whose numbers at rest are judged by `reference`.
 ///
 /// # Errors
@@ -171,4 +211,19 @@ fn matrix(rows: &[[f64; 2]; 2]) -> Matrix2<f64> {
 /// Distance over the size of what it is measured from.
 fn relative(found: &Matrix2<f64>, limit: &Matrix2<f64>) -> f64 {
     (found - limit).norm() / limit.norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ranges that meet are not told from each other; a range that is not known says nothing, of others nor of the best.
+    #[test]
+    fn who_is_within_the_errors_of_the_best_is_named() {
+        let all = [(3, 1.0, Some(0.1)), (5, 1.25, Some(0.2)), (8, 1.25, Some(0.1)), (9, 1.05, None)];
+        assert_eq!(not_told_from(3, all.into_iter()), [5]);
+        assert_eq!(not_told_from(9, all.into_iter()), [0; 0]);
+        let exact = [(1, 2.0, Some(0.0)), (2, 2.0, Some(0.0)), (4, 2.1, Some(0.0))];
+        assert_eq!(not_told_from(1, exact.into_iter()), [2], "equal to the last digit");
+    }
 }

@@ -27,7 +27,8 @@ fn whole() -> f64 {
 }
 
 /// Points, or a part of an edge of the outline. Points that must lie on the boundary and miss it by less than a thousandth of
-/// the body's size (the diagonal of its bounding box) are put onto it; so is a needle contact that is outside by as much.
+/// the body's size (the diagonal of its bounding box) are put onto it; so is a needle contact that is outside by as
+/// much, or inside by less than a hundred-thousandth.
 #[derive(Debug, Clone, PartialEq, JsonSchema)]
 #[schemars(untagged, rename = "OnBoundary_{T}")]
 pub enum OnBoundary<T> {

@@ -65,6 +65,9 @@ pub fn imported(names: &StarterNames, imported: &mut Imported) -> Result<String,
         (imported.needle.is_none(), "needle"),
         (imported.target.is_none(), "target"),
         (imported.paddles.is_empty(), "paddles"),
+        (imported.material.is_none(), "material of the body"),
+        (imported.inclusions.iter().any(|inclusion| inclusion.material.is_none()), "stiffness of inclusions"),
+        (imported.depth.is_none(), "depth of the needle"),
     ];
     imported.summary.suggested = parts.iter().filter(|part| part.0).map(|part| part.1).collect();
     match Scene::parse(&text, "<new scene>") {

@@ -91,9 +91,10 @@ const VIEWS: [View; 4] = [
 /// Name, colour and marker of a point: of the rule, or of the plant where the job compares plants.
 fn appearance(point: &Measurement) -> (&'static str, Colour, Marker) {
     match (point.job, point.model_kind) {
-        (Job::Step, ModelKind::Reduced) => ("reduced", Colour::Green, Marker::Square),
-        (Job::Step, ModelKind::Condensed) => ("condensed", Colour::Blue, Marker::Diamond),
-        (Job::Step, _) => ("full", Colour::Vermillion, Marker::Circle),
+        // Colours are the rules', and all these have the same one.
+        (Job::Step, ModelKind::Reduced) => ("reduced", Colour::Ink, Marker::Square),
+        (Job::Step, ModelKind::Condensed) => ("condensed", Colour::Ink, Marker::Diamond),
+        (Job::Step, _) => ("full", Colour::Ink, Marker::Circle),
         _ => {
             let integration = point.discretization.method.integration;
             let (colour, marker) = look(integration);

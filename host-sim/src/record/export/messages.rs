@@ -7,6 +7,7 @@
 //! | `/truth` | what really happened at a tick of the plant |
 //! | `/needle_forces` | what a needle that slips met at a moment |
 //! | `/scene/rest`, `/scene`, `/tf` | what is to be seen, in [Foxglove's schemas](super::foxglove) |
+//! | `/pose/needle`, `/pose/target` | where the needle's contact is, x along the insertion, and where the target is |
 //! | `/scene/body` | in space the deformed body |
 //! | `/log` | a change of the controller's mode or faults, in Foxglove's schema |
 
@@ -18,7 +19,7 @@ use schemars::generate::SchemaSettings;
 use serde::Serialize;
 
 use super::csv::Series;
-use super::foxglove::{self, FrameTransform, Log, SceneUpdate, Scenery};
+use super::foxglove::{self, FrameTransform, Log, PoseInFrame, SceneUpdate, Scenery};
 use crate::world::truth::Truth;
 
 /// A sample of the needle's encoder.
@@ -170,7 +171,7 @@ fn schema_of<T: JsonSchema>() -> schemars::Schema {
 }
 
 /// Topic, name of the schema and schema of every kind of message.
-pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 12] {
+pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 14] {
     [
         ("/needle", "stillpoint.NeedleMessage", schema_of::<NeedleMessage>()),
         ("/target", "stillpoint.TargetMessage", schema_of::<TargetMessage>()),
@@ -181,6 +182,8 @@ pub fn schemas() -> [(&'static str, &'static str, schemars::Schema); 12] {
         ("/needle_forces", "stillpoint.NeedleForcesMessage", schema_of::<NeedleForcesMessage>()),
         ("/scene/rest", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
         ("/scene", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
+        ("/pose/needle", "foxglove.PoseInFrame", schema_of::<PoseInFrame>()),
+        ("/pose/target", "foxglove.PoseInFrame", schema_of::<PoseInFrame>()),
         ("/tf", "foxglove.FrameTransform", schema_of::<FrameTransform>()),
         ("/log", "foxglove.Log", schema_of::<Log>()),
         ("/scene/body", "foxglove.SceneUpdate", schema_of::<SceneUpdate>()),
@@ -342,12 +345,19 @@ pub fn at_rest<S: MessageSink>(sink: &mut S, time_ns: u64, stage: &dyn Scenery) 
     sink.take("/scene/rest", [time_ns; 2], &stage.at_rest(time_ns))
 }
 
-/// What moves, at a tick.
+/// What moves at a tick, by these topics.
+pub const MOVING: [&str; 3] = ["/scene", "/pose/needle", "/pose/target"];
+
+/// What moves, at a tick: the messages of [`MOVING`].
 ///
 /// # Errors
 /// Those of the sink.
 pub fn at_tick<S: MessageSink>(sink: &mut S, truth: &Truth, stage: &dyn Scenery) -> Result<(), S::Refusal> {
-    sink.take("/scene", [truth.time_ns; 2], &stage.at_tick(truth))
+    let [scene, needle, target] = MOVING;
+    let [needle_pose, target_pose] = stage.poses(truth);
+    sink.take(scene, [truth.time_ns; 2], &stage.at_tick(truth))?;
+    sink.take(needle, [truth.time_ns; 2], &needle_pose)?;
+    sink.take(target, [truth.time_ns; 2], &target_pose)
 }
 
 /// The deformed body at this time, ns.

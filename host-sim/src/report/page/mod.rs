@@ -122,7 +122,7 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
         } }
         h3 { "The body under each strategy" }
         p { "At the end of the insertion, or wherever the slider is. Colour is what is chosen below, the size of the \
-             displacement from rest at first; dashed is the outline at rest. Displacements are drawn as they are, not enlarged." }
+             displacement from rest at first; dashed is the outline at rest, white are inclusions. Displacements are drawn as they are, not enlarged." }
         (controls(run, surface))
         @for (i, case) in run.cases.iter().enumerate() {
             div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
@@ -259,7 +259,8 @@ pub fn pictures(run: &RunResult) -> Vec<(&'static str, String)> {
     let surface = scene::Surface::new(run);
     let mut scene = vec![scene::at_rest(run)];
     if let Some((i, case)) = run.cases.iter().enumerate().find(|(_, case)| case.strategies.controlled().is_some()) {
-        let body = |strategy| surface.body(run, String::new(), &format!("dynamic, case {i}"), strategy);
+        let name = format!("dynamic, case {i}");
+        let body = |strategy| surface.body(run, case.tissue, (String::new(), &name), strategy);
         let body = case.strategies.controlled().map(body);
         scene.extend(body.map(|body| sheet("", &[body, surface.colour_bar(run)], 1)));
     }

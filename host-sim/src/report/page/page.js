@@ -27,6 +27,7 @@
   const bodies = data.bodies.map((body) => {
     const svg = document.getElementById(body.id);
     return { ...body, svg, polygons: [...svg.querySelectorAll(".field polygon")], edge: svg.querySelector(".edge"),
+      lumps: [...svg.querySelectorAll(".lump")],
       aim: svg.querySelector(".aim"), tool: svg.querySelector(".tool"), shaft: svg.querySelector(".shaft"),
       part: svg.closest("[data-case]"), values: [],
       numbers: document.getElementById(body.id + "-numbers"), final: body.series[body.series.length - 1] };
@@ -102,6 +103,8 @@
         polygon.setAttribute("points", corners.map((corner) => place(state.nodes[corner])).join(" "));
         polygon.setAttribute("class", "f" + band);
       });
+      body.lumps.forEach((lump, i) => lump.setAttribute("points", data.inclusions[i].map(({ corners, weights }) =>
+        place([0, 1].map((k) => corners.reduce((sum, corner, c) => sum + weights[c] * state.nodes[corner][k], 0)))).join(" ")));
       if (body.edge) body.edge.setAttribute("points", data.boundary.map((i) => place(state.nodes[i])).join(" "));
     }
     for (const { cursor, span: [left, right, low, high] } of charts) {

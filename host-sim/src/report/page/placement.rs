@@ -101,7 +101,8 @@ pub(super) fn controllability_charts(run: &RunResult) -> Vec<Panel> {
             let mut panel = Panel::new(
                 &title,
                 places(placement, placement.best_dynamic, "best dynamic"),
-                Axis::linear("controllability measure ‖J⁻¹n‖ (less is better)", "1").enclosing(values.iter().copied()),
+                Axis::linear("controllability measure ‖J⁻¹n‖ (less is better)", "1")
+                    .enclosing(values.iter().copied().chain([0.0])),
             );
             panel.description = format!("Controllability measure of every paddle, tissue {}", placement.tissue);
             let places = placement.paddles.iter().enumerate();

@@ -9,6 +9,8 @@ use model_offline::output::chart::number::{in_unit, number};
 use model_offline::output::chart::style::band;
 use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
 use model_offline::output::surface;
+use model_offline::output::surface::Interpolated;
+use model_offline::scene::TissueVariant;
 
 use super::embed::inline;
 use super::view::{PlaneView, along, inside, middle};
@@ -129,6 +131,8 @@ pub(super) struct Surface {
     pub(super) view: PlaneView,
     pub(super) triangles: Vec<[usize; 3]>,
     pub(super) boundary: Vec<usize>,
+    /// Corners of every inclusion between the nodes, in order.
+    pub(super) inclusions: Vec<Vec<Interpolated>>,
     /// Displacement at which the colours end, px.
     pub(super) largest: f64,
 }
@@ -143,16 +147,26 @@ impl Surface {
             .map(|(_, displacement)| displacement)
             .filter(|displacement| displacement.is_finite())
             .fold(0.0, f64::max);
+        let triangles = surface::triangles(&geometry.nodes, &geometry.outline);
+        let between = |corner: &[f64; 2]| Interpolated::new(&geometry.nodes, &triangles, *corner);
+        let rim = |inclusion: &Vec<[f64; 2]>| inclusion.iter().filter_map(between).collect();
         Self {
-            triangles: surface::triangles(&geometry.nodes, &geometry.outline),
+            inclusions: geometry.inclusions.iter().map(rim).collect(),
+            triangles,
             boundary: super::view::boundary(geometry, view.extent),
             view,
             largest: largest.max(f64::MIN_POSITIVE),
         }
     }
 
-    /// The body at full depth: displacement field, outlines, needle, paddle, target.
-    pub(super) fn body(&self, run: &RunResult, id: String, name: &str, strategy: &StrategyResult) -> Drawing {
+    /// The body of this tissue at full depth: displacement field, outlines, needle, paddle, target.
+    pub(super) fn body(
+        &self,
+        run: &RunResult,
+        tissue: TissueVariant,
+        (id, name): (String, &str),
+        strategy: &StrategyResult,
+    ) -> Drawing {
         let (view, geometry) = (&self.view, &run.geometry);
         let nodes = displaced(view, geometry, &strategy.deformed_nodes);
         let mut drawing = Drawing::new(view.size(), format!("Body at full depth: {name}"));
@@ -168,6 +182,13 @@ impl Surface {
         drawing.polygon("rest", &view.path(&geometry.outline));
         let edge: Vec<Px> = self.boundary.iter().filter_map(|i| nodes.get(*i)).map(|node| node.0).collect();
         drawing.polygon("edge", &edge);
+        if tissue == TissueVariant::Inclusion && nodes.len() == geometry.nodes.len() {
+            let places: Vec<Px> = nodes.iter().map(|node| node.0).collect();
+            for inclusion in &self.inclusions {
+                let rim: Vec<Px> = inclusion.iter().map(|corner| corner.of(&places)).collect();
+                drawing.polygon("lump", &rim);
+            }
+        }
         geometry.immobile.iter().for_each(|part| held(&mut drawing, view, geometry, part));
         needle(&mut drawing, view, geometry, run.settings.depth);
         let end = strategy.series.last();
@@ -233,7 +254,7 @@ pub(super) fn bodies(run: &RunResult, surface: &Surface, case_number: usize, cas
         div.bodies {
             @for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
                 figure {
-                    (inline(&surface.body(run, body_id(case_number, strategy), strategy.title(), result)))
+                    (inline(&surface.body(run, case.tissue, (body_id(case_number, strategy), strategy.title()), result)))
                     figcaption {
                         b { (strategy.title()) @if let Some(paddle) = result.paddle { ", paddle " (paddle) } }
                         " · " output id=(format!("{}-numbers", body_id(case_number, strategy))) {

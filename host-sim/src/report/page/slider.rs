@@ -1,6 +1,7 @@
 //! What the page's slider needs: the body along the way and the time series, as numbers only.
 
 use model_offline::output::chart::style::BANDS;
+use model_offline::output::surface::Interpolated;
 use serde::Serialize;
 
 use super::insertion::CaseCharts;
@@ -20,6 +21,7 @@ struct Data<'a> {
     size: [f64; 2],
     triangles: &'a [[usize; 3]],
     boundary: &'a [usize],
+    inclusions: &'a [Vec<Interpolated>],
     rest: Vec<[f64; 2]>,
     target: [f64; 2],
     axis: [f64; 2],
@@ -97,6 +99,7 @@ pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) ->
         size: surface.view.size(),
         triangles: &surface.triangles,
         boundary: &surface.boundary,
+        inclusions: &surface.inclusions,
         rest: surface.view.path(&geometry.nodes).into_iter().map(rounded).collect(),
         target: surface.view.at(geometry.target),
         axis: geometry.needle_axis,

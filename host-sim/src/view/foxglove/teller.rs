@@ -126,7 +126,7 @@ fn tell_scene(due: &mut Due, truth: &Truth, stage: &dyn Scenery, began_ns: u64) 
     if ["/tf", "/scene/rest"].into_iter().any(|topic| due.is_wanted(topic, began_ns)) {
         messages::at_rest(due, began_ns, stage)?;
     }
-    if due.is_wanted("/scene", truth.time_ns) {
+    if messages::MOVING.into_iter().any(|topic| due.is_wanted(topic, truth.time_ns)) {
         messages::at_tick(due, truth, stage)?;
     }
     Ok(())

@@ -5,6 +5,9 @@ use crate::geometry::{Point2, Polygon, cross, distance_to_segment};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
 
+/// Triangles that are no higher than this, over the tolerance of what lies on an edge, are none.
+const THIN: f64 = 4.0;
+
 /// The nodes cannot be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -56,14 +59,17 @@ pub fn triangulate_along(
             mesh.add_constraint(a, b);
         }
     }
-    let smallest = 1e-12 * outline.size() * outline.size();
+    // What lies on an edge may lie inside of it by the tolerance: the triangle between both is no part of the body, and as an
+    // element it would hold all three corners in line.
+    let thinnest = THIN * tolerance;
     let triangles: Vec<[u32; 3]> = mesh
         .inner_faces()
         .filter_map(|face| {
             let corners = face.vertices().map(|v| v.index() as u32);
             let [a, b, c] = corners.map(|i| nodes[i as usize]);
             let inside = outline.contains((a + b + c) / 3.0);
-            (inside && cross(b - a, c - a) > smallest).then_some(corners)
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            (inside && cross(b - a, c - a) > thinnest * longest).then_some(corners)
         })
         .collect();
     let area: f64 = triangles.iter().map(|t| area(nodes, t)).sum();
@@ -106,4 +112,27 @@ fn edges_along(nodes: &[Point2], lines: impl Iterator<Item = (Point2, Point2)>, 
         edges.extend(on.windows(2).map(|w| [w[0].1, w[1].1]));
     }
     edges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A node on an edge lies a rounding inside of it: no triangle spans the edge beneath it, whose three corners would be held
+    /// in line.
+    #[test]
+    fn a_node_that_is_nearly_on_an_edge_makes_no_sliver() {
+        let corners = [[0.0, 0.0], [3.0, 1.0], [2.0, 4.0], [-1.0, 3.0]].map(Point2::from);
+        let outline = Polygon::new(corners.to_vec()).unwrap();
+        let (along, inwards) = (corners[1] - corners[0], Point2::new(-1.0, 3.0).normalize());
+        for off in [0.0, 1e-15, 1e-12, 1e-10, 0.9e-9] {
+            for part in [0.02, 0.5, 0.9] {
+                let on = corners[0] + along * part + inwards * (off * outline.size());
+                let nodes = [corners.to_vec(), vec![on, Point2::new(1.0, 2.0)]].concat();
+                let triangles = triangulate(&nodes, &outline, &[]).unwrap();
+                assert_eq!(triangles.len(), 5, "{off} {part}: {triangles:?}");
+                assert!(triangles.iter().all(|t| area(&nodes, t) > 0.01), "{off} {part}: {triangles:?}");
+            }
+        }
+    }
 }

@@ -24,7 +24,7 @@ pub struct Grading {
     pub finest: f64,
     /// Growth of the spacing with distance from a singular point.
     pub slope: f64,
-    /// Spacing along the edges of inclusions and along a shaft, length units.
+    /// Spacing along the edges of inclusions, where they are not shorter, and along a shaft, length units.
     pub interface: f64,
     /// Largest spacing where the body, or a slot in it, is narrow: over the width there.
     pub narrow: f64,
@@ -43,6 +43,9 @@ pub enum InterfaceFit {
 
 /// Interior nodes keep this many local spacings from nodes on the boundary and from feature points.
 const CLEARANCE: f64 = 0.55;
+/// Where a line turns by less, radians, it is a curve: with 210° inside strain grows like r^(−1/4) at most (sin λω = −λ sin ω has λ =
+/// 0.75; Williams, J. Appl. Mech. 19, 1952), and over no more than the length of an edge.
+const CORNER: f64 = std::f64::consts::PI / 6.0;
 /// Features closer than this (relative to the body) are one point.
 const COINCIDENT: f64 = 1e-9;
 
@@ -56,8 +59,7 @@ impl Grading {
         let edge = features
             .inclusions
             .iter()
-            .flat_map(Polygon::edges)
-            .map(|(a, b)| (b - a).norm())
+            .map(shortest_side)
             .chain(features.shaft.map(|[entry, tip]| 0.5 * (tip - entry).norm()))
             .fold(f64::INFINITY, f64::min);
         let coarsest = 0.2 * features.outline.area().sqrt() * halved.sqrt();
@@ -78,16 +80,17 @@ struct Field<'a> {
     grading: &'a Grading,
     singular: Vec<(Point2, f64)>,
     wanted: Option<&'a Sizing>,
-    interfaces: Vec<(Point2, Point2)>,
+    /// Each with the spacing there.
+    interfaces: Vec<(Point2, Point2, f64)>,
     narrows: Vec<[(Point2, Point2); 2]>,
 }
 
 impl Field<'_> {
     /// Spacing wanted at `x`.
     fn spacing(&self, x: Point2) -> f64 {
-        let Grading { coarsest, finest, slope, interface, narrow, .. } = *self.grading;
+        let Grading { coarsest, finest, slope, narrow, .. } = *self.grading;
         let points = self.singular.iter().map(|(s, weight)| finest * weight + slope * (x - s).norm());
-        let edges = self.interfaces.iter().map(|(a, b)| interface + slope * distance_to_segment(x, *a, *b));
+        let edges = self.interfaces.iter().map(|(a, b, spacing)| spacing + slope * distance_to_segment(x, *a, *b));
         // The distances from two sides add up to the width between them, and grow away from there.
         let to = |(a, b): (Point2, Point2)| distance_to_segment(x, a, b);
         let narrows = self.narrows.iter().map(|[a, b]| narrow * (to(*a) + to(*b)));
@@ -129,15 +132,38 @@ fn singular_points(features: &Features) -> Vec<(Point2, f64)> {
         points.extend(path.first().map(|p| (*p, 2.0)));
         points.extend(path.last().map(|p| (*p, 2.0)));
     }
-    // Corners of the outline that turn inwards are singular too.
-    let v = features.outline.vertices();
-    for i in 0..v.len() {
-        let (a, b, c) = (v[(i + v.len() - 1) % v.len()], v[i], v[(i + 1) % v.len()]);
-        if cross(b - a, c - b) < -1e-9 * (b - a).norm() * (c - b).norm() {
-            points.push((b, 2.0));
-        }
-    }
+    // Corners of the outline that turn inwards are singular too; the vertices of a curve hardly are.
+    let turns = features.outline.vertices().iter().zip(turns(features.outline.vertices()));
+    points.extend(turns.filter(|(_, turn)| *turn < -CORNER).map(|(corner, _)| (*corner, 2.0)));
     points
+}
+
+/// By how much a loop turns at every vertex, radians: positive where it is convex and goes counter-clockwise.
+fn turns(vertices: &[Point2]) -> impl Iterator<Item = f64> {
+    let count = vertices.len();
+    (0..count).map(move |i| {
+        let [before, here, after] = [i + count - 1, i, i + 1].map(|k| vertices[k % count]);
+        let (to, from) = (here - before, after - here);
+        cross(to, from).atan2(to.dot(&from))
+    })
+}
+
+/// The shortest side of a region, between corners that turn by more than [`CORNER`]. A curve of many edges is one side, and
+/// asks for no more than a square with its perimeter, or with its ratio of area to perimeter, would.
+fn shortest_side(region: &Polygon) -> f64 {
+    let vertices = region.vertices();
+    let is_corner: Vec<bool> = turns(vertices).map(|turn| turn.abs() > CORNER).collect();
+    let lengths: Vec<f64> = region.edges().map(|(a, b)| (b - a).norm()).collect();
+    let perimeter: f64 = lengths.iter().sum();
+    let of_curve = (0.25 * perimeter).min(4.0 * region.area() / perimeter);
+    let count = vertices.len();
+    // From corner to corner; without any there is the curve alone.
+    let sides = (0..count).filter(|i| is_corner[*i]).map(|from| {
+        let edges = (1..).take_while(|k| !is_corner[(from + k) % count]).count() + 1;
+        let length: f64 = (0..edges).map(|k| lengths[(from + k) % count]).sum();
+        if edges == 1 { length } else { length.min(of_curve) }
+    });
+    sides.reduce(f64::min).unwrap_or(of_curve)
 }
 
 /// Generates graded nodes.
@@ -153,11 +179,13 @@ pub fn sized_nodes(features: &Features, grading: &Grading, wanted: &Sizing) -> V
 fn nodes(features: &Features, grading: &Grading, wanted: Option<&Sizing>) -> Vec<Point2> {
     let outline = &features.outline;
     let tolerance = COINCIDENT * outline.size();
-    let interfaces: Vec<(Point2, Point2)> = features.inclusions.iter().flat_map(Polygon::edges).collect();
+    // The edges of a curve may be shorter than what it asks for: nodes that follow them are as near as that.
+    let along = |(a, b): (Point2, Point2)| (a, b, grading.interface.min((b - a).norm()));
+    let interfaces = features.inclusions.iter().flat_map(Polygon::edges);
     let narrows = narrows(outline, grading.coarsest, grading.narrow);
     // Along a shaft forces act as they do along the edge of an inclusion.
     let shaft = features.shaft.map(|[entry, tip]| (entry, tip));
-    let interfaces = interfaces.into_iter().chain(shaft).collect();
+    let interfaces = interfaces.chain(shaft).map(along).collect();
     let field = Field { grading, singular: singular_points(features), wanted, interfaces, narrows };
 
     // Features first, then nodes along outline and needle contact between them.
@@ -308,5 +336,56 @@ fn subdivide(low: Point2, side: f64, spacing: &impl Fn(Point2) -> f64, out: &mut
     let half = 0.5 * side;
     for (sx, sy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
         subdivide(low + Point2::new(sx, sy) * half, half, spacing, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::PI;
+
+    /// Of a circle of radius 2, so many corners of a whole one, from the right on.
+    fn arc(corners: u32, of: u32) -> Vec<Point2> {
+        (0..corners)
+            .map(|i| 2.0 * PI * f64::from(i) / f64::from(of))
+            .map(|a| Point2::new(a.cos(), a.sin()) * 2.0)
+            .collect()
+    }
+
+    /// Edges of a curve are no sides of it, however many there are; those between corners are.
+    #[test]
+    fn a_curve_is_one_side() {
+        let of = |corners: Vec<Point2>| shortest_side(&Polygon::new(corners).unwrap());
+        let rectangle = [[0.0, 0.0], [5.0, 0.0], [5.0, 3.0], [0.0, 3.0]].map(Point2::from).to_vec();
+        assert_eq!(of(rectangle), 3.0);
+        assert!((of(arc(6, 6)) - 2.0).abs() < 1e-12, "a hexagon has corners");
+        // A quarter of the circumference.
+        let circles = [16, 60, 400].map(|n| of(arc(n, n)));
+        assert!(circles.iter().all(|side| (side / PI - 1.0).abs() < 0.01), "{circles:?}");
+        // Half a disc has two corners: its diameter is a side, its arc asks for four times area over perimeter.
+        let half = of(arc(101, 200));
+        assert!((half / (8.0 * PI / (4.0 + 2.0 * PI)) - 1.0).abs() < 0.01 && half < 4.0, "{half}");
+        // A sliver that is round asks for its width.
+        let sliver = of(arc(200, 200).into_iter().map(|p| Point2::new(p.x, 0.1 * p.y)).collect());
+        assert!((0.6..0.7).contains(&sliver), "{sliver}");
+    }
+
+    /// Nodes at the rim of a disc are as many as the disc asks for, not as its corners are.
+    #[test]
+    fn many_corners_of_a_curve_take_no_more_nodes() {
+        let features = |corners: u32| {
+            let mut scene = crate::scene::Scene::bundled("paper").unwrap();
+            let disc = arc(corners, corners).into_iter().map(|p| p * 0.05 + Point2::new(0.5, 0.5)).collect();
+            scene.inclusions[0].outline = Polygon::new(disc).unwrap();
+            scene.features()
+        };
+        let count = |corners: u32, fit| {
+            let features = features(corners);
+            graded_nodes(&features, &Grading::level(&features, 2, fit)).len() as f64
+        };
+        for fit in [InterfaceFit::On, InterfaceFit::Between] {
+            let (few, many) = (count(16, fit), count(48, fit));
+            assert!((many / few - 1.0).abs() < 0.2, "{few} {many}");
+        }
     }
 }

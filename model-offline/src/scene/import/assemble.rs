@@ -1,6 +1,7 @@
 //! From named shapes to the parts of a scene; whatever is not taken is left out with a reason.
 
 use super::along::Along;
+use super::flatten::{Flattened, under_paddles};
 use super::role::{ROLES, Role};
 use super::shape::{DETAIL, Shape};
 use super::{ImportError, ImportOptions, Imported, ImportedInclusion, Summary, parts};
@@ -47,6 +48,11 @@ pub(super) fn assemble(
     };
     summary.take(Role::Body, &body.told, note);
     kept.iter_mut().for_each(|shape| shape.points.iter_mut().for_each(|p| *p = frame.apply(*p)));
+    let Flattened { outline, under } = under_paddles(outline, &kept, |p| frame.rounded(p));
+    for (shape, by) in under {
+        let by = in_unit(by, options.length);
+        summary.note(format!("outline: straight under {}, which is stiff; the curve was up to {by} off", shape.told));
+    }
     let mut sorter =
         Sorter { frame, stress: options.stress, has_named: false, imported: Imported::of(outline.clone(), Vec::new()) };
     sorter.imported.summary = summary;

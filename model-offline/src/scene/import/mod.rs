@@ -6,6 +6,7 @@
 
 mod along;
 mod assemble;
+mod flatten;
 pub mod gmsh;
 mod parts;
 mod role;

@@ -7,7 +7,7 @@ use crate::geometry::{Location, Point2, Polygon, cross, distance_to_polyline, ne
 use crate::number::short;
 
 /// What is farther off the outline than this part of the body's size is not meant to be on it.
-const OFF: f64 = 0.05;
+pub(super) const OFF: f64 = 0.05;
 /// A needle's contact as part of the edge that it enters: what a starter scene has.
 const CONTACT: f64 = 0.3;
 /// The shortest contact, part of the body's size: more than the distance of nodes of a starter scene.

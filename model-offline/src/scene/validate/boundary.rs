@@ -12,6 +12,9 @@ const TOUCHING: f64 = 1e-9;
 /// Points this near to the boundary are meant to lie on it, part of the body's size: three digits by hand.
 const SNAP: f64 = 1e-3;
 
+/// A contact inside that is this near to the boundary is on it, part of the body's size.
+const FILM: f64 = 1e-5;
+
 /// The body's boundary, and how exactly its parts must lie on it.
 pub(super) struct Boundary<'a> {
     pub(super) outline: &'a Polygon,
@@ -35,11 +38,21 @@ impl<'a> Boundary<'a> {
     /// The point, or where it is on the boundary if it is meant to lie there: at a corner that is near enough, else at the
     /// nearest point. What touches the boundary already keeps its digits.
     pub(super) fn snapped(&self, p: Point2) -> Point2 {
+        self.snapped_within(p, self.snap)
+    }
+
+    /// The point, or where it is on the boundary if nothing but a film of tissue is between: the rounding of a file's digits,
+    /// which elements would follow with triangles of no height.
+    fn without_film(&self, p: Point2) -> Point2 {
+        self.snapped_within(p, FILM / SNAP * self.snap)
+    }
+
+    fn snapped_within(&self, p: Point2, most: f64) -> Point2 {
         match nearest_on_loop(&self.vertices, p) {
-            Some(nearest) if nearest.distance > self.tolerance && nearest.distance <= self.snap => {
+            Some(nearest) if nearest.distance > self.tolerance && nearest.distance <= most => {
                 let from = |v: &&Point2| (*v - p).norm();
                 let corner = self.vertices.iter().min_by(|a, b| from(a).total_cmp(&from(b)));
-                corner.filter(|v| from(v) <= self.snap).copied().unwrap_or(nearest.point)
+                corner.filter(|v| from(v) <= most).copied().unwrap_or(nearest.point)
             }
             _ => p,
         }
@@ -87,14 +100,14 @@ impl<'a> Boundary<'a> {
 
 impl Validator<'_> {
     /// The contact, which may also be inside: its points are put onto the boundary where one of them is outside, which nobody
-    /// means. Those of a contact that is inside stay where they are, however near the boundary is.
+    /// means. Those of a contact that is inside stay where they are but for a film beside the boundary.
     pub(super) fn contact(&self, boundary: &Boundary<'_>) -> Checked<Vec<Point2>> {
         let located = &self.file.needle.contact;
         let what = "needle contact";
         if let OnBoundary::Points(points) = located.get() {
             let path = self.polyline(points, located.span(), what)?;
             if path.iter().all(|p| boundary.holds(*p)) {
-                return Ok(path);
+                return Ok(path.iter().map(|p| boundary.without_film(*p)).collect());
             }
         }
         let path = self.points_on(located, boundary, what)?;

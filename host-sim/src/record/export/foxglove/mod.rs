@@ -261,6 +261,20 @@ pub struct FrameTransform {
     rotation: Quaternion,
 }
 
+/// `foxglove.PoseInFrame`: where something is, and how it is turned.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct PoseInFrame {
+    timestamp: Time,
+    frame_id: String,
+    pose: Pose,
+}
+
+impl PoseInFrame {
+    fn new(time_ns: u64, pose: Pose) -> Self {
+        Self { timestamp: Time::new(time_ns), frame_id: FRAME.to_owned(), pose }
+    }
+}
+
 /// `foxglove.Log`: a line of a log.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Log {

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use super::layout::{Camera, layout};
 use super::scenery::{Scenery, Tools};
-use super::{BLACK, BLUE, GREY, LinePrimitive, ORANGE, SceneEntity, SceneUpdate};
+use super::{BLACK, BLUE, GREY, LinePrimitive, ORANGE, PoseInFrame, SceneEntity, SceneUpdate};
 use crate::world::truth::Truth;
 
 /// Thickness of lines, px.
@@ -76,6 +76,10 @@ impl Scenery for Stage {
             paddle.lines.push(LinePrimitive::new(&now, false, TOOL, BLUE));
         }
         SceneUpdate::of(vec![tools.needle(truth), paddle, tools.target(truth)])
+    }
+
+    fn poses(&self, truth: &Truth) -> [PoseInFrame; 2] {
+        self.tools().poses(truth)
     }
 
     /// It is not drawn in the plane.

@@ -5,7 +5,9 @@ use std::fmt::Debug;
 use model_offline::geometry::Point;
 use serde_json::Value;
 
-use super::{ArrowPrimitive, GREY, PURPLE, Pose, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Vector3};
+use super::{
+    ArrowPrimitive, GREY, PURPLE, Pose, PoseInFrame, Quaternion, SceneEntity, SceneUpdate, SpherePrimitive, Vector3,
+};
 use crate::world::truth::Truth;
 
 /// Length of the needle outside the tissue, its thickness and the size of the target, part of the body's longest side.
@@ -23,6 +25,9 @@ pub trait Scenery: Debug {
 
     /// What moves with every tick: needle, paddles, target.
     fn at_tick(&self, truth: &Truth) -> SceneUpdate;
+
+    /// Where the needle's contact is, x along the insertion, and where the target is.
+    fn poses(&self, truth: &Truth) -> [PoseInFrame; 2];
 
     /// The deformed body, at ticks at which it has been solved for.
     fn body_at(&self, truth: &Truth) -> Option<SceneUpdate>;
@@ -71,6 +76,16 @@ impl<const D: usize> Tools<D> {
     /// The target's ball where it is.
     pub(super) fn target(&self, truth: &Truth) -> SceneEntity {
         self.ball("target", truth.time_ns, self.target + truth.target::<D>())
+    }
+
+    /// Where the middle of the contact is, x along the insertion, and where the target is.
+    pub(super) fn poses(&self, truth: &Truth) -> [PoseInFrame; 2] {
+        let needle = Pose {
+            position: (self.entry + self.axis * truth.depth).into(),
+            orientation: Quaternion::towards(self.axis),
+        };
+        let target = Pose::at(self.target + truth.target::<D>());
+        [needle, target].map(|pose| PoseInFrame::new(truth.time_ns, pose))
     }
 
     /// An arrow whose head ends where the needle is.

@@ -10,7 +10,9 @@ use serde_json::Value;
 
 use super::layout::{Camera, layout};
 use super::scenery::{Scenery, Tools};
-use super::{BLACK, BLUE, Color, GREY, KeyValuePair, ORANGE, Pose, SceneEntity, SceneUpdate, TriangleListPrimitive};
+use super::{
+    BLACK, BLUE, Color, GREY, KeyValuePair, ORANGE, Pose, PoseInFrame, SceneEntity, SceneUpdate, TriangleListPrimitive,
+};
 use crate::world::retrace::SolvedBody;
 use crate::world::truth::Truth;
 
@@ -151,6 +153,10 @@ impl Scenery for SpaceStage<'_> {
         let mut entities = vec![tools.needle(truth), tools.target(truth)];
         entities.extend(plates.map(|((id, index), moved_by)| self.paddle(id, *index, truth, moved_by)));
         SceneUpdate::of(entities)
+    }
+
+    fn poses(&self, truth: &Truth) -> [PoseInFrame; 2] {
+        self.tools().poses(truth)
     }
 
     fn body_at(&self, truth: &Truth) -> Option<SceneUpdate> {
