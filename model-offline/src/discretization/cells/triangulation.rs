@@ -4,9 +4,9 @@
 use crate::geometry::{Point2, Polygon, cross, distance_to_segment};
 use spade::handles::FixedVertexHandle;
 use spade::{ConstrainedDelaunayTriangulation, DelaunayTriangulation, Point2 as Site, Triangulation as _};
+use std::collections::BTreeSet;
 
-/// Triangles that are no higher than this, over the tolerance of what lies on an edge, are none.
-const THIN: f64 = 4.0;
+type Mesh = ConstrainedDelaunayTriangulation<Site<f64>>;
 
 /// The nodes cannot be triangulated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -47,9 +47,8 @@ pub fn triangulate_along(
 ) -> Result<Vec<[u32; 3]>, TriangulationError> {
     let sites: Vec<Site<f64>> = nodes.iter().map(|x| Site::new(x.x, x.y)).collect();
     let tolerance = 1e-9 * outline.size();
-    let edges = edges_along(nodes, outline.edges(), tolerance);
-    let mut mesh = ConstrainedDelaunayTriangulation::<Site<f64>>::bulk_load_cdt(sites, edges)
-        .map_err(TriangulationError::Coordinate)?;
+    let outline_edges = edges_along(nodes, outline.edges(), tolerance);
+    let mut mesh = Mesh::bulk_load_cdt(sites, outline_edges.clone()).map_err(TriangulationError::Coordinate)?;
     if mesh.num_vertices() != nodes.len() {
         return Err(TriangulationError::Coincident);
     }
@@ -59,24 +58,31 @@ pub fn triangulate_along(
             mesh.add_constraint(a, b);
         }
     }
-    // What lies on an edge may lie inside of it by the tolerance: the triangle between both is no part of the body, and as an
-    // element it would hold all three corners in line.
-    let thinnest = THIN * tolerance;
-    let triangles: Vec<[u32; 3]> = mesh
-        .inner_faces()
-        .filter_map(|face| {
-            let corners = face.vertices().map(|v| v.index() as u32);
-            let [a, b, c] = corners.map(|i| nodes[i as usize]);
-            let inside = outline.contains((a + b + c) / 3.0);
-            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-            (inside && cross(b - a, c - a) > thinnest * longest).then_some(corners)
-        })
-        .collect();
+    let is_outside = outside(&mesh, &outline_edges);
+    let of_body = mesh.inner_faces().filter(|face| !is_outside[face.index()]);
+    let triangles: Vec<[u32; 3]> = of_body.map(|face| face.vertices().map(|v| v.index() as u32)).collect();
     let area: f64 = triangles.iter().map(|t| area(nodes, t)).sum();
     if (area - outline.area()).abs() > 1e-6 * outline.area() {
         return Err(TriangulationError::OffTheOutline);
     }
     Ok(triangles)
+}
+
+/// Which faces can be reached from without and not across the outline, by their index. A node that lies a rounding inside of an
+/// edge has a triangle between both; that is outside as well: as an element it would hold all three corners in line.
+fn outside(mesh: &Mesh, outline_edges: &[[usize; 2]]) -> Vec<bool> {
+    let outline: BTreeSet<[usize; 2]> = outline_edges.iter().map(|[a, b]| [*a.min(b), *a.max(b)]).collect();
+    let mut is_outside = vec![false; mesh.num_all_faces()];
+    let mut edges: Vec<_> = mesh.directed_edges().filter(|edge| edge.face().is_outer()).collect();
+    while let Some(edge) = edges.pop() {
+        let [a, b] = edge.vertices().map(|vertex| vertex.index());
+        let Some(face) = edge.rev().face().as_inner() else { continue };
+        if !is_outside[face.index()] && !outline.contains(&[a.min(b), a.max(b)]) {
+            is_outside[face.index()] = true;
+            edges.extend(face.adjacent_edges());
+        }
+    }
+    is_outside
 }
 
 /// Delaunay neighbours of every node.
@@ -117,6 +123,7 @@ fn edges_along(nodes: &[Point2], lines: impl Iterator<Item = (Point2, Point2)>, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::BTreeMap;
 
     /// A node on an edge lies a rounding inside of it: no triangle spans the edge beneath it, whose three corners would be held
     /// in line.
@@ -133,6 +140,31 @@ mod tests {
                 assert_eq!(triangles.len(), 5, "{off} {part}: {triangles:?}");
                 assert!(triangles.iter().all(|t| area(&nodes, t) > 0.01), "{off} {part}: {triangles:?}");
             }
+            // Several of them in a row, over one another as seen from outside.
+            let row = (1..9).map(|i| corners[0] + along * (f64::from(i) / 9.0) + inwards * (off * outline.size()));
+            let nodes: Vec<Point2> = corners.into_iter().chain(row).chain([Point2::new(1.0, 2.0)]).collect();
+            let triangles = triangulate(&nodes, &outline, &[]).unwrap();
+            assert!(triangles.len() == 12 && triangles.iter().all(|t| area(&nodes, t) > 0.01), "{off}: {triangles:?}");
+        }
+    }
+
+    /// Inside of the body there is something on either side of a triangle, however thin: left out, it would leave a crack.
+    #[test]
+    fn thin_triangles_inside_of_the_body_leave_no_crack() {
+        let outline =
+            Polygon::new([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]].map(Point2::from).to_vec()).unwrap();
+        for off in [0.0, 0.5e-9, 2e-9, 1e-8] {
+            let [a, b, c] = [[1.0, 2.0], [2.0, 2.0 + off * outline.size()], [3.0, 2.0]].map(Point2::from);
+            let nodes = [outline.vertices().to_vec(), vec![a, b, c]].concat();
+            let triangles = triangulate_along(&nodes, &outline, &[(a, c), (a, b), (b, c)]).unwrap();
+            let mut sides: BTreeMap<[u32; 2], usize> = BTreeMap::new();
+            for [i, j, k] in &triangles {
+                for (from, to) in [(i, j), (j, k), (k, i)] {
+                    *sides.entry([*from.min(to), *from.max(to)]).or_default() += 1;
+                }
+            }
+            let free: Vec<_> = sides.iter().filter(|side| *side.1 != 2).collect();
+            assert!(free.len() == 4 && free.iter().all(|(ends, _)| ends[1] < 4), "{off}: {free:?}");
         }
     }
 }
