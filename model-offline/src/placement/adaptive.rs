@@ -101,7 +101,7 @@ pub fn discretise_judged(scene: &Scene) -> Result<Judged, ModelError> {
 }
 
 /// The model on which to follow the insertion to depth, for a model refined to a tolerance: itself while it is small,
-/// else the coarsest graded one. With the paper's law the finite-depth profile has no mesh limit (finer nodes resolve
+/// else the coarsest graded one, if that is smaller. With the paper's law the finite-depth profile has no mesh limit (finer nodes resolve
 /// the needle's edge better and lose stability earlier), so refining it buys nothing.
 ///
 /// # Errors
@@ -110,7 +110,9 @@ pub fn profile_model(model: &TissueModel) -> Result<TissueModel, ModelError> {
     if model.nodes() <= PROFILE_NODES {
         return Ok(model.clone());
     }
-    graded_model(model.scene(), model.planar().method(), 0)
+    let graded = graded_model(model.scene(), model.planar().method(), 0)?;
+    // Gradings do not know what is asked for: in a body of many details the answers may need fewer nodes.
+    Ok(if graded.nodes() < model.nodes() { graded } else { model.clone() })
 }
 
 /// Largest model on which the finite-depth profile is followed.

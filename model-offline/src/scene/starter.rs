@@ -214,7 +214,8 @@ impl Layout {
              # max_displacement = {d}\n# max_rate = {d}                     # per second\n# max_needle_speed = {}\n\n\
              # [sensor]                          # what sees the target: ideal, camera, ultrasound, mri, or numbers of your own\n\
              # preset = \"ultrasound\"\n\n\
-             [discretization]\ntolerance = 0.02                    # largest relative error of the controllability measures; or: spacing = {}, between nodes\n",
+             [discretization]\ntolerance = 0.02                    # largest relative error of the controllability measures; or: spacing = {}, between nodes\n\
+             integration = \"fem-t6\"              # quadratic triangles, the fastest to a tolerance; scni-stabilised: meshfree, on any nodes\n",
             number(2.0 * self.depth),
             number(self.spacing),
             d = number(self.depth),

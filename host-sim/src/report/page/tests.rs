@@ -252,6 +252,33 @@ fn assert_finite(svg: &str) {
     }
 }
 
+/// Inclusions are drawn into the bodies that have them, where their nodes have taken them, and into no other.
+#[test]
+fn inclusions_move_with_the_bodies_that_have_them() {
+    let run = run("paper");
+    let surface = scene::Surface::new(&run);
+    let moved: Vec<[f64; 2]> = rest().iter().map(|[x, y]| [x + 0.05, y - 0.1]).collect();
+    let rim = |tissue, nodes: &[[f64; 2]]| {
+        let mut strategy = run.cases[0].strategies.controlled().unwrap().clone();
+        strategy.deformed_nodes = nodes.to_vec();
+        let text = inline(&surface.body(&run, tissue, (String::new(), ""), &strategy)).into_string();
+        let document = roxmltree::Document::parse(&text).unwrap();
+        let rims = document.descendants().filter(|part| part.attribute("class") == Some("lump"));
+        rims.map(|rim| rim.attribute("points").unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    assert_eq!(rim(TissueVariant::Homogeneous, &moved), [""; 0]);
+    let points = |text: &str| -> Vec<f64> { text.split([' ', ',']).map(|number| number.parse().unwrap()).collect() };
+    let [before, after] = [rest(), moved].map(|nodes| points(&rim(TissueVariant::Inclusion, &nodes)[0]));
+    let expected = surface.view.path(&run.geometry.inclusions[0]).concat();
+    assert_eq!(before.len(), expected.len());
+    assert!(before.iter().zip(&expected).all(|(found, at)| (found - at).abs() < 0.06), "{before:?} {expected:?}");
+    let [right, down] = [0.05, 0.1].map(|by| surface.view.length(by));
+    for (place, (before, after)) in before.iter().zip(&after).enumerate() {
+        let by = if place % 2 == 0 { right } else { down };
+        assert!((after - before - by).abs() < 0.12, "{place}: {before} {after} {by}");
+    }
+}
+
 #[test]
 fn every_part_and_every_chart_is_there() {
     let page = render(&run("paper"));
