@@ -24,9 +24,9 @@ pub struct Grading {
     pub finest: f64,
     /// Growth of the spacing with distance from a singular point.
     pub slope: f64,
-    /// Spacing along the edges of inclusions, where they are not shorter, and along a shaft, length units.
+    /// Spacing along a side of an inclusion, from corner to corner, over its length; and along a shaft over half of that.
     pub interface: f64,
-    /// Largest spacing where the body, or a slot in it, is narrow: over the width there.
+    /// Largest spacing where the body, a slot in it, or an inclusion is narrow: over the width there.
     pub narrow: f64,
     /// Where nodes lie with respect to those edges.
     pub fit: InterfaceFit,
@@ -56,18 +56,12 @@ impl Grading {
         let halved = 0.5_f64.powi(level);
         let paddle = features.paddles.iter().map(|p| (p[1] - p[0]).norm()).fold(f64::INFINITY, f64::min);
         let contact: f64 = features.contact.windows(2).map(|s| (s[1] - s[0]).norm()).sum();
-        let edge = features
-            .inclusions
-            .iter()
-            .map(shortest_side)
-            .chain(features.shaft.map(|[entry, tip]| 0.5 * (tip - entry).norm()))
-            .fold(f64::INFINITY, f64::min);
         let coarsest = 0.2 * features.outline.area().sqrt() * halved.sqrt();
         Self {
             coarsest,
             finest: (0.2 * paddle.min(contact) * halved).min(coarsest),
             slope: 0.6 * halved.powf(0.25),
-            interface: (0.2 * edge * halved).min(coarsest),
+            interface: 0.2 * halved,
             narrow: 0.5 * halved.sqrt(),
             fit,
         }
@@ -82,7 +76,7 @@ struct Field<'a> {
     wanted: Option<&'a Sizing>,
     /// Each with the spacing there.
     interfaces: Vec<(Point2, Point2, f64)>,
-    narrows: Vec<[(Point2, Point2); 2]>,
+    narrows: Vec<[Edge; 2]>,
 }
 
 impl Field<'_> {
@@ -92,27 +86,36 @@ impl Field<'_> {
         let points = self.singular.iter().map(|(s, weight)| finest * weight + slope * (x - s).norm());
         let edges = self.interfaces.iter().map(|(a, b, spacing)| spacing + slope * distance_to_segment(x, *a, *b));
         // The distances from two sides add up to the width between them, and grow away from there.
-        let to = |(a, b): (Point2, Point2)| distance_to_segment(x, a, b);
+        let to = |(a, b): Edge| distance_to_segment(x, a, b);
         let narrows = self.narrows.iter().map(|[a, b]| narrow * (to(*a) + to(*b)));
         let wanted = self.wanted.map(|sizing| sizing.at(x));
         points.chain(edges).chain(narrows).chain(wanted).fold(coarsest, f64::min)
     }
 }
 
+type Edge = (Point2, Point2);
+
+/// Whether two edges of a loop run against each other.
+fn facing(e: Edge, f: Edge) -> bool {
+    let direction = |e: Edge| (e.1 - e.0).normalize();
+    direction(e).dot(&direction(f)) < -0.5
+}
+
+/// Whether the room between two edges asks for nodes nearer than `spacing`.
+fn resolves_not(narrow: f64, e: Edge, f: Edge, spacing: f64) -> bool {
+    let to = |p, (a, b)| distance_to_segment(p, a, b);
+    let apart = to(e.0, f).min(to(e.1, f)).min(to(f.0, e)).min(to(f.1, e));
+    apart > 0.0 && narrow * apart < spacing
+}
+
 /// Pairs of edges of the outline that face each other, across the body or across a slot, nearer than spacings of `coarsest`
 /// can resolve.
-fn narrows(outline: &Polygon, coarsest: f64, narrow: f64) -> Vec<[(Point2, Point2); 2]> {
-    let edges: Vec<(Point2, Point2)> = outline.edges().collect();
-    let direction = |e: (Point2, Point2)| (e.1 - e.0).normalize();
-    let facing = |e, f| direction(e).dot(&direction(f)) < -0.5;
-    let apart = |e: (Point2, Point2), f: (Point2, Point2)| {
-        let to = |p, (a, b)| distance_to_segment(p, a, b);
-        to(e.0, f).min(to(e.1, f)).min(to(f.0, e)).min(to(f.1, e))
-    };
+fn narrows(outline: &Polygon, grading: &Grading) -> Vec<[Edge; 2]> {
+    let edges: Vec<Edge> = outline.edges().collect();
     let pairs = (0..edges.len()).flat_map(|i| (i + 1..edges.len()).map(move |j| (i, j)));
     pairs
         .map(|(i, j)| [edges[i], edges[j]])
-        .filter(|[e, f]| facing(*e, *f) && apart(*e, *f) > 0.0 && narrow * apart(*e, *f) < coarsest)
+        .filter(|[e, f]| facing(*e, *f) && resolves_not(grading.narrow, *e, *f, grading.coarsest))
         .collect()
 }
 
@@ -148,22 +151,62 @@ fn turns(vertices: &[Point2]) -> impl Iterator<Item = f64> {
     })
 }
 
-/// The shortest side of a region, between corners that turn by more than [`CORNER`]. A curve of many edges is one side, and
-/// asks for no more than a square with its perimeter, or with its ratio of area to perimeter, would.
-fn shortest_side(region: &Polygon) -> f64 {
-    let vertices = region.vertices();
-    let is_corner: Vec<bool> = turns(vertices).map(|turn| turn.abs() > CORNER).collect();
+/// A side of a region that an edge is part of: from one corner that turns by more than [`CORNER`] to the next.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Side {
+    /// Length, of a curve no more than a square with the region's perimeter would have: a curve of many edges is one side.
+    length: f64,
+    /// Width of a strip with the region's area and perimeter, if it is a curve.
+    width: Option<f64>,
+}
+
+/// The sides of a region, edge by edge.
+fn sides(region: &Polygon) -> Vec<Side> {
+    let is_corner: Vec<bool> = turns(region.vertices()).map(|turn| turn.abs() > CORNER).collect();
     let lengths: Vec<f64> = region.edges().map(|(a, b)| (b - a).norm()).collect();
     let perimeter: f64 = lengths.iter().sum();
-    let of_curve = (0.25 * perimeter).min(4.0 * region.area() / perimeter);
-    let count = vertices.len();
-    // From corner to corner; without any there is the curve alone.
-    let sides = (0..count).filter(|i| is_corner[*i]).map(|from| {
-        let edges = (1..).take_while(|k| !is_corner[(from + k) % count]).count() + 1;
-        let length: f64 = (0..edges).map(|k| lengths[(from + k) % count]).sum();
-        if edges == 1 { length } else { length.min(of_curve) }
-    });
-    sides.reduce(f64::min).unwrap_or(of_curve)
+    let width = Some(2.0 * region.area() / perimeter);
+    let count = lengths.len();
+    let Some(first) = is_corner.iter().position(|corner| *corner) else {
+        return vec![Side { length: 0.25 * perimeter, width }; count];
+    };
+    let mut sides = vec![Side { length: 0.0, width: None }; count];
+    let mut from = 0;
+    while from < count {
+        let edges = (1..).take_while(|k| !is_corner[(first + from + k) % count]).count() + 1;
+        let these: Vec<usize> = (from..from + edges).map(|k| (first + k) % count).collect();
+        let length: f64 = these.iter().map(|&k| lengths[k]).sum();
+        let side = match edges {
+            1 => Side { length, width: None },
+            _ => Side { length: length.min(0.25 * perimeter), width },
+        };
+        these.into_iter().for_each(|k| sides[k] = side);
+        from += edges;
+    }
+    sides
+}
+
+/// The edges of an inclusion, each with the spacing there. Those of a curve may be shorter than what it asks for: nodes that
+/// follow them are as near as that.
+fn interfaces(region: &Polygon, grading: &Grading) -> Vec<(Point2, Point2, f64)> {
+    let spacing = |side: &Side| {
+        let over_width = side.width.map_or(f64::INFINITY, |width| grading.narrow * width);
+        (grading.interface * side.length).min(over_width).min(grading.coarsest)
+    };
+    region.edges().zip(sides(region)).map(|((a, b), side)| (a, b, spacing(&side).min((b - a).norm()))).collect()
+}
+
+/// Pairs of straight sides of an inclusion that face each other nearer than their own spacings can resolve.
+fn narrows_within(region: &Polygon, grading: &Grading) -> Vec<[Edge; 2]> {
+    let sides = sides(region);
+    let straight = region.edges().zip(&sides).filter(|(_, side)| side.width.is_none());
+    let straight: Vec<(Edge, f64)> = straight.map(|(edge, side)| (edge, grading.interface * side.length)).collect();
+    let pairs = (0..straight.len()).flat_map(|i| (i + 1..straight.len()).map(move |j| (i, j)));
+    pairs
+        .map(|(i, j)| [straight[i], straight[j]])
+        .filter(|[(e, along), (f, beside)]| facing(*e, *f) && resolves_not(grading.narrow, *e, *f, along.min(*beside)))
+        .map(|[(e, _), (f, _)]| [e, f])
+        .collect()
 }
 
 /// Generates graded nodes.
@@ -179,14 +222,16 @@ pub fn sized_nodes(features: &Features, grading: &Grading, wanted: &Sizing) -> V
 fn nodes(features: &Features, grading: &Grading, wanted: Option<&Sizing>) -> Vec<Point2> {
     let outline = &features.outline;
     let tolerance = COINCIDENT * outline.size();
-    // The edges of a curve may be shorter than what it asks for: nodes that follow them are as near as that.
-    let along = |(a, b): (Point2, Point2)| (a, b, grading.interface.min((b - a).norm()));
-    let interfaces = features.inclusions.iter().flat_map(Polygon::edges);
-    let narrows = narrows(outline, grading.coarsest, grading.narrow);
+    let mut narrow = narrows(outline, grading);
+    narrow.extend(features.inclusions.iter().flat_map(|region| narrows_within(region, grading)));
+    let mut along: Vec<(Point2, Point2, f64)> =
+        features.inclusions.iter().flat_map(|region| interfaces(region, grading)).collect();
     // Along a shaft forces act as they do along the edge of an inclusion.
-    let shaft = features.shaft.map(|[entry, tip]| (entry, tip));
-    let interfaces = interfaces.chain(shaft).map(along).collect();
-    let field = Field { grading, singular: singular_points(features), wanted, interfaces, narrows };
+    along.extend(features.shaft.map(|[entry, tip]| {
+        let length = (tip - entry).norm();
+        (entry, tip, (0.5 * grading.interface * length).min(grading.coarsest))
+    }));
+    let field = Field { grading, singular: singular_points(features), wanted, interfaces: along, narrows: narrow };
 
     // Features first, then nodes along outline and needle contact between them.
     let mut positions: Vec<Point2> = Vec::new();
@@ -355,19 +400,49 @@ mod tests {
     /// Edges of a curve are no sides of it, however many there are; those between corners are.
     #[test]
     fn a_curve_is_one_side() {
-        let of = |corners: Vec<Point2>| shortest_side(&Polygon::new(corners).unwrap());
+        let of = |corners: Vec<Point2>| sides(&Polygon::new(corners).unwrap());
         let rectangle = [[0.0, 0.0], [5.0, 0.0], [5.0, 3.0], [0.0, 3.0]].map(Point2::from).to_vec();
-        assert_eq!(of(rectangle), 3.0);
-        assert!((of(arc(6, 6)) - 2.0).abs() < 1e-12, "a hexagon has corners");
+        assert_eq!(of(rectangle), [5.0, 3.0, 5.0, 3.0].map(|length| Side { length, width: None }));
+        assert!(of(arc(6, 6)).iter().all(|side| (side.length - 2.0).abs() < 1e-12), "a hexagon has corners");
         // A quarter of the circumference.
-        let circles = [16, 60, 400].map(|n| of(arc(n, n)));
-        assert!(circles.iter().all(|side| (side / PI - 1.0).abs() < 0.01), "{circles:?}");
-        // Half a disc has two corners: its diameter is a side, its arc asks for four times area over perimeter.
+        for n in [16, 60, 400] {
+            assert!(of(arc(n, n)).iter().all(|side| (side.length / PI - 1.0).abs() < 0.01 && side.width.is_some()));
+        }
+        // Half a disc has two corners: its diameter is a side, its arc another, no longer than that of the square.
         let half = of(arc(101, 200));
-        assert!((half / (8.0 * PI / (4.0 + 2.0 * PI)) - 1.0).abs() < 0.01 && half < 4.0, "{half}");
-        // A sliver that is round asks for its width.
-        let sliver = of(arc(200, 200).into_iter().map(|p| Point2::new(p.x, 0.1 * p.y)).collect());
-        assert!((0.6..0.7).contains(&sliver), "{sliver}");
+        assert_eq!(half[100], Side { length: 4.0, width: None });
+        assert!((half[0].length / (1.0 + 0.5 * PI) - 1.0).abs() < 0.01, "{:?}", half[0]);
+        assert!(half[..100].iter().all(|side| *side == half[0]));
+        // A strip that is round is about as wide as it looks.
+        let strip: Vec<Point2> = arc(200, 200).into_iter().map(|p| Point2::new(p.x, 0.1 * p.y)).collect();
+        assert!(of(strip).iter().all(|side| (0.3..0.35).contains(&side.width.unwrap())));
+    }
+
+    /// A thin layer takes nodes for its width, and no more along its sides than that; what is thin asks nothing of others.
+    #[test]
+    fn a_thin_layer_takes_few_nodes_and_asks_nothing_of_others() {
+        let square = |low: [f64; 2], size: [f64; 2]| {
+            let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+            let corners = corners.map(|c| Point2::new(low[0] + c[0] * size[0], low[1] + c[1] * size[1]));
+            Polygon::new(corners.to_vec()).unwrap()
+        };
+        let count = |inclusions: &[Polygon], level| {
+            let mut features = crate::scene::Scene::bundled("paper").unwrap().without_inclusions().features();
+            features.inclusions = inclusions.to_vec();
+            graded_nodes(&features, &Grading::level(&features, level, InterfaceFit::On)).len()
+        };
+        let (block, layer) = (square([0.1, 0.3], [0.2, 0.2]), square([0.05, 0.1], [0.9, 0.01]));
+        for level in [0, 2] {
+            let (none, with_block) = (count(&[], level), count(std::slice::from_ref(&block), level));
+            let (with_layer, with_both) =
+                (count(std::slice::from_ref(&layer), level), count(&[block.clone(), layer.clone()], level));
+            assert!(with_both < with_block + with_layer - none / 2, "{none} {with_block} {with_layer} {with_both}");
+            // Squares of half a width and less, which grow beside it: thirty rows or so. A fifth of the width all along would
+            // be more than twice as many, at level 2 five times.
+            let spacing = 0.005 * 0.5_f64.powf(0.5 * f64::from(level));
+            let rows = (with_layer - none) as f64 * spacing / 0.9;
+            assert!(rows < 33.0, "{none} {with_layer}: {rows}");
+        }
     }
 
     /// Nodes at the rim of a disc are as many as the disc asks for, not as its corners are.
