@@ -92,7 +92,7 @@ fn nothing_is_unusual_in_the_bundled_scenes_and_in_the_block() {
 #[test]
 fn every_warning_is_given_with_its_numbers_where_it_is_due() {
     type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
-    let cases: [Case<'_>; 17] = [
+    let cases: [Case<'_>; 18] = [
         (&[(AXIS, "axis = [0.0, 1.0]")], &["points out of the body: 180°", "turn the axis round"]),
         (&[(AXIS, "axis = [0.5, 1.0]")], &["points out of the body: 153°"]),
         (&[(AXIS, "axis = [1.0, -0.1]")], &["along the surface: 5.7°", "turn the axis inwards"]),
@@ -139,12 +139,20 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
                 "[immobile]",
                 "[[inclusion]]\noutline = [[70.0, 20.0], [90.0, 20.0], [90.0, 40.0], [70.0, 40.0]]\nstiffness = 2.0\n[immobile]",
             )],
-            &["inclusions 1 and 2 overlap: an area of 100 mm², 25 % of the smaller one"],
+            &["inclusions 1 and 2 overlap: an area of 100 mm², 25 % of the smaller one, is taken to be of inclusion 2"],
         ),
         (
             // The same twice.
             &[("[immobile]", &format!("[[inclusion]]\noutline = {INCLUSION}\nstiffness = 2.0\n[immobile]"))],
-            &["inclusions 1 and 2 overlap: an area of 400 mm², 100 % of the smaller one"],
+            &["inclusion 1 does nothing: inclusion 2 covers it", "write the inner one after the outer one"],
+        ),
+        (
+            // The outer one after the inner one.
+            &[(
+                "[immobile]",
+                "[[inclusion]]\noutline = [[50.0, 10.0], [90.0, 10.0], [90.0, 50.0], [50.0, 50.0]]\nstiffness = 2.0\n[immobile]",
+            )],
+            &["inclusion 1 does nothing: inclusion 2 covers it"],
         ),
         (
             // Inside, with the paddle on the skin above.

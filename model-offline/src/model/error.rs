@@ -95,7 +95,7 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; ask for less, or use a method that converges faster (fem-t6, in space fem-t10)"
+        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; take a larger tolerance, or fem-t6 (in space fem-t10), which converge faster than the others"
     )]
     ToleranceNotReached {
         /// Asked for.

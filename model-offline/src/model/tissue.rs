@@ -51,10 +51,8 @@ pub(super) fn tissue_of(scene: &Scene, cells: &[NodalCell], mixing: Mixing) -> T
                 .into_iter()
                 .map(|(share, members)| Phase {
                     share,
-                    parts: match members.is_empty() {
-                        true => vec![(0, 1.0)],
-                        false => members.iter().map(|&i| (of_inclusion[i], scene.inclusions[i].stiffness)).collect(),
-                    },
+                    // Of inclusions that cover the same the last one counts, as in space.
+                    parts: vec![members.last().map_or((0, 1.0), |&i| (of_inclusion[i], scene.inclusions[i].stiffness))],
                 })
                 .collect();
             mixture(&phases, &shear, mixing)
@@ -223,13 +221,13 @@ mod tests {
 
     #[test]
     fn what_two_inclusions_cover_together_is_taken_from_the_body_once() {
-        // 0.25 body alone, 0.25 each inclusion alone, 0.25 both (their factors add up).
+        // 0.25 body alone, 0.25 each inclusion alone, 0.25 both, of which the last one counts.
         let crossing = || vec![inclusion([0.5, -1.0], [2.0, 2.0], 3.0), inclusion([-1.0, 0.5], [2.0, 2.0], 8.0)];
-        assert!((factor(crossing(), Mixing::Area) - 0.25 * (1.0 + 3.0 + 8.0 + 11.0)).abs() < 1e-12);
-        let sum = 0.25 * [1.0, 3.0, 8.0, 11.0_f64].iter().map(|mu| mu.powf(-0.4)).sum::<f64>();
+        assert!((factor(crossing(), Mixing::Area) - 0.25 * (1.0 + 3.0 + 8.0 + 8.0)).abs() < 1e-12);
+        let sum = 0.25 * [1.0, 3.0, 8.0, 8.0_f64].iter().map(|mu| mu.powf(-0.4)).sum::<f64>();
         assert!((factor(crossing(), Mixing::Surrounding) - sum.powf(-2.5)).abs() < 1e-12);
         // The same region twice, over half of the cell.
         let twice = vec![inclusion([-1.0, -1.0], [0.5, 2.0], 3.0), inclusion([-1.0, -1.0], [0.5, 2.0], 8.0)];
-        assert!((factor(twice, Mixing::Area) - (0.5 + 0.5 * 11.0)).abs() < 1e-12);
+        assert!((factor(twice, Mixing::Area) - (0.5 + 0.5 * 8.0)).abs() < 1e-12);
     }
 }

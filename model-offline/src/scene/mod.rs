@@ -85,7 +85,7 @@ pub struct Scene {
     pub clockwise: bool,
     /// What the body is made of.
     pub material: Law,
-    /// Regions of another stiffness or material.
+    /// Regions of another stiffness or material; where several overlap, the last one counts.
     pub inclusions: Vec<Inclusion>,
     /// Polylines on the boundary that cannot move.
     pub immobile: Vec<Vec<Point2>>,

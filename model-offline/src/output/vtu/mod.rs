@@ -54,7 +54,7 @@ fn push(grid: &mut Grid<2>, integration: Integration, corners: &[Point2]) {
 /// What is known of every cell.
 fn of_cells(model: &TissueModel, gradients: &[Matrix<2>]) -> Vec<Array> {
     let scene = model.scene();
-    let inclusion_at = |x: &Point2| scene.inclusions.iter().position(|inclusion| inclusion.outline.contains(*x));
+    let inclusion_at = |x: &Point2| scene.inclusions.iter().rposition(|inclusion| inclusion.outline.contains(*x));
     let regions = model.cells().iter().map(|cell| inclusion_at(&cell.centroid()).map_or(0.0, |i| (i + 1) as f64));
     let gradients: Vec<Matrix<3>> = gradients.iter().map(in_space).collect();
     known(model.tissue(), regions.collect(), &gradients, has_stress(model), &scene.stress_unit)

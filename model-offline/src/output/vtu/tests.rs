@@ -93,7 +93,7 @@ fn regions_and_materials_are_numbered_and_unknown_stress_is_left_out() {
     let document = Document::parse(&text).unwrap();
     let regions = numbers(&document, "region");
     for (cell, region) in model.cells().iter().zip(&regions) {
-        let inside = model.scene().inclusions.iter().position(|i| i.outline.contains(cell.centroid()));
+        let inside = model.scene().inclusions.iter().rposition(|i| i.outline.contains(cell.centroid()));
         assert_eq!(*region, inside.map_or(0.0, |i| i as f64 + 1.0));
     }
     assert!(regions.contains(&1.0));

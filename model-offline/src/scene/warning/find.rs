@@ -18,6 +18,8 @@ const BESIDE: f64 = 0.1;
 const SAME: f64 = 1e-9;
 /// Parts of an area below this are rounding.
 const NO_AREA: f64 = 1e-6;
+/// Share of the smaller inclusion that overlaps where only the rounding of a shared edge does.
+const SHARED_EDGE: f64 = 1e-3;
 
 impl Scene {
     /// What is allowed in the scene and seldom meant, in the order of the file.
@@ -88,7 +90,8 @@ impl Rules<'_> {
         found
     }
 
-    /// Two inclusions of which neither is inside the other.
+    /// Two inclusions of which neither is inside the other, or of which the later one leaves nothing of the other. A later one that
+    /// is inside is what it looks like, and an edge that both have but for rounding is no overlap.
     fn overlap(&self, first: usize, second: usize) -> Option<SceneWarning> {
         let [a, b] = [first, second].map(|i| &self.scene.inclusions[i].outline);
         let ((low, high), (low_b, high_b)) = (a.bounds(), b.bounds());
@@ -99,9 +102,12 @@ impl Rules<'_> {
         let smaller = a.area().min(b.area());
         let area = shared_area(&[a], b.vertices());
         let share = (area / smaller).min(1.0);
-        let nested = share > 1.0 - NO_AREA && smaller < (1.0 - NO_AREA) * a.area().max(b.area());
+        if area > (1.0 - NO_AREA) * a.area() {
+            return Some(SceneWarning::InclusionCovered { inclusion: first + 1, by: second + 1 });
+        }
+        let inside = area > (1.0 - NO_AREA) * b.area();
         let overlap = SceneWarning::InclusionsOverlap { first: first + 1, second: second + 1, area, share };
-        (share > NO_AREA && !nested).then_some(overlap)
+        (share > SHARED_EDGE && !inside).then_some(overlap)
     }
 
     /// Angle between the axis and the inner normals of the boundary at the entry, the largest where it enters at a corner,

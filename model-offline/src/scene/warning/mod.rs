@@ -95,7 +95,14 @@ pub enum SceneWarning {
         /// Node spacing.
         spacing: f64,
     },
-    /// Two inclusions cover a part of each other, or are the same twice.
+    /// A later inclusion covers all of another one, which does nothing then.
+    InclusionCovered {
+        /// Which.
+        inclusion: usize,
+        /// The later one.
+        by: usize,
+    },
+    /// Two inclusions cover a part of each other.
     InclusionsOverlap {
         /// Which, the one that the file has first.
         first: usize,
@@ -177,8 +184,14 @@ impl SceneWarning {
             Self::InclusionNarrow { inclusion, width, spacing } => {
                 format!("inclusion {inclusion} is narrower than the node spacing: {} of {}", long(width), long(spacing))
             }
+            Self::InclusionCovered { inclusion, by } => {
+                format!(
+                    "inclusion {inclusion} does nothing: inclusion {by} covers it, and counts because it comes later"
+                )
+            }
             Self::InclusionsOverlap { first, second, area, share } => format!(
-                "inclusions {first} and {second} overlap: an area of {}, {} of the smaller one, has the stiffness of both",
+                "inclusions {first} and {second} overlap: an area of {}, {} of the smaller one, is taken to be of inclusion {second}, \
+                 which comes later",
                 number::area(area, unit),
                 percent(share)
             ),
@@ -211,8 +224,10 @@ impl SceneWarning {
             Self::InclusionNarrow { .. } => {
                 "take a smaller spacing, or a tolerance: nodes so far apart hardly know of it"
             }
+            Self::InclusionCovered { .. } => "write the inner one after the outer one, or leave it out",
             Self::InclusionsOverlap { .. } => {
-                "move one; where one is meant to be inside the other, put all of it there"
+                "move one, or write the one that is meant to count after the other; where one is meant to be inside the other, put \
+                 all of it there"
             }
             Self::PaddleInTheWay { .. } => "move the paddle, or the needle",
         }
