@@ -102,6 +102,26 @@ pub struct WaitingRow {
     pub sensors: Vec<BreathRow>,
 }
 
+/// What one sensor is worth in the simplest world with a table of tissue that is another.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OtherTissueRow {
+    /// What sees the target.
+    pub sensor: SensorPreset,
+    /// The controller with a table of homogeneous tissue, in tissue with inclusions.
+    pub homogeneous: Controlled,
+    /// The one with a table of that tissue.
+    pub known: Controlled,
+}
+
+/// A table of homogeneous tissue in tissue with inclusions.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct OtherTissue {
+    /// Its feed-forward alone.
+    pub fed_forward: Errors,
+    /// With what the sensor shows, sensor by sensor.
+    pub sensors: Vec<OtherTissueRow>,
+}
+
 /// All worlds of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Worlds {
@@ -117,6 +137,8 @@ pub struct Worlds {
     pub rows: Vec<WorldRow>,
     /// Worlds that breathe, the needle having waited for some breaths.
     pub waiting: Vec<WaitingRow>,
+    /// A table that does not know the inclusions, where there are some.
+    pub other_tissue: Option<OtherTissue>,
 }
 
 /// Everything that all worlds of a scene share.
@@ -157,13 +179,16 @@ pub fn compare(scene: &Scene, seeds: u64, threads: usize, progress: &(dyn Fn() +
         row
     });
     let waiting = waiting.into_iter().collect::<Result<_, _>>()?;
+    let other_tissue = basis.other_tissue()?;
+    progress();
     let Basis { paddles, .. } = basis;
-    Ok(Worlds { scene: scene.name.clone(), length_unit: scene.length_unit.clone(), seeds, paddles, rows, waiting })
+    let (scene, length_unit) = (scene.name.clone(), scene.length_unit.clone());
+    Ok(Worlds { scene, length_unit, seeds, paddles, rows, waiting, other_tissue })
 }
 
-/// Number of worlds that are tried.
+/// Number of worlds that are tried, the one of other tissue with them.
 pub fn count() -> u64 {
-    (1 << EFFECTS.len()) + WAITING.len() as u64
+    (1 << EFFECTS.len()) + WAITING.len() as u64 + 1
 }
 
 /// Worlds that are tried with a needle that waits, and how their breaths vary.
@@ -262,6 +287,30 @@ impl Basis<'_> {
         Ok(WaitingRow { effects: effects.to_vec(), wait_s, varies, none, fixture, sensors })
     }
 
+    /// The simplest world with a table of homogeneous tissue; none where the scene has no other.
+    fn other_tissue(&self) -> Result<Option<OtherTissue>, SimError> {
+        if self.scene.inclusions.is_empty() {
+            return Ok(None);
+        }
+        let (scene, simulation) = self.with_only(&[]);
+        let (model, _) = discretise(&scene)?;
+        let (believed, _) = discretise(&scene.without_inclusions())?;
+        let [_, dynamic] = self.paddles;
+        let table = build(&believed, dynamic, &options(&simulation))?;
+        let reductions = Reductions::default();
+        let forward = InProcess::new(&model, &simulation, &reductions).fed_forward();
+        let fed_forward = forward.run(AttachedPaddle::Steered(&table), false)?.errors;
+        let sensors = self.sensors.iter().map(|sensor| {
+            let loop_settings = LoopSettings { feedback: FeedbackLaw::Observer, ..LoopSettings::of(sensor) };
+            let seen = Simulation { sensor: *sensor, loop_settings, ..simulation.clone() };
+            let homogeneous = self.controlled(&model, &seen, &table, &reductions)?;
+            let known = self.controlled(&model, &seen, &self.simple, &reductions)?;
+            Ok(OtherTissueRow { sensor: sensor.preset, homogeneous, known })
+        });
+        let sensors = sensors.collect::<Result<_, SimError>>()?;
+        Ok(Some(OtherTissue { fed_forward, sensors }))
+    }
+
     fn controlled(
         &self,
         model: &TissueModel,
@@ -309,12 +358,20 @@ mod tests {
     fn in_the_simplest_world_both_tables_are_one() {
         let scene = Scene::bundled("paper").unwrap();
         let worlds = compare(&scene, 2, 2, &|| {}).unwrap();
-        assert_eq!((worlds.rows.len() + worlds.waiting.len()) as u64, count());
+        assert_eq!((worlds.rows.len() + worlds.waiting.len()) as u64 + 1, count());
         let simplest = &worlds.rows[0];
         assert!(simplest.effects.is_empty() && simplest.no_table.is_none());
         for row in &simplest.sensors {
             assert_eq!(row.known.as_ref(), Some(&row.simple));
             assert!(row.simple.peak.median < 0.1 * simplest.fixture.peak, "{row:?}");
+        }
+        // A table of other tissue leaves more than one of this tissue, and the sensor repairs it.
+        let other = worlds.other_tissue.unwrap();
+        assert_eq!(other.sensors.len(), simplest.sensors.len());
+        for (row, same) in other.sensors.iter().zip(&simplest.sensors) {
+            assert_eq!(row.known, same.simple);
+            assert!(row.known.rms.median < row.homogeneous.rms.median, "{row:?}");
+            assert!(row.homogeneous.rms.median < 0.1 * other.fed_forward.rms, "{row:?} {:?}", other.fed_forward);
         }
         // Whoever breathes moves the target without a needle.
         let breathing = worlds.rows.iter().find(|row| row.effects == [Effect::Breathing]).unwrap();

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use model_offline::number::length;
 
 use crate::bench::in_process::Errors;
-use crate::bench::worlds::{Controlled, Spread, Worlds};
+use crate::bench::worlds::{Controlled, OtherTissue, OtherTissueRow, Spread, WorldRow, Worlds};
 use model_offline::scene::Effect;
 
 /// The table, in Markdown: readable in a terminal too.
@@ -17,7 +17,7 @@ pub fn summary(worlds: &Worlds) -> String {
 }
 
 fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
-    let Worlds { scene, length_unit, seeds, paddles: [fixture, dynamic], rows, waiting } = worlds;
+    let Worlds { scene, length_unit, seeds, paddles: [fixture, dynamic], rows, waiting, other_tissue } = worlds;
     writeln!(
         text,
         "Scene {scene}: target displacement orthogonal to the needle, peak / RMS in {length_unit}; fixture: paddle {fixture}, \
@@ -66,6 +66,9 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
             )?;
         }
     }
+    if let (Some(other), Some(simplest)) = (other_tissue, rows.first()) {
+        write_other_tissue(text, other, simplest)?;
+    }
     let all = rows.iter().flat_map(|row| &row.sensors).flat_map(|row| row.known.iter().chain([&row.simple]));
     let all = all.chain(waiting.iter().flat_map(|row| &row.sensors).flat_map(|row| [&row.followed, &row.predicted]));
     let found = all.filter_map(|run| run.tissue_error).fold(0.0, f64::max);
@@ -79,6 +82,32 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
     for row in rows.iter().filter(|row| row.no_table.is_some()) {
         let effects: Vec<&str> = row.effects.iter().map(|effect| effect.name()).collect();
         writeln!(text, "No table that knows {}: {}", effects.join(", "), row.no_table.as_deref().unwrap_or_default())?;
+    }
+    Ok(())
+}
+
+/// The table of other tissue.
+fn write_other_tissue(text: &mut String, other: &OtherTissue, simplest: &WorldRow) -> std::fmt::Result {
+    writeln!(
+        text,
+        "\nThe simplest world where the table is of homogeneous tissue and the tissue has inclusions: by its feed-forward alone, \
+         and with what the sensor shows.\n"
+    )?;
+    writeln!(
+        text,
+        "| sensor | no paddle | fixture | feed-forward alone | Stillpoint, table does not know | table knows |"
+    )?;
+    writeln!(text, "|---|---|---|---|---|---|")?;
+    for OtherTissueRow { sensor, homogeneous, known } in &other.sensors {
+        writeln!(
+            text,
+            "| {sensor} | {} | {} | {} | {} | {} |",
+            errors(&simplest.none),
+            errors(&simplest.fixture),
+            errors(&other.fed_forward),
+            controlled(homogeneous, &simplest.none),
+            controlled(known, &simplest.none),
+        )?;
     }
     Ok(())
 }

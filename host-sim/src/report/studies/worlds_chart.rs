@@ -118,6 +118,7 @@ mod tests {
                 row(vec![Effect::Breathing], 0.6, 0.7),
             ],
             waiting: vec![],
+            other_tissue: None,
         };
         let figure = figure(&worlds);
         let told = "breast: with a table that knows the world the target is held better than by the best fixture in 2 of 3 worlds, \
