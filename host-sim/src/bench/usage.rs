@@ -170,7 +170,7 @@ pub enum UsageError {
         /// The row.
         row: u32,
         /// The last one there is.
-        last: usize,
+        last: u32,
     },
     /// No controller runs that could be re-armed.
     #[error("no controller of this user is running; `host-sim controller --table FILE` starts one")]

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use host_sim::SimError;
 use host_sim::bench::board::measure::{self, Budget, Complaint, Figures, MeasureError};
-use host_sim::bench::board::space;
+use host_sim::bench::board::scenarios::Scenarios;
 use host_sim::bench::usage::UsageError;
-use host_sim::exchange::board::Control;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
@@ -43,20 +42,15 @@ pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
     check_outputs(&[&args.recording], &outputs)?;
     let recording = Recording::read(&args.recording)?;
     let budget = args.budget.as_deref().map(read_budget).transpose()?;
-    let scenarios = measure::scenarios(&recording)?;
+    let scenarios = Scenarios::of(&recording)?;
     let mut measured = Budget::new();
     let mut complaints = Vec::new();
     let mut images = measure::images().map_err(MeasureError::from)?;
     images.push(measure::spatial_image().map_err(MeasureError::from)?);
-    let in_space = space::scenarios();
     for image in images {
         let name = measure::name(&image);
-        let measure = || match image.control {
-            Control::Plane => measure::measure(&image, &scenarios),
-            Control::SpacePair => measure::measure(&image, &in_space),
-        };
-        let figures = measure()?;
-        if args.twice && measure()? != figures {
+        let figures = scenarios.measure(&image)?;
+        if args.twice && scenarios.measure(&image)? != figures {
             complaints.push(Complaint::Unsteady { image: name.clone() });
         }
         print!("{}", table(&name, &figures));

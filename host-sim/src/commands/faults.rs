@@ -1,18 +1,17 @@
 //! `host-sim faults`.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
 use firmware::Mode;
-use firmware::contract::Table;
 use host_sim::SimError;
-use host_sim::bench::faults::catalogue::rows;
 use host_sim::bench::faults::evidence::RowVerdict;
-use host_sim::bench::faults::monitors::{MonitorOff, monitors_off};
-use host_sim::bench::faults::random::{Composed, composed};
+use host_sim::bench::faults::monitors::MonitorOff;
+use host_sim::bench::faults::random::Composed;
 use host_sim::bench::faults::report::{CatalogueMode, FaultsResult, RowResult};
-use host_sim::bench::paper_table::{brick_table, paper_table};
+use host_sim::bench::faults::session::{Session, row_count, session};
 use host_sim::bench::usage::UsageError;
 use host_sim::record::error::FileError;
 use host_sim::record::files::{write_bytes, write_json};
@@ -67,17 +66,10 @@ const DEFAULT_SEEDS: u64 = 1000;
 pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
     signals::install();
     EFFORT.check(args.effort)?;
-    if args.dimension > 2 { tried_on(args, brick_table) } else { tried_on(args, paper_table) }
-}
-
-/// The same on the table that `made` makes.
-fn tried_on<const D: usize, const N: usize, const P: usize>(
-    args: &FaultsArgs,
-    made: impl FnOnce() -> Result<Table<f64, D, N, P>, SimError>,
-) -> Result<(), SimError> {
-    let rows = rows::<D, N, P>();
-    if let Some(unknown) = args.only.iter().find(|id| !rows.iter().any(|row| row.id == **id)) {
-        return Err(UsageError::NoRow { row: *unknown, last: rows.len() }.into());
+    let last = row_count(args.dimension);
+    let asked: Vec<u32> = if args.only.is_empty() { (1..=last).collect() } else { args.only.clone() };
+    if let Some(&row) = asked.iter().find(|id| !(1..=last).contains(id)) {
+        return Err(UsageError::NoRow { row, last }.into());
     }
     if let Some(directory) = &args.out {
         std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
@@ -85,34 +77,39 @@ fn tried_on<const D: usize, const N: usize, const P: usize>(
     let files = FILES.map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own, svg] = files.each_ref().map(Option::as_deref);
     check_outputs(&[], &[("--out", csv), ("--out", own), ("--out", svg), ("--json", args.json.as_deref())])?;
-    let table = signals::ends_at_once(made)?;
-    if args.monitors_off {
-        return without_monitors(args, &table);
-    }
+    let session = signals::ends_at_once(|| session(args.dimension, args.seed))?;
+    if args.monitors_off { without_monitors(args, session.as_ref()) } else { tried(args, &asked, session.as_ref()) }
+}
+
+/// The rows that were asked for, in the order of the catalogue, then random schedules.
+fn tried(args: &FaultsArgs, asked: &[u32], session: &dyn Session) -> Result<(), SimError> {
     let mut result =
         FaultsResult { version: env!("CARGO_PKG_VERSION").to_owned(), seed: args.seed, ..FaultsResult::default() };
-    if D > 2 {
+    let in_space = args.dimension > 2;
+    if in_space {
         (result.dimension, result.mode) = (Some(args.dimension), CatalogueMode::InSpace);
     }
-    for row in rows.iter().filter(|row| args.only.is_empty() || args.only.contains(&row.id)) {
+    let in_order = asked.iter().collect::<BTreeSet<_>>();
+    for &id in in_order {
         signals::check()?;
         let started = Instant::now();
-        let row = RowResult::new(row, &row.run(&table, args.seed, args.effort)?);
-        print_row(&row, started.elapsed().as_secs_f64());
-        result.rows.push(row);
+        if let Some(row) = session.row(id, args.effort)? {
+            print_row(&row, started.elapsed().as_secs_f64());
+            result.rows.push(row);
+        }
     }
     let default = if args.only.is_empty() { DEFAULT_SEEDS } else { 0 };
     let seeds = args.seeds.unwrap_or(default);
     if seeds > 0 {
         let started = Instant::now();
-        let sums = signals::ends_at_once(|| composed(&table, args.seed, seeds, &|| {}))?;
+        let sums = session.composed(seeds)?;
         print_composed(&sums, started.elapsed().as_secs_f64());
         result.composed = Some(sums);
     }
     write(args, &result)?;
     let (failed, schedules) = (result.failed(), result.composed.as_ref().map_or(0, |sums| sums.failures.len()));
     if failed + schedules > 0 {
-        let space = if D > 2 { " --dimension 3" } else { "" };
+        let space = if in_space { " --dimension 3" } else { "" };
         println!("seed {}: host-sim faults{space} --seed {} shows it again", args.seed, args.seed);
         return Err(SimError::Faults { failed, rows: result.rows.len(), schedules });
     }
@@ -120,11 +117,8 @@ fn tried_on<const D: usize, const N: usize, const P: usize>(
 }
 
 /// The table monitor × row.
-fn without_monitors<const D: usize, const N: usize, const P: usize>(
-    args: &FaultsArgs,
-    table: &Table<f64, D, N, P>,
-) -> Result<(), SimError> {
-    let monitors = signals::ends_at_once(|| monitors_off(table, args.seed))?;
+fn without_monitors(args: &FaultsArgs, session: &dyn Session) -> Result<(), SimError> {
+    let monitors = session.monitors_off()?;
     for MonitorOff { monitor, rows } in &monitors {
         let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
         println!(

@@ -10,7 +10,7 @@ use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
 use host_sim::runtime::peer::introduction::Expected;
 use host_sim::runtime::plant::PlantLoop;
-use host_sim::runtime::plant::process::{OnDeath, PlantResult, Visit, serve};
+use host_sim::runtime::plant::process::{OnDeath, PlantResult, Visit, serve_in_plane, serve_in_space};
 use host_sim::runtime::plant::rehearsal::{space_in_time, world_in_time};
 use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
@@ -99,7 +99,7 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
         paddles: None,
     };
     let visit = visit(args, &simulation, expected);
-    let result = serve(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
+    let result = serve_in_plane(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
     end(args, &result, &format!("paddle {paddle}"))
 }
 
@@ -140,7 +140,7 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
         paddles: Some(paddles.clone()),
     };
     let visit = visit(args, &simulation, expected);
-    let result = serve(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
+    let result = serve_in_space(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
     let names: Vec<String> = paddles.iter().map(u32::to_string).collect();
     end(args, &result, &format!("paddle {}", names.join(" + ")))
 }

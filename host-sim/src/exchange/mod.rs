@@ -24,3 +24,6 @@ pub use ports::{ControllerPorts, PlantPorts, ReceiveCounts};
 pub use space::{Departure, Space, sweep};
 pub use stream::{Receiver, Sender};
 pub use wire::{ClockFrame, ClockKind, Wire, WireFrame};
+
+#[cfg(test)]
+mod tests;

@@ -292,7 +292,7 @@ pub fn spatial_image() -> Result<Image, BoardError> {
 ///
 /// # Errors
 /// [`MeasureError`]; [`MeasureError::Differs`] for a command that is not the host's.
-pub fn measure<const D: usize, const N: usize, const P: usize>(
+pub(super) fn measure<const D: usize, const N: usize, const P: usize>(
     image: &Image,
     scenarios: &[Scenario<D, N, P>],
 ) -> Result<Figures, MeasureError> {

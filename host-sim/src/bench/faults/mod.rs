@@ -20,5 +20,6 @@ pub mod random;
 pub mod report;
 pub(crate) mod rows;
 pub mod seam;
+pub mod session;
 pub mod shuttle;
 pub mod tissue;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use iceoryx2::service::ipc;
-use nalgebra::SMatrix;
+use nalgebra::{Matrix3x2, SMatrix, Vector2};
 use serde::{Deserialize, Serialize};
 
 use super::free_run::{FreeRun, Succession};
@@ -17,7 +17,8 @@ use crate::runtime::peer::{Patience, Peer};
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
 use crate::world::loop_settings::LoopSettings;
-use crate::world::tissue::TissueResponse;
+use crate::world::space::SpaceTissue;
+use crate::world::tissue::{TissuePlant, TissueResponse};
 use crate::world::truth::{Truth, from_frame};
 
 /// What `plant --json` writes.
@@ -71,12 +72,34 @@ pub enum OnDeath {
 /// Commands, controllers, timing, samples published.
 type Inserted = (CommandAccount, u64, Option<LoopTiming>, Published);
 
-/// Runs one insertion. Leaves nothing behind in shared memory, however it ends. `orthogonal` are the N directions orthogonal to
-/// the needle.
+/// Runs one insertion in the plane. Leaves nothing behind in shared memory, however it ends. `orthogonal` is the direction
+/// orthogonal to the needle.
 ///
 /// # Errors
 /// [`RuntimeError`].
-pub fn serve<T: TissueResponse<D>, const D: usize, const N: usize>(
+pub fn serve_in_plane(
+    plant: &mut PlantLoop<TissuePlant<'_>>,
+    space: &Space,
+    visit: &Visit,
+    orthogonal: &Vector2<f64>,
+) -> Result<PlantResult, RuntimeError> {
+    serve(plant, space, visit, orthogonal)
+}
+
+/// The same in space, where `orthogonal` are the two directions orthogonal to the needle.
+///
+/// # Errors
+/// [`RuntimeError`].
+pub fn serve_in_space(
+    plant: &mut PlantLoop<SpaceTissue<'_>, 3>,
+    space: &Space,
+    visit: &Visit,
+    orthogonal: &Matrix3x2<f64>,
+) -> Result<PlantResult, RuntimeError> {
+    serve(plant, space, visit, orthogonal)
+}
+
+fn serve<T: TissueResponse<D>, const D: usize, const N: usize>(
     plant: &mut PlantLoop<T, D>,
     space: &Space,
     visit: &Visit,

@@ -2,8 +2,9 @@
 
 use firmware::contract::{NeedleSample, PaddleCommand, TargetSample};
 use firmware::io::{CommandSink, SampleSource};
-use host_sim::exchange::{ClockFrame, ClockKind, ControllerPorts, LinkError, PlantPorts, Space};
 use iceoryx2::service::local::Service;
+
+use super::{ClockFrame, ClockKind, ControllerPorts, Departure, LinkError, PlantPorts, Space};
 
 fn both(name: &str) -> (Space, PlantPorts<Service>, ControllerPorts<Service>) {
     let space = Space::new(&format!("test-{name}-{}", std::process::id())).unwrap();
@@ -18,7 +19,7 @@ fn both(name: &str) -> (Space, PlantPorts<Service>, ControllerPorts<Service>) {
 
 fn end(space: &Space, plant: PlantPorts<Service>, controller: ControllerPorts<Service>) {
     drop((plant, controller));
-    space.leave::<Service>(host_sim::exchange::Departure::Last);
+    space.leave::<Service>(Departure::Last);
     assert!(!space.root().exists(), "nothing stays behind");
 }
 
