@@ -92,7 +92,7 @@ fn nothing_is_unusual_in_the_bundled_scenes_and_in_the_block() {
 #[test]
 fn every_warning_is_given_with_its_numbers_where_it_is_due() {
     type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
-    let cases: [Case<'_>; 18] = [
+    let cases: [Case<'_>; 19] = [
         (&[(AXIS, "axis = [0.0, 1.0]")], &["points out of the body: 180°", "turn the axis round"]),
         (&[(AXIS, "axis = [0.5, 1.0]")], &["points out of the body: 153°"]),
         (&[(AXIS, "axis = [1.0, -0.1]")], &["along the surface: 5.7°", "turn the axis inwards"]),
@@ -122,6 +122,14 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
         (
             &[(LAST_PADDLE, "segment = [[100.0, 20.0], [100.0, 22.5]]")],
             &["paddle 7 is shorter than the node spacing: 2.5 mm of 5 mm"],
+        ),
+        (
+            // Ends that a drawing's digits have pushed past each other.
+            &[(
+                LAST_PADDLE,
+                &format!("{LAST_PADDLE}\n[[paddle]]\nindex = 8\nsegment = [[100.0, 39.9], [100.0, 60.0]]"),
+            )],
+            &["overlap by 0.1 mm", "let one end where the other begins"],
         ),
         (
             &[(DEPTH, SHAFT)],

@@ -2,7 +2,7 @@
 
 use super::SceneWarning;
 use crate::discretization::Resolution;
-use crate::geometry::{Point2, distance_to_polyline, distance_to_segment, segments_meet, shared_area};
+use crate::geometry::{Point2, cross, distance_to_polyline, distance_to_segment, segments_meet, shared_area};
 use crate::scene::{Resistance, Scene};
 
 /// A needle at less than this angle to the boundary goes along it, degrees.
@@ -20,6 +20,8 @@ const SAME: f64 = 1e-9;
 const NO_AREA: f64 = 1e-6;
 /// Share of the smaller inclusion that overlaps where only the rounding of a shared edge does.
 const SHARED_EDGE: f64 = 1e-3;
+/// Part of a paddle's length below which an overlap with another is hardly meant: two places that share more are alternatives.
+const SHORT_OVERLAP: f64 = 0.02;
 
 impl Scene {
     /// What is allowed in the scene and seldom meant, in the order of the file.
@@ -58,6 +60,17 @@ pub(crate) fn towards_target(depth: f64, nearest_at: f64, miss: f64, size: f64) 
     } else {
         None
     }
+}
+
+/// Length that two segments share that lie on one line, within a tolerance; 0 where they do not.
+fn overlap([a, b]: [Point2; 2], [c, d]: [Point2; 2], tolerance: f64) -> f64 {
+    let along = (b - a).normalize();
+    if [c, d].iter().any(|x| cross(along, x - a).abs() > tolerance) {
+        return 0.0;
+    }
+    let at = |x: Point2| (x - a).dot(&along);
+    let (low, high) = (at(c).min(at(d)).max(0.0), at(c).max(at(d)).min(at(b)));
+    (high - low).max(0.0)
 }
 
 struct Rules<'a> {
@@ -198,7 +211,7 @@ impl Rules<'_> {
 
     fn paddles(&self) -> Vec<SceneWarning> {
         let mut found = Vec::new();
-        for paddle in &self.scene.paddles {
+        for (i, paddle) in self.scene.paddles.iter().enumerate() {
             let [a, b] = paddle.segment;
             let length = (b - a).norm();
             if let Some(spacing) = self.longer_spacing(length) {
@@ -206,6 +219,16 @@ impl Rules<'_> {
             }
             if let Some(at) = self.in_the_way([a, b]) {
                 found.push(SceneWarning::PaddleInTheWay { index: paddle.index, at });
+            }
+            for before in &self.scene.paddles[..i] {
+                let overlap = overlap(before.segment, paddle.segment, SAME * self.size);
+                if overlap > SAME * self.size && overlap < SHORT_OVERLAP * length {
+                    found.push(SceneWarning::PaddlesOverlap {
+                        first: before.index,
+                        second: paddle.index,
+                        length: overlap,
+                    });
+                }
             }
         }
         found

@@ -113,6 +113,15 @@ pub enum SceneWarning {
         /// Part of the smaller one's area that is, 0 to 1.
         share: f64,
     },
+    /// Two paddles overlap by much less than either is long.
+    PaddlesOverlap {
+        /// Index of the paddle that the file has first.
+        first: u32,
+        /// Index of the other one.
+        second: u32,
+        /// Length that both cover.
+        length: f64,
+    },
     /// A paddle is shorter than the nodes are apart.
     PaddleShort {
         /// Its index.
@@ -195,6 +204,9 @@ impl SceneWarning {
                 number::area(area, unit),
                 percent(share)
             ),
+            Self::PaddlesOverlap { first, second, length } => {
+                format!("paddles {first} and {second} overlap by {}", long(length))
+            }
             Self::PaddleShort { index, length, spacing } => {
                 format!("paddle {index} is shorter than the node spacing: {} of {}", long(length), long(spacing))
             }
@@ -228,6 +240,9 @@ impl SceneWarning {
             Self::InclusionsOverlap { .. } => {
                 "move one, or write the one that is meant to count after the other; where one is meant to be inside the other, put \
                  all of it there"
+            }
+            Self::PaddlesOverlap { .. } => {
+                "let one end where the other begins: an overlap so short takes elements as short, and insertions do not get far on them"
             }
             Self::PaddleInTheWay { .. } => "move the paddle, or the needle",
         }
