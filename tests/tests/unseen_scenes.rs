@@ -2,6 +2,9 @@
 //! inclusions on the edge, inner corners, other units, origins far away, paddles that hardly control the target. The default rule reaches 1 % on all of them, and its
 //! estimated errors hold against quadratic triangles refined until they leave next to nothing open.
 
+use model_offline::discretization::{Integration, Method, Resolution};
+use model_offline::placement::adaptive::discretise;
+use model_offline::scene::Scene;
 use tests::estimates::{Outcome, PaddleOutcome, SCENES, TOLERANCE, outcome};
 
 /// Errors smaller than this share of the tolerance come about by accident: no estimate is three times them at most.
@@ -58,6 +61,22 @@ scenes! {
     an_ell_whose_short_arm_is_held: "an L whose short arm is held",
     a_tall_ell_with_an_inclusion_deep_inside: "a tall L, an inclusion inside",
     a_disc_whose_paddles_hardly_control_the_target: "a disc, hardly controlled",
+}
+
+/// Nodes along a thin layer follow its width and its length: as near as its ends ask for, all along, none of these would end.
+#[test]
+fn a_thin_layer() {
+    check(include_str!("../scenes/layer.toml"));
+}
+
+/// A band that is 9 times as long as wide and 10,000 times as stiff as what is around it asks for near nodes all along.
+#[test]
+fn a_stiff_band() {
+    let mut scene = Scene::bundled("tethered").unwrap();
+    scene.discretization.method = Method::new(Integration::ScniStabilised);
+    scene.discretization.resolution = Resolution::Tolerance(TOLERANCE);
+    let (_, estimate) = discretise(&scene).unwrap();
+    assert!(estimate.unwrap().controllability <= TOLERANCE);
 }
 
 /// Where a Jacobian is all but singular, two meshes agree on ‖J⁻¹n‖ by accident.

@@ -24,7 +24,8 @@ pub struct Grading {
     pub finest: f64,
     /// Growth of the spacing with distance from a singular point.
     pub slope: f64,
-    /// Spacing along a side of an inclusion, from corner to corner, over its length; and along a shaft over half of that.
+    /// Spacing along an inclusion over the shortest of its sides, from corner to corner; and along a shaft over half of its
+    /// length.
     pub interface: f64,
     /// Largest spacing where the body, a slot in it, or an inclusion is narrow: over the width there.
     pub narrow: f64,
@@ -186,26 +187,38 @@ fn sides(region: &Polygon) -> Vec<Side> {
     sides
 }
 
+/// A side that is longer than this many times the shortest of its region asks for spacings that follow its own length: nodes as
+/// near as a thin layer's end asks for would be all that there are.
+const LONG: f64 = 15.0;
+
+/// The spacing along every edge of an inclusion, without what its width asks for where its sides are straight.
+fn along_sides(region: &Polygon, grading: &Grading) -> Vec<(Edge, Side, f64)> {
+    let sides = sides(region);
+    let extent = |side: &Side| side.width.map_or(side.length, |width| side.length.min(2.0 * width));
+    let shortest = sides.iter().map(extent).fold(f64::INFINITY, f64::min);
+    let spacing = |side: &Side| {
+        let over_width = side.width.map_or(f64::INFINITY, |width| grading.narrow * width);
+        (grading.interface * shortest.max(side.length / LONG)).min(over_width).min(grading.coarsest)
+    };
+    region.edges().zip(&sides).map(|(edge, side)| (edge, *side, spacing(side))).collect()
+}
+
 /// The edges of an inclusion, each with the spacing there. Those of a curve may be shorter than what it asks for: nodes that
 /// follow them are as near as that.
 fn interfaces(region: &Polygon, grading: &Grading) -> Vec<(Point2, Point2, f64)> {
-    let spacing = |side: &Side| {
-        let over_width = side.width.map_or(f64::INFINITY, |width| grading.narrow * width);
-        (grading.interface * side.length).min(over_width).min(grading.coarsest)
-    };
-    region.edges().zip(sides(region)).map(|((a, b), side)| (a, b, spacing(&side).min((b - a).norm()))).collect()
+    let along = along_sides(region, grading).into_iter();
+    along.map(|((a, b), _, spacing)| (a, b, spacing.min((b - a).norm()))).collect()
 }
 
 /// Pairs of straight sides of an inclusion that face each other nearer than their own spacings can resolve.
 fn narrows_within(region: &Polygon, grading: &Grading) -> Vec<[Edge; 2]> {
-    let sides = sides(region);
-    let straight = region.edges().zip(&sides).filter(|(_, side)| side.width.is_none());
-    let straight: Vec<(Edge, f64)> = straight.map(|(edge, side)| (edge, grading.interface * side.length)).collect();
+    let mut straight = along_sides(region, grading);
+    straight.retain(|(_, side, _)| side.width.is_none());
     let pairs = (0..straight.len()).flat_map(|i| (i + 1..straight.len()).map(move |j| (i, j)));
     pairs
         .map(|(i, j)| [straight[i], straight[j]])
-        .filter(|[(e, along), (f, beside)]| facing(*e, *f) && resolves_not(grading.narrow, *e, *f, along.min(*beside)))
-        .map(|[(e, _), (f, _)]| [e, f])
+        .filter(|[e, f]| facing(e.0, f.0) && resolves_not(grading.narrow, e.0, f.0, e.2.min(f.2)))
+        .map(|[e, f]| [e.0, f.0])
         .collect()
 }
 
@@ -437,9 +450,10 @@ mod tests {
             let (with_layer, with_both) =
                 (count(std::slice::from_ref(&layer), level), count(&[block.clone(), layer.clone()], level));
             assert!(with_both < with_block + with_layer - none / 2, "{none} {with_block} {with_layer} {with_both}");
-            // Squares of half a width and less, which grow beside it: thirty rows or so. A fifth of the width all along would
-            // be more than twice as many, at level 2 five times.
-            let spacing = 0.005 * 0.5_f64.powf(0.5 * f64::from(level));
+            // Squares of what its width or its length asks for and less, which grow beside it: thirty rows or so. A fifth of
+            // the width all along would be three times as many.
+            let halved = 0.5_f64.powi(level);
+            let spacing = (0.5 * 0.01 * halved.sqrt()).min(0.2 * 0.9 / LONG * halved);
             let rows = (with_layer - none) as f64 * spacing / 0.9;
             assert!(rows < 33.0, "{none} {with_layer}: {rows}");
         }
