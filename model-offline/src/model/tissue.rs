@@ -142,7 +142,8 @@ fn overlapping_phases(
     area: f64,
     inclusions: &[Inclusion],
 ) -> Vec<(f64, Vec<usize>)> {
-    let touching = &touching[..touching.len().min(MOST_IN_A_CELL)];
+    // The last ones count where they overlap.
+    let touching = &touching[touching.len().saturating_sub(MOST_IN_A_CELL)..];
     let members = |set: usize| touching.iter().enumerate().filter(move |(k, _)| set >> k & 1 == 1).map(|(_, &i)| i);
     let sets = 1_usize << touching.len();
     // Share covered by all members of a set, whatever else covers it.
