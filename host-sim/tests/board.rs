@@ -269,7 +269,7 @@ fn run_in_space(folder: &Path, pairs: &str, options: &[&str]) -> std::process::O
 }
 
 #[test]
-fn two_paddles_in_space_are_held_bit_identically_by_the_cortex_m7() {
+fn a_pair_in_space_is_held_bit_identically_by_the_cortex_m7() {
     if image(ScalarKind::F64).is_none() {
         return;
     }

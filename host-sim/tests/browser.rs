@@ -290,7 +290,7 @@ fn the_live_view_shows_pauses_steps_and_obeys_its_knobs() {
 
 /// In space: the body moves in its view, which is turned while it does; pause, knobs and the end are as in the plane.
 #[test]
-fn the_live_view_of_a_body_in_space_moves_and_is_turned() {
+fn a_body_in_space_moves_in_the_live_view_and_is_turned() {
     let Some(browser) = Browser::start() else { return };
     let folder = tempfile::tempdir().unwrap();
     let scene = scenes::with_pairs(folder.path(), "[[5, 6]]");

@@ -12,13 +12,15 @@ const HOST_SIM: &str = env!("CARGO_BIN_EXE_host-sim");
 /// What `timing` says where no round is worth anything.
 const VOID: &str = "are void: ";
 
-fn pages() -> Vec<PathBuf> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let mut pages = vec![root.join("README.md")];
-    for folder in ["model-offline/src/guide", "host-sim/src/guide"] {
-        let files = std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
-        pages.extend(files.filter(|path| path.extension().is_some_and(|extension| extension == "md")));
-    }
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
+}
+
+/// The pages of a guide.
+fn guide(folder: &str) -> Vec<PathBuf> {
+    let files = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+    let mut pages: Vec<PathBuf> =
+        files.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect();
     pages.sort();
     pages
 }
@@ -45,14 +47,26 @@ fn commands(page: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_command_shown_works() {
+fn every_command_of_the_readme_and_the_simulators_guide_works() {
+    let mut pages = guide("host-sim/src/guide");
+    pages.push(root().join("README.md"));
+    works(&pages);
+}
+
+#[test]
+fn every_command_of_the_models_guide_works() {
+    works(&guide("model-offline/src/guide"));
+}
+
+/// Runs what the pages show.
+fn works(pages: &[PathBuf]) {
     let model_offline = Path::new(HOST_SIM).with_file_name("model-offline");
     if !model_offline.is_file() {
         let missing = "model-offline is not built; `cargo test --workspace` does, or `cargo build --workspace` before";
         return missing::skip("every command shown", missing);
     }
-    for page in pages() {
-        let text = std::fs::read_to_string(&page).unwrap();
+    for page in pages {
+        let text = std::fs::read_to_string(page).unwrap();
         let folder = tempfile::tempdir().unwrap();
         for command in commands(&text) {
             let (program, rest) = if let Some(rest) = command.strip_prefix("cargo run --release -p model-offline -- ") {

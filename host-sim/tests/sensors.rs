@@ -3,6 +3,7 @@
 use firmware::{Controller, Feedback, Settings, State};
 use host_sim::world::World;
 use host_sim::{Simulation, TissueVariant};
+use model_offline::parallel::{map_each, threads};
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::{Scene, SensorPreset};
 use model_offline::table::{TableOptions, build};
@@ -57,7 +58,7 @@ fn feedback_does_not_hurt_with_a_sensor_of_practice() {
         ("prostate", TissueVariant::Inclusion, [0.07, 0.027]),
         ("prostate", TissueVariant::Homogeneous, [0.065, 0.03]),
     ];
-    for (scene, tissue, [most_peak, most_rms]) in cases {
+    map_each(cases.to_vec(), threads(None), |(scene, tissue, [most_peak, most_rms])| {
         let observed = medians(scene, tissue, 20, |settings| settings);
         let [by_sensor, by_table] = [medians(scene, tissue, 5, integral), medians(scene, tissue, 1, table_alone)];
         let told =
@@ -70,5 +71,5 @@ fn feedback_does_not_hurt_with_a_sensor_of_practice() {
         assert!(rms < by_table[1].max(most_rms), "{told}");
         // 1.5 was asked for, which `breast` keeps.
         assert!(way < 2.0 * by_table[2], "{told}");
-    }
+    });
 }

@@ -262,7 +262,7 @@ fn in_mcap(path: &Path, recording: &Recording) {
 
 /// Two processes over shared memory do what one process does, tick by tick and bit by bit: samples of both paddles, commands and truth.
 #[test]
-fn two_processes_do_what_one_does() {
+fn a_run_of_two_processes_is_that_of_one() {
     let directory = tempfile::tempdir().unwrap();
     let path = SHORT.join("pairs.toml");
     let dynamic = result(&SHORT)["cases"][0]["dynamic"].clone();

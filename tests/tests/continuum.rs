@@ -3,6 +3,7 @@
 
 use model_offline::discretization::{Integration, Method, Resolution};
 use model_offline::model::graded_model;
+use model_offline::parallel::{map_each, threads};
 use model_offline::placement::adaptive::discretise;
 use model_offline::placement::rest::rest_responses;
 use model_offline::scene::Scene;
@@ -42,7 +43,7 @@ fn a_tolerance_of_one_percent_is_kept_by_quadratic_triangles() {
 
 #[test]
 fn a_tolerance_of_one_percent_is_kept_by_scni() {
-    for (mut scene, limits) in cases() {
+    map_each(cases(), threads(None), |(mut scene, limits)| {
         scene.discretization.resolution = Resolution::Tolerance(0.01);
         let (model, _) = discretise(&scene).unwrap();
         let found = errors(&rest_responses(&model).unwrap(), &limits);
@@ -53,7 +54,7 @@ fn a_tolerance_of_one_percent_is_kept_by_scni() {
             scene.name,
             scene.tissue()
         );
-    }
+    });
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 use model_offline::discretization::{Integration, Method, Resolution};
 use model_offline::model::{ModelError, TissueModel};
+use model_offline::parallel::{map_each, threads};
 use model_offline::placement::discretise;
 use model_offline::placement::reference::Reference;
 use model_offline::placement::rest::rest_responses;
@@ -103,7 +104,7 @@ fn rules_with_stable_modes_are_right_on_even_nodes() {
 fn a_tolerance_is_kept_or_refused_with_the_error_that_was_reached() {
     const TOLERANCE: f64 = 0.05;
     let reference = reference(0.002);
-    for integration in [
+    let methods = [
         Integration::default(),
         Integration::Dni,
         Integration::Scni,
@@ -111,7 +112,8 @@ fn a_tolerance_is_kept_or_refused_with_the_error_that_was_reached() {
         Integration::Gauss,
         Integration::FemT3,
         Integration::FemT6,
-    ] {
+    ];
+    map_each(methods.to_vec(), threads(None), |integration| {
         match discretise(&slab(integration, Resolution::Tolerance(TOLERANCE))) {
             Ok((model, _)) => {
                 let found = error(&model, &reference);
@@ -127,7 +129,7 @@ fn a_tolerance_is_kept_or_refused_with_the_error_that_was_reached() {
             }
             Err(other) => panic!("{integration:?}: {other}"),
         }
-    }
+    });
 }
 
 #[test]

@@ -225,6 +225,38 @@ impl RunArgs {
     }
 }
 
+/// Progress of a study: what comes before and after the steps that are counted is told in words.
+pub(super) struct StudyProgress(ProgressBar);
+
+impl StudyProgress {
+    /// Of a scene at this resolution, before anything is solved.
+    pub(super) fn new(run: &RunArgs, resolution: Resolution) -> Self {
+        let bar = run.progress(1);
+        bar.set_message(match resolution {
+            Resolution::Tolerance(_) => "finding the nodes that the tolerance asks for",
+            Resolution::Spacing(_) | Resolution::Level(_) => "solving the body at rest",
+        });
+        Self(bar)
+    }
+
+    /// So many steps come.
+    pub(super) fn begin(&self, steps: u64) {
+        self.0.set_length(steps);
+    }
+
+    /// One of them is done.
+    pub(super) fn step(&self) {
+        self.0.inc(1);
+        let is_last = self.0.length().is_some_and(|steps| self.0.position() >= steps);
+        self.0.set_message(if is_last { "estimating errors" } else { "following the insertion" });
+    }
+
+    /// Nothing of it is left on a terminal.
+    pub(super) fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
 /// Warnings, a line each.
 pub(super) fn warned(warnings: &[String]) -> String {
     warnings.iter().fold(String::new(), |mut out, warning| {

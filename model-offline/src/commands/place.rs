@@ -1,6 +1,6 @@
 //! `model-offline place`: the whole placement study.
 
-use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
+use super::common::{DiscretizationArgs, RunArgs, SceneArgs, StudyProgress};
 use super::error::CliError;
 use super::json::write_json;
 use super::place_space;
@@ -65,14 +65,15 @@ impl Placed {
 }
 
 fn place(scene: &Scene, args: &PlaceArgs) -> Result<Placed, CliError> {
-    let bar = args.run.progress(study::steps(scene));
-    let progress = || bar.inc(1);
+    let bar = StudyProgress::new(&args.run, scene.discretization.resolution);
+    bar.begin(study::steps(scene));
+    let progress = || bar.step();
     let threads = args.run.threads();
     let options = PlacementOptions { threads, progress: &progress, ..Default::default() };
     let study = PlacementStudy::run(scene, &options)?;
     let wanted = !args.run.quiet || args.json.is_some();
     let accuracy = wanted.then(|| study.accuracy(threads));
-    bar.finish_and_clear();
+    bar.finish();
     let table = args.table.as_ref().map(|_| table_of(&study));
     write_json(args.json.as_deref(), &document(&study, accuracy.as_ref(), table.as_ref()))?;
     if !args.run.quiet {

@@ -1,6 +1,6 @@
 //! `model-offline place` of a scene in space: singles and pairs.
 
-use super::common::RunArgs;
+use super::common::{RunArgs, StudyProgress};
 use super::error::CliError;
 use super::json::write_json;
 use super::place_text::in_lengths_of;
@@ -11,7 +11,6 @@ use model_offline::scene::space::SpaceScene;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
-use std::sync::OnceLock;
 
 /// What stands where there is no number.
 const NONE: &str = "–";
@@ -26,15 +25,10 @@ pub(super) fn run(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Res
 }
 
 fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), CliError> {
-    let bar = OnceLock::new();
-    let begin = |steps: u64| {
-        bar.get_or_init(|| run.progress(steps));
-    };
-    let progress = || {
-        bar.get().into_iter().for_each(|bar| bar.inc(1));
-    };
+    let bar = StudyProgress::new(run, scene.discretization.resolution);
+    let (begin, progress) = (|steps: u64| bar.begin(steps), || bar.step());
     let study = SpaceStudy::run(scene, run.threads(), &begin, &progress)?;
-    bar.get().into_iter().for_each(|bar| bar.finish_and_clear());
+    bar.finish();
     write_json(json, &document(&study))?;
     if !run.quiet {
         for [a, b] in overlapping(&study) {

@@ -3,7 +3,7 @@
 use crate::discretization::meshing::StuffingError;
 use crate::discretization::{DiscretizationError, ShapeError, SpatialError};
 use crate::material::MaterialError;
-use crate::number::length;
+use crate::number::{length, short};
 use crate::scene::NoSuchPaddle;
 use crate::solver::equilibrium::{Failure, FailureReason};
 
@@ -95,7 +95,8 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached: the best estimate is {reached:.4}; take a larger tolerance, or fem-t6 (in space fem-t10), which converge faster than the others"
+        "tolerance {tolerance} was not reached: the best estimate is {}; take a larger tolerance, or fem-t6 (in space fem-t10), which converge faster than the others",
+        short(*reached)
     )]
     ToleranceNotReached {
         /// Asked for.

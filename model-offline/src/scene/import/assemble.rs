@@ -47,18 +47,37 @@ pub(super) fn assemble(
         None => Some("the largest closed shape without a role in its name".to_owned()),
     };
     summary.take(Role::Body, &body.told, note);
+    let drawn: Vec<Point2> = body.points.iter().map(|p| frame.apply(*p)).collect();
+    if let Some(told) = fewer_corners(&outline, &drawn, options.length) {
+        summary.note(format!("outline: {told}"));
+    }
     kept.iter_mut().for_each(|shape| shape.points.iter_mut().for_each(|p| *p = frame.apply(*p)));
     let Flattened { outline, under } = under_paddles(outline, &kept, |p| frame.rounded(p));
     for (shape, by) in under {
         let by = in_unit(by, options.length);
         summary.note(format!("outline: straight under {}, which is stiff; the curve was up to {by} off", shape.told));
     }
-    let mut sorter =
-        Sorter { frame, stress: options.stress, has_named: false, imported: Imported::of(outline.clone(), Vec::new()) };
+    let mut sorter = Sorter {
+        frame,
+        length: options.length,
+        stress: options.stress,
+        has_named: false,
+        imported: Imported::of(outline.clone(), Vec::new()),
+    };
     sorter.imported.summary = summary;
     sorter.imported.material = sorter.preset(body.preset, &body.told);
     sorter.sort(&Along::new(&outline), kept);
     Ok(sorter.imported)
+}
+
+/// What a region has lost of its drawing (scene units): details that are smaller than nodes could show. Points between
+/// others on a line are nothing that is lost.
+fn fewer_corners(region: &Polygon, drawn: &[Point2], length: &str) -> Option<String> {
+    let (low, high) = bounds(drawn);
+    let off = drawn.iter().map(|p| region.distance_to_boundary(*p)).fold(0.0, f64::max);
+    let (corners, points) = (region.vertices().len(), drawn.len());
+    let is_less = corners < points && off > 1e-2 * DETAIL * (high - low).max();
+    is_less.then(|| format!("{corners} corners for {points} points of the drawing, up to {} off", in_unit(off, length)))
 }
 
 /// Which shape is the body.
@@ -148,6 +167,7 @@ impl Frame {
 
 struct Sorter<'a> {
     frame: Frame,
+    length: &'a str,
     stress: &'a str,
     /// Whether some shape is an inclusion by its name.
     has_named: bool,
@@ -228,6 +248,7 @@ impl Sorter<'_> {
         if !shape.closed {
             notes.push("it is open, and closed by a straight line".to_owned());
         }
+        notes.extend(fewer_corners(&region, &shape.points, self.length));
         let material = self.preset(shape.preset, &shape.told);
         self.take(Role::Inclusion, shape, (!notes.is_empty()).then(|| notes.join("; ")));
         self.imported.inclusions.push(ImportedInclusion { outline: region, material });

@@ -5,6 +5,7 @@ use super::along::{Along, CORNER};
 use super::shape::Shape;
 use crate::geometry::{Location, Point2, Polygon, cross, distance_to_polyline, nearest_on_loop};
 use crate::number::short;
+use crate::scene::middle;
 
 /// What is farther off the outline than this part of the body's size is not meant to be on it.
 pub(super) const OFF: f64 = 0.05;
@@ -201,15 +202,23 @@ pub(super) fn needle(along: &Along<'_>, shape: &Shape) -> Placed<ImportedNeedle>
             begin + back * way
         }
     };
-    let way = tip - entry;
-    if way.norm() <= CORNER * along.size {
+    if (tip - entry).norm() <= CORNER * along.size {
         return Err("it hardly reaches into the body; draw it to where the tip shall be".to_owned());
     }
     if line.windows(2).map(|s| (s[1] - s[0]).norm()).sum::<f64>() > (1.0 + ON) * (tip - begin).norm() {
         note = Some("it is bent: its axis is straight from where it enters to its tip".to_owned());
     }
     let (station, _) = along.station(entry);
-    Ok((ImportedNeedle { contact: contact(along, station), axis: way.normalize(), most: way.norm() }, note))
+    let contact = contact(along, station);
+    // Scenes have it enter in the middle of its contact, and its tip is what it was drawn for.
+    let enters = middle(&contact);
+    let moved = (enters - entry).norm() / along.size;
+    if moved > CORNER {
+        let aside = format!("it enters {} further from the corner, where its contact has room", share(moved));
+        note = Some(note.map_or_else(|| aside.clone(), |before| format!("{before}; {aside}")));
+    }
+    let way = tip - enters;
+    Ok((ImportedNeedle { contact, axis: way.normalize(), most: way.norm() }, note))
 }
 
 /// Where a line first comes in.
@@ -234,17 +243,22 @@ fn entry(outline: &Polygon, line: &[Point2]) -> Option<Point2> {
     None
 }
 
-/// The boundary around an entry: within the edge where that is long enough.
+/// The boundary around an entry: within the edge where that is long enough, and as long on both sides. Only where a
+/// corner leaves less than the shortest contact is it not the middle.
 fn contact(along: &Along<'_>, entry: f64) -> Vec<Point2> {
     let (_, start, end) = along.edge(entry);
-    let length = (CONTACT * (end - start)).max(SHORTEST_CONTACT * along.size).min(0.5 * along.length);
-    let mut from = entry.rem_euclid(along.length) - 0.5 * length;
+    let entry = entry.rem_euclid(along.length);
+    let shortest = SHORTEST_CONTACT * along.size;
+    let length = (CONTACT * (end - start)).max(shortest).min(0.5 * along.length);
     // Not to the corner itself, where it could touch what is on the next edge.
     let margin = 0.02 * (end - start);
     if length + 2.0 * margin <= end - start {
-        from = from.clamp(start + margin, end - margin - length);
+        let room = 2.0 * (entry - start).min(end - entry) - 2.0 * margin;
+        let length = length.min(room.max(shortest));
+        let from = (entry - 0.5 * length).clamp(start + margin, end - margin - length);
         return along.part(from, from + length);
     }
+    let from = entry - 0.5 * length;
     along.part(along.at_corner(from), along.at_corner(from + length))
 }
 
@@ -308,9 +322,15 @@ mod tests {
         let (straight, note) = at(&[[50.0, 90.0], [50.0, 20.0]]);
         assert!(is(&straight.contact, &[[35.0, 60.0], [65.0, 60.0]]), "{:?}", straight.contact);
         assert_eq!((straight.axis, straight.most, note), (Point2::new(0.0, -1.0), 40.0, None));
-        // Near a corner the contact stays on its edge.
-        let (corner, _) = at(&[[96.0, 90.0], [96.0, 20.0]]);
-        assert!(is(&corner.contact, &[[68.0, 60.0], [98.0, 60.0]]), "{:?}", corner.contact);
+        // Near a corner the contact stays on its edge, and gets shorter: the needle enters where it was drawn.
+        let (corner, note) = at(&[[90.0, 90.0], [90.0, 20.0]]);
+        assert!(is(&corner.contact, &[[82.0, 60.0], [98.0, 60.0]]) && note.is_none(), "{corner:?} {note:?}");
+        assert_eq!((corner.axis, corner.most), (Point2::new(0.0, -1.0), 40.0));
+        // Nearer it is moved, says so, and still aims at its tip.
+        let (moved, note) = at(&[[98.5, 90.0], [98.5, 20.0]]);
+        let enters = middle(&moved.contact);
+        assert!(enters.x < 98.0 && note.unwrap().contains("further from the corner"), "{moved:?}");
+        assert!((enters + moved.axis * moved.most - Point2::new(98.5, 20.0)).norm() < 1e-9);
         let (slant, _) = at(&[[0.0, 100.0], [60.0, 40.0]]);
         assert!(
             (slant.axis - Point2::new(1.0, -1.0).normalize()).norm() < 1e-12
