@@ -1,6 +1,7 @@
 //! A placement study as text: a row per paddle and one without, with the error of every number beside it.
 
 use super::common::warned;
+use model_offline::discretization::Resolution;
 use model_offline::model::ModelError;
 use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::accuracy::{AsGood, PaddleErrors, StaticErrors};
@@ -9,6 +10,8 @@ use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PaddleResult, PlacementStudy};
 use std::fmt::Write as _;
 
+/// An error of a static displacement that is explained, part of the displacement.
+const ROUGH: f64 = 0.1;
 /// What stands where there is no number.
 const NONE: &str = "–";
 /// What marks the best of a column, and the others.
@@ -157,5 +160,23 @@ fn how_known(study: &PlacementStudy, known: &StudyAccuracy) -> String {
         };
         let _ = writeln!(out, "static displacements without an error: {why}");
     }
+    if let (Some(nodes), true) = (known.errors.second_nodes, is_static_rough(study, known)) {
+        let _ = writeln!(
+            out,
+            "static displacements are told with how far those on {nodes} other nodes are off: the tolerance is of \
+             controllability"
+        );
+    }
     out
+}
+
+/// Whether some static displacement of a scene with a tolerance is known to a tenth of itself at best.
+fn is_static_rough(study: &PlacementStudy, known: &StudyAccuracy) -> bool {
+    if !matches!(study.model.scene().discretization.resolution, Resolution::Tolerance(_)) {
+        return false;
+    }
+    let pairs = study.placement.paddles.iter().zip(&known.errors.paddles);
+    let mut errors =
+        pairs.map(|(paddle, errors)| (paddle.static_study.max_orthogonal, errors.static_study.max_orthogonal));
+    errors.any(|(value, error)| error.is_some_and(|error| error > ROUGH * value))
 }

@@ -130,7 +130,9 @@ fn second_model(scene: &Scene) -> Option<TissueModel> {
 fn follow_all(model: &TissueModel, threads: usize) -> Result<Vec<FollowedInsertion>, ModelError> {
     let count = model.scene().paddles.len();
     let newton = newton_for(Resolution::Level(LEVEL));
-    parallel::map(count + 1, threads, |i| follow(model, (i < count).then_some(i), newton, &|| {})).into_iter().collect()
+    parallel::map(count + 1, threads, |i| follow(model, (i < count).then_some(i), newton, None, &|| {}))
+        .into_iter()
+        .collect()
 }
 
 /// What is known at rest.
@@ -150,7 +152,7 @@ impl<'a> Rest<'a> {
         (Vector2::from(per_depth) - self.reference.responses()[i].target_per_depth).norm() + self.open_per_depth
     }
 
-    /// The same of the model that the insertion is followed on.
+    /// The same of the insertion.
     fn slope_error(&self, i: usize, paddle: &PaddleResult) -> f64 {
         self.per_depth_error(i, paddle.static_study.target_per_depth)
     }
@@ -165,7 +167,6 @@ impl<'a> Rest<'a> {
             controllability_measure: measure.is_finite().then_some(measure),
             best_direction: directions.map(|(found, limit)| (found - limit).norm() + open * limit.norm()),
             target_per_depth: self.per_depth_error(i, paddle.target_per_depth),
-            // The insertion may be that of a coarser model, which starts off with an error of its own.
             static_study: followed.errors(second, self.slope_error(i, paddle)),
         }
     }

@@ -5,7 +5,7 @@ use super::controllability::rows;
 use super::hindrance::{Hindrance, hindrance};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::Resolution;
-use crate::model::{ModelError, TissueModel};
+use crate::model::{Body, ModelError, TissueModel};
 use crate::parallel;
 use crate::scene::Scene;
 use crate::solver::equilibrium::{Failure, FailureReason, NewtonSettings};
@@ -27,7 +27,7 @@ pub struct StaticFailure {
 /// The insertion with a static paddle: attached, and held still.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct StaticStudy {
-    /// d(target displacement)/d(depth) at zero depth, on the model that the insertion is followed on.
+    /// d(target displacement)/d(depth) at zero depth.
     pub target_per_depth: [f64; 2],
     /// Needle depths, from the first increment.
     pub depth: Vec<f64>,
@@ -136,7 +136,9 @@ impl Default for PlacementOptions<'_> {
 }
 
 /// Studies every paddle of the model's scene. Jacobians at rest are those of the model itself; on a model that was refined to
-/// a tolerance, the insertion is followed to depth on its [`profile_model`].
+/// a tolerance, the insertion is followed to depth on its [`profile_model`], which says only what the law's nonlinearity adds
+/// where its nodes are fewer: at rest the insertion answers as the model itself, `u(d) = u_c(d) + (u′ − u_c′) d`, and so do
+/// the Jacobians along it.
 ///
 /// # Errors
 /// [`ModelError`] when the body at rest cannot be solved. A static run that stops early and a paddle that cannot control
@@ -151,8 +153,14 @@ pub fn place(model: &TissueModel, options: &PlacementOptions<'_>) -> Result<Plac
     let newton = options.newton.unwrap_or_else(|| newton_for(resolution));
     let rest = rest_responses(model)?;
     // Every paddle, and none at the end of the list.
+    let mut at_rest: Vec<Option<AtRest>> = vec![None; rest.len() + 1];
+    if profile.nodes() != model.nodes() {
+        let known = rest.iter().map(|r| AtRest { per_depth: r.target_per_depth, jacobian: Some(r.jacobian) });
+        let without = AtRest { per_depth: model.body(None, newton)?.depth_sensitivity()?, jacobian: None };
+        at_rest = known.chain([without]).map(Some).collect();
+    }
     let insertions = parallel::map(rest.len() + 1, options.threads, |i| {
-        follow(&profile, (i < rest.len()).then_some(i), newton, options.progress)
+        follow(&profile, (i < rest.len()).then_some(i), newton, at_rest[i].as_ref(), options.progress)
     });
     let mut insertions = insertions.into_iter().collect::<Result<Vec<_>, _>>()?;
     let without = insertions.pop().unwrap_or_default();
@@ -207,7 +215,24 @@ pub(super) struct FollowedInsertion {
     pub study: StaticStudy,
 }
 
-/// Follows the insertion at the scene's increments, until it stops.
+/// What a better model answers at rest, with a paddle or without one.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AtRest {
+    pub per_depth: Vector2<f64>,
+    pub jacobian: Option<Matrix2<f64>>,
+}
+
+impl AtRest {
+    /// What it answers beside a body, which is at rest.
+    fn beside(&self, body: &mut Body<'_>, per_depth: Vector2<f64>) -> Result<Self, ModelError> {
+        let own = self.jacobian.map(|_| body.actuation_jacobian()).transpose()?;
+        let jacobian = self.jacobian.zip(own).map(|(better, own)| better - own);
+        Ok(Self { per_depth: self.per_depth - per_depth, jacobian })
+    }
+}
+
+/// Follows the insertion at the scene's increments, until it stops; where a better model has been heard, corrected by what it
+/// answers at rest.
 ///
 /// # Errors
 /// [`ModelError`] when the body at rest cannot be solved.
@@ -215,6 +240,7 @@ pub(super) fn follow(
     model: &TissueModel,
     paddle: Option<usize>,
     newton: NewtonSettings,
+    at_rest: Option<&AtRest>,
     progress: &(dyn Fn() + Sync),
 ) -> Result<FollowedInsertion, ModelError> {
     let scene = model.scene();
@@ -222,7 +248,9 @@ pub(super) fn follow(
     let mut body = model.body(paddle, newton)?;
     let mut followed = FollowedInsertion::default();
     let study = &mut followed.study;
-    study.target_per_depth = body.depth_sensitivity()?.into();
+    let per_depth = body.depth_sensitivity()?;
+    let beside = at_rest.map(|better| better.beside(&mut body, per_depth)).transpose()?;
+    study.target_per_depth = at_rest.map_or(per_depth, |better| better.per_depth).into();
     let increments = scene.needle.increments;
     for increment in 1..=increments {
         progress();
@@ -231,14 +259,16 @@ pub(super) fn follow(
         let jacobian = outcome.and_then(|()| paddle.map(|_| body.actuation_jacobian()).transpose());
         match jacobian {
             Ok(jacobian) => {
-                let displacement = body.target_displacement();
+                let added = beside.map_or_else(Vector2::zeros, |beside| beside.per_depth * depth);
+                let displacement = body.target_displacement() + added;
                 let orthogonal = displacement.dot(&normal);
                 study.depth.push(depth);
                 study.target_displacement.push(displacement.into());
                 study.orthogonal.push(orthogonal);
                 study.max_orthogonal = study.max_orthogonal.max(orthogonal.abs());
                 study.reached_depth = depth;
-                followed.jacobians.extend(jacobian.as_ref().map(rows));
+                let added = beside.and_then(|beside| beside.jacobian).unwrap_or_else(Matrix2::zeros);
+                followed.jacobians.extend(jacobian.map(|jacobian| rows(&(jacobian + added))));
             }
             Err(Failure { reason, detail, .. }) => {
                 study.reached_depth = body.depth();
@@ -309,5 +339,41 @@ fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
     Optimum {
         static_paddle: static_paddle.map_or(0, |p| p.index),
         dynamic_paddle: least(paddles.iter().map(|p| (p.index, p.controllability_measure))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::adaptive::discretise;
+    use super::*;
+    use crate::discretization::{Integration, Method};
+
+    /// Followed on few nodes, an insertion still begins as the model that was refined answers at rest.
+    #[test]
+    fn an_insertion_on_coarser_nodes_begins_as_the_accurate_model_answers() {
+        let mut scene = Scene::bundled("paper").unwrap().without_inclusions();
+        scene.discretization.method = Method::new(Integration::FemT6);
+        scene.discretization.resolution = Resolution::Tolerance(0.003);
+        scene.needle.depth *= 1e-4;
+        scene.needle.increments = 1;
+        let (model, _) = discretise(&scene).unwrap();
+        let placement = place(&model, &PlacementOptions::default()).unwrap();
+        assert!(placement.profile_nodes < model.nodes(), "{} nodes are followed themselves", model.nodes());
+        let coarse = rest_responses(&profile_model(&model).unwrap()).unwrap();
+        let off = |found: [f64; 2], rest: [f64; 2]| {
+            (Vector2::from(found) - Vector2::from(rest)).norm() / Vector2::from(rest).norm()
+        };
+        for (paddle, coarse) in placement.paddles.iter().zip(coarse) {
+            let study = &paddle.static_study;
+            let slope = study.target_displacement[0].map(|u| u / study.depth[0]);
+            let [followed, uncorrected] =
+                [slope, coarse.target_per_depth.into()].map(|u| off(u, paddle.target_per_depth));
+            assert!(followed < 1e-4 && uncorrected > 1e-3, "{}: {followed}, {uncorrected}", paddle.index);
+            let [rest, along] = [paddle.jacobian, paddle.jacobians[0]].map(|j| Matrix2::from_row_slice(&j.concat()));
+            assert!((along - rest).norm() < 1e-4 * rest.norm(), "{}: {along} {rest}", paddle.index);
+            assert_eq!(study.target_per_depth, paddle.target_per_depth);
+        }
+        let none = &placement.no_paddle.static_study;
+        assert!(off(none.target_displacement[0].map(|u| u / none.depth[0]), none.target_per_depth) < 1e-4);
     }
 }
