@@ -210,3 +210,28 @@ fn unit<T: Scalar, const D: usize>(field: Field, vector: &SVector<T, D>) -> Resu
     finite(field, vector.as_slice())?;
     ensure((vector.norm().to_f64() - 1.0).abs() <= T::UNIT_TOLERANCE, TableError::NotUnit { field })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+
+    /// Of diagonal matrices every one of them is known: √(Σm · Σ1/m) with m = w₁a₁² + w₂a₂².
+    #[test]
+    fn condition_numbers_of_diagonal_jacobians_are_known() {
+        let one = Matrix2::from_diagonal(&Vector2::new(1.0, 2.0));
+        assert!((condition_number(&one) - 2.5).abs() < 1e-12);
+        assert_eq!(joint_condition_number(&[one], &[0.3]), condition_number(&one));
+        let (first, second) = (Vector3::new(1.0, 2.0, 3.0), Vector3::new(0.5, 0.0, -1.0));
+        let together = joint_condition_number(&[first, second].map(|a| Matrix3::from_diagonal(&a)), &[1.0, 0.25]);
+        let m = [1.0 + 0.25 * 0.25, 4.0, 9.0 + 0.25];
+        let known: f64 = m.iter().sum::<f64>() * m.iter().map(|m| 1.0 / m).sum::<f64>();
+        assert!((together - known.sqrt()).abs() < 1e-12, "{together}");
+        assert_eq!(joint_condition_number(&[Matrix2::<f64>::zeros(); 2], &[1.0, 1.0]), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_motion_costs_what_the_limits_say() {
+        assert_eq!(relative_weights(&[2.0, 4.0, 1.0]), [0.25, 1.0, 0.0625]);
+    }
+}
