@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Matrix3x2, Rotation3, SMatrix, SVector, Vector3};
 use super::*;
 use crate::contract::frames::{MAX_DIMENSION, TARGET_VISIBLE};
 use crate::contract::{Gains, Knot, NeedleSample, Paddle, PaddleSample, SpatialTable, Units, Validity};
+use crate::controller::feedback::Setting;
 use crate::law::{Direction, Feedback};
 use crate::scalar::Scalar;
 
@@ -412,6 +413,33 @@ fn what_a_saturated_paddle_cannot_give_the_other_gives() {
             }
             assert!(closed.error() < 1e-6, "{feedback:?} {direction:?}: {}", closed.error());
         }
+    }
+}
+
+/// What is beyond a limit is given in full by a paddle that moves the target across the needle, which is known then, and not
+/// by one that moves nothing.
+#[test]
+fn what_is_handed_over_is_known_to_be_given_or_not() {
+    let able = pair();
+    let unable = Tissue { jacobians: [able.jacobians[0], Matrix3::zeros()], ..able.clone() };
+    for (tissue, expected) in [(able, true), (unable, false)] {
+        let table = tissue.table(Direction::MinimumNorm);
+        let controller = Controller::new(&table, &settings()).unwrap();
+        let mut goals = Matrix3x2::from_columns(&[Vector3::new(0.09, 0.0, 0.0), Vector3::zeros()]);
+        let setting = Setting {
+            time_ns: 0,
+            location: table.locate(0.5 * DEPTH).unwrap(),
+            feed_forward: Matrix3x2::zeros(),
+            previous: Matrix3x2::zeros(),
+            limits: controller.runtime.paddles.each_ref().map(|paddle| paddle.limits),
+        };
+        assert_eq!(controller.hand_over(&mut goals, &setting), expected);
+        // 0.04 of the 0.09 is more than the first paddle may.
+        let across = |moved: Vector3<f64>| tissue.orthogonal.tr_mul(&moved);
+        let (lost, given) =
+            (across(tissue.jacobians[0] * Vector3::x() * 0.04), across(tissue.jacobians[1] * goals.column(1)));
+        assert!(!expected || (given - lost).norm() < 1e-12, "{given} {lost}");
+        assert!(expected || goals.column(1).norm() == 0.0, "{goals}");
     }
 }
 
