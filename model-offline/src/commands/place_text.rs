@@ -80,7 +80,10 @@ fn static_part(
         .failure
         .as_ref()
         .map_or(String::new(), |f| format!("  stopped at depth {}: {}", length(f.depth), f.reason));
-    format!("{:23.digits$}{mark} {error:>8}   {share:>12}{stopped}", study.max_orthogonal)
+    // Of an insertion that stopped at once nothing is known.
+    let largest = study.depth.last().map(|_| format!("{:.digits$}", study.max_orthogonal));
+    let largest = largest.unwrap_or_else(|| NONE.to_owned());
+    format!("{largest:>23}{mark} {error:>8}   {share:>12}{stopped}")
 }
 
 fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
@@ -152,7 +155,9 @@ fn how_known(study: &PlacementStudy, known: &StudyAccuracy) -> String {
     if placement.profile_nodes != study.model.nodes() {
         let _ = writeln!(out, "the insertion was followed on {} nodes", placement.profile_nodes);
     }
-    let unknown = known.errors.paddles.iter().any(|p| p.static_study.max_orthogonal.is_none());
+    let studies = placement.paddles.iter().zip(&known.errors.paddles);
+    let mut followed = studies.filter(|(paddle, _)| !paddle.static_study.depth.is_empty());
+    let unknown = followed.any(|(_, errors)| errors.static_study.max_orthogonal.is_none());
     if unknown {
         let why = match known.errors.second_nodes {
             Some(nodes) => format!("the insertion on other nodes ({nodes}) does not get as deep"),

@@ -198,7 +198,8 @@ impl Followed<'_> {
             .collect();
         let jacobians = self.jacobians.iter().enumerate();
         StaticErrors {
-            max_orthogonal: target_displacement.iter().copied().try_fold(0.0, |m: f64, e| Some(m.max(e?))),
+            // Of an insertion that stopped at once nothing is known.
+            max_orthogonal: target_displacement.iter().copied().reduce(|m, e| Some(m?.max(e?))).flatten(),
             target_displacement,
             jacobians: jacobians.map(|(k, j)| Some(relative(&matrix(j), &matrix(second.jacobians.get(k)?)))).collect(),
         }
