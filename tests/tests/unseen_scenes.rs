@@ -4,6 +4,7 @@
 
 use model_offline::discretization::{Integration, Method, Resolution};
 use model_offline::placement::adaptive::discretise;
+use model_offline::placement::{PlacementOptions, place};
 use model_offline::scene::Scene;
 use tests::estimates::{Outcome, PaddleOutcome, SCENES, TOLERANCE, outcome};
 
@@ -30,6 +31,61 @@ fn check(text: &str) {
         );
         if truth > ACCIDENT * TOLERANCE {
             assert!(estimated <= 3.0 * (truth + open), "‖J⁻¹n‖ = {measure}: {truth} true, {estimated} estimated");
+        }
+    }
+}
+
+/// A lopsided body whose corner lies there.
+fn lopsided(at: [f64; 2], integration: Integration) -> Scene {
+    let point = |x: f64, y: f64| format!("[{:?}, {:?}]", at[0] + x, at[1] + y);
+    let points = |points: &[[f64; 2]]| {
+        let points: Vec<String> = points.iter().map(|[x, y]| point(*x, *y)).collect();
+        format!("[{}]", points.join(", "))
+    };
+    let text = format!(
+        r#"
+        scene = {{ name = "lopsided", dimension = 2, units = {{ length = "1", stress = "1" }} }}
+        domain.outline = {outline}
+        material = {{ model = "neo-hookean", lambda = 4.0, mu = 1.0 }}
+        inclusion = [{{ outline = {inclusion}, stiffness = 5.0 }}]
+        immobile.paths = [{immobile}]
+        needle = {{ contact = {contact}, axis = [1.0, 0.0], depth = 0.1, increments = 2 }}
+        target.position = {target}
+        paddle = [{{ index = 1, segment = {first} }}, {{ index = 3, segment = {second} }}]
+        discretization = {{ spacing = 0.12 }}
+        "#,
+        outline = points(&[[0.0, 0.0], [2.1, -0.2], [2.4, 0.9], [1.5, 1.6], [0.0, 1.4]]),
+        inclusion = points(&[[0.9, 0.5], [1.3, 0.45], [1.35, 0.85], [0.95, 0.9]]),
+        immobile = points(&[[0.0, 0.0], [2.1, -0.2]]),
+        contact = points(&[[0.0, 0.6], [0.0, 0.9]]),
+        target = point(1.0, 0.62),
+        first = points(&[[2.16, 0.02], [2.28, 0.46]]),
+        second = points(&[[1.2, 1.56], [0.6, 1.48]]),
+    );
+    let mut scene = Scene::parse(&text, "lopsided").unwrap();
+    scene.discretization.method = Method::new(integration);
+    scene
+}
+
+/// Where the body lies is no part of the answer. On even nodes four cells meet in one corner, which far from the origin is four
+/// that lie apart by rounding.
+#[test]
+fn a_body_far_from_the_origin_is_the_same_body() {
+    for integration in [Integration::ScniStabilised, Integration::Mscni, Integration::Scni, Integration::FemT6] {
+        let found = |at: [f64; 2]| {
+            let (model, _) = discretise(&lopsided(at, integration)).unwrap();
+            let study = place(&model, &PlacementOptions::default()).unwrap();
+            let held = study.no_paddle.static_study.orthogonal;
+            let moved = study.paddles.iter().map(|paddle| paddle.controllability_measure);
+            moved.chain(held).collect::<Vec<f64>>()
+        };
+        let here = found([0.0, 0.0]);
+        assert_eq!(here.len(), 4, "{integration:?}: {here:?}");
+        for at in [[200.0, 0.0], [800.0, -560.0], [1e4, -7e3]] {
+            let there = found(at);
+            for (here, there) in here.iter().zip(&there) {
+                assert!((there / here - 1.0).abs() < 1e-5, "{integration:?} {at:?}: {here} {there}");
+            }
         }
     }
 }

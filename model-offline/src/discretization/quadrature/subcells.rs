@@ -25,8 +25,13 @@ use crate::geometry::{Point, Point2, cross};
 pub const STABILISATION: f64 = 1.0;
 /// Triangles below this share of their cell's area have none: the node lies on that edge.
 const DEGENERATE: f64 = 1e-12;
+/// Nor have those whose area is not this many times what rounding leaves of it: far from the origin corners that are one,
+/// of four cells that meet, lie apart by rounding, and what is between them has gradients of any size.
+const ROUNDED: f64 = 1e4;
 /// Ends of an edge that differ by less than this, over the support's half-width, are the same: two cells compute them each.
 const SAME_END: f64 = 1e-12;
+/// Nor do they where it is by so many roundings of their coordinates.
+const ROUNDINGS: f64 = 16.0;
 
 /// SCNI with the constant stabilisation of weight `alpha`; see the module documentation.
 ///
@@ -69,7 +74,7 @@ pub fn modified_scni(shape: &ShapeFunctions<'_, 2>, cells: &[NodalCell]) -> Resu
     for (node, cell) in cells.iter().enumerate() {
         subcells.compute(node, cell)?;
         // A cell that its node does not see all of (at a notch) has triangles that overlap; its mean serves there.
-        if subcells.areas.is_empty() || subcells.areas.iter().any(|a| *a < -DEGENERATE * cell.area) {
+        if subcells.areas.is_empty() || subcells.areas.iter().any(|a| *a < -subcells.no_area) {
             rule.push(cell.area, node, &subcells.nodes, &subcells.mean);
             continue;
         }
@@ -92,6 +97,8 @@ struct Subcells<'a, 'c> {
     mean: Vec<Point<2>>,
     /// Signed areas of the triangles.
     areas: Vec<f64>,
+    /// Triangles of no larger area are degenerate.
+    no_area: f64,
     /// Mean gradients over the triangles, one row of `nodes.len()` after the other.
     gradients: Vec<Point<2>>,
     candidates: Vec<u32>,
@@ -115,6 +122,7 @@ impl<'a, 'c> Subcells<'a, 'c> {
             nodes: Vec::new(),
             mean: Vec::new(),
             areas: Vec::new(),
+            no_area: 0.0,
             gradients: Vec::new(),
             candidates: Vec::new(),
             stencil: Stencil::default(),
@@ -125,12 +133,11 @@ impl<'a, 'c> Subcells<'a, 'c> {
     /// Triangles that are not degenerate: area and gradients. Areas of triangles that the cell's shape turns over count
     /// as positive: what is summed over them is an energy.
     fn triangles(&self) -> impl Iterator<Item = (f64, &[Point<2>])> {
-        let total: f64 = self.areas.iter().map(|a| a.abs()).sum();
         self.areas
             .iter()
             .map(|a| a.abs())
             .zip(self.gradients.chunks_exact(self.nodes.len()))
-            .filter(move |(area, _)| *area > DEGENERATE * total)
+            .filter(|(area, _)| *area > self.no_area)
     }
 
     /// The next cell: nodes are taken in ascending order, each once, so that an edge between two of them is integrated once.
@@ -173,6 +180,9 @@ impl<'a, 'c> Subcells<'a, 'c> {
             }
             self.areas.extend(seen.then_some(area));
         }
+        let total: f64 = self.areas.iter().map(|a| a.abs()).sum();
+        let rounding = f64::EPSILON * low.amax().max(high.amax()) * (high - low).norm();
+        self.no_area = (DEGENERATE * total).max(ROUNDED * rounding);
         Ok(())
     }
 
@@ -205,7 +215,8 @@ impl<'a, 'c> Subcells<'a, 'c> {
         if across == Across::Bridge {
             return Ok(vec![0.0; self.candidates.len()]);
         }
-        let same = SAME_END * self.shape.cloud().half_widths()[node];
+        let rounding = f64::EPSILON * a.amax().max(b.amax());
+        let same = (SAME_END * self.shape.cloud().half_widths()[node]).max(ROUNDINGS * rounding);
         if let Some(edge) = known.iter().find(|e| (e.from - a).amax() <= same && (e.to - b).amax() <= same) {
             let mut means = edge.means.iter().peekable();
             let mean = |i: &u32| means.next_if(|(node, _)| node == i).map_or(0.0, |(_, mean)| *mean);
