@@ -206,6 +206,20 @@ mod tests {
         }
     }
 
+    /// A second paddle that moves nothing changes nothing of how the first one is damped.
+    #[test]
+    fn several_are_damped_as_one() {
+        let n = Vector2::new(0.6, 0.8);
+        for condition in [20.0, 99.0, 101.0, 1e3] {
+            let x: f64 = 0.5 * (condition + (condition * condition - 4.0_f64).sqrt());
+            let jacobian = Matrix2::new(3.0, 0.2, 0.0, 3.0 / x);
+            let expected = solve(Direction::Inverse, jacobian, &n);
+            let [found, still] = Direction::Inverse.solve(&[jacobian, Matrix2::zeros()], &n, &[1.0, 1.0]);
+            assert!((found - expected).norm() < 1e-9 * expected.norm(), "{condition}: {found} {expected}");
+            assert_eq!(still, Vector2::zeros());
+        }
+    }
+
     #[test]
     fn near_singular_directions_stay_bounded() {
         for exponent in 1..=12 {

@@ -293,6 +293,19 @@ mod tests {
         }
     }
 
+    /// Frames with number 0 that nobody follows are counted, and the one that is followed is no replay.
+    #[test]
+    fn starts_that_are_not_followed_are_counted() {
+        let start = &frames(1)[0];
+        let mut reader = FrameReader::new();
+        for times in 1..=3 {
+            assert_eq!(start.iter().find_map(|byte| reader.feed(*byte)), Some(Frame::Start));
+            assert_eq!((reader.ledger().replayed_starts, reader.ledger().starts), (times, 0));
+        }
+        reader.follow();
+        assert_eq!((reader.ledger().replayed_starts, reader.ledger().starts), (2, 1));
+    }
+
     #[test]
     fn doubled_late_and_lost_frames_are_told_apart() {
         let f = frames(6);

@@ -87,3 +87,17 @@ impl<const D: usize, const P: usize> InnovationGate<D, P> {
         if are_within(current, previous, gate) { Ok(()) } else { Err(Discard::Innovation) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Larger component plus (√2 − 1) times the smaller one, and the same of those two and the third.
+    #[test]
+    fn what_was_travelled_is_a_difference() {
+        const K: f64 = core::f64::consts::SQRT_2 - 1.0;
+        assert!((farthest(&[5.0, 1.0], &[1.0, 0.5]) - (4.0 + 0.5 * K)).abs() < 1e-15);
+        assert!((farthest(&[1.5, 1.0, 7.0], &[1.0, 0.5, 3.0]) - (4.0 + (0.5 + 0.5 * K) * K)).abs() < 1e-15);
+        assert_eq!(farthest(&[2.0; 3], &[2.0; 3]), 0.0);
+    }
+}

@@ -147,6 +147,10 @@ fn commands_are_the_controllers<T: Scalar>() {
         })
         .collect();
     assert!(commands.iter().eq(expected.iter().map(|(_, command)| command)));
+    // The host is told once that the board is ready, and before anything is commanded.
+    let ready: Vec<usize> = (0..replies.len()).filter(|i| matches!(replies[*i], Reply::Ready)).collect();
+    let first = replies.iter().position(|reply| matches!(reply, Reply::Command { .. }));
+    assert!(ready.len() == 1 && first.is_some_and(|first| ready[0] < first), "{ready:?} {first:?}");
     let Some(Reply::Account(account)) = replies.last() else { panic!("no account: {:?}", replies.last()) };
     assert_eq!((account.ledger.unaccounted(), account.ledger.ticks.due), (0, 300));
     assert_eq!((account.line.frames.unaccounted(), account.line.damaged), (0, 0));

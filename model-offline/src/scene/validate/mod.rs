@@ -217,9 +217,9 @@ impl Validator<'_> {
             ));
         }
         let axis = self.point(section.axis.get(), section.axis.span(), "needle axis")?;
-        if axis.norm() < 1e-12 {
+        let Some(axis) = direction_of(axis) else {
             return Err(self.error(section.axis.span(), "the needle axis has no direction", "e.g. axis = [0.0, -1.0]"));
-        }
+        };
         let increments = *section.increments.get();
         if !(1..=10_000).contains(&increments) {
             return Err(self.error(
@@ -245,7 +245,7 @@ impl Validator<'_> {
                 "give a length, positive or negative, no more than the depth",
             )),
         })?;
-        Ok(Needle { contact, axis: axis.normalize(), depth, increments, deflection, speed, shaft: None })
+        Ok(Needle { contact, axis, depth, increments, deflection, speed, shaft: None })
     }
 
     fn target(&self, target: Point2, around: &Surroundings<'_>) -> Checked<()> {
@@ -415,6 +415,14 @@ impl Validator<'_> {
     }
 }
 
+/// The unit vector along another; none along one without a length. The square of a very long or short vector is no number.
+fn direction_of(vector: Point2) -> Option<Point2> {
+    let longest = vector.amax();
+    let unit = vector.normalize();
+    let is_unit = (unit.norm() - 1.0).abs() < 1e-9;
+    (longest > 0.0).then(|| if is_unit { unit } else { (vector / longest).normalize() })
+}
+
 fn touch(a: &[Point2], b: &[Point2; 2], tolerance: f64) -> bool {
     crate::geometry::segments_meet(a[0], a[1], b[0], b[1], tolerance)
 }
@@ -436,4 +444,19 @@ fn overlap(a: &Polygon, b: &Polygon) -> f64 {
             if signed == 0.0 { 0.0 } else { signed.signum() * crate::geometry::overlap_area(b, &triangle) }
         })
         .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_of_any_length_have_a_direction_but_for_none() {
+        for scale in [1.0, 1e-13, 1e-200, 1e200, 1e300, f64::MIN_POSITIVE] {
+            let found = direction_of(Point2::new(3.0, -4.0) * (0.25 * scale)).unwrap();
+            assert!((found - Point2::new(0.6, -0.8)).norm() < 1e-15, "{scale}: {found}");
+        }
+        assert_eq!(direction_of(Point2::new(1e200, 0.0)), Some(Point2::x()));
+        assert_eq!(direction_of(Point2::zeros()), None);
+    }
 }

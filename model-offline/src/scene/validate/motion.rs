@@ -1,6 +1,6 @@
 //! The rules of what moves a patient.
 
-use super::{Checked, Validator};
+use super::{Checked, Validator, direction_of};
 use crate::geometry::Point2;
 use crate::scene::schema::Located;
 use crate::scene::{Breathing, Motion, Surge};
@@ -46,10 +46,8 @@ impl Validator<'_> {
 
     fn direction(&self, direction: &Located<[f64; 2]>) -> Checked<Point2> {
         let vector = self.point(direction.get(), direction.span(), "direction")?;
-        if vector.norm() < 1e-12 {
-            return Err(self.error(direction.span(), "this motion has no direction", "e.g. direction = [0.0, 1.0]"));
-        }
-        Ok(vector.normalize())
+        direction_of(vector)
+            .ok_or_else(|| self.error(direction.span(), "this motion has no direction", "e.g. direction = [0.0, 1.0]"))
     }
 
     fn recorded(&self, rows: &Located<Vec<[f64; 3]>>) -> Checked<Vec<(f64, Point2)>> {
