@@ -3,7 +3,8 @@
 use assert_cmd::Command;
 use model_offline::model::TissueModel;
 use model_offline::placement::{PlacementOptions, place};
-use model_offline::scene::{BUNDLED, Effect, Scene};
+use model_offline::scene::space::AnyScene;
+use model_offline::scene::{BUNDLED, BUNDLED_IN_SPACE, Effect, Scene};
 use std::path::Path;
 use strum::VariantArray as _;
 
@@ -393,4 +394,29 @@ fn scenes_say_what_is_wrong_with_a_motion() {
     // A scene whose breaths are alike is the same file as ever: tables and snapshots are known by its hash.
     let alike = serde_json::json!(read(&breathing("period_variation = 0.0")).unwrap().motion);
     assert_eq!(alike["breathing"].as_object().unwrap().len(), 3, "{alike}");
+}
+
+/// TOML's reader drops what a list has too much: three coordinates in the plane were two.
+#[test]
+fn coordinates_of_another_dimension_are_refused_wherever_they_stand() {
+    let bundled = |name: &str| BUNDLED.iter().chain(&BUNDLED_IN_SPACE).find(|(other, _)| *other == name).unwrap().1;
+    for (name, given, wrong) in [
+        ("paper", "position = [0.5, 0.5]", "position = [0.5, 0.5, 7.0]"),
+        ("paper", "axis = [0.0, -1.0]", "axis = [0.0, -1.0, 0.0]"),
+        ("paper", "outline = [[0.5, 0.0],", "outline = [[0.5, 0.0, 7.0],"),
+        ("paper", "outline = [[0.55, 0.25],", "outline = [[0.55, 0.25, 7.0],"),
+        ("paper", "paths = [[[1.0, 0.0],", "paths = [[[1.0, 0.0, 7.0],"),
+        ("paper", "contact = [[0.4, 1.0], [0.6, 1.0]]", "contact = [[0.4, 1.0], [0.6, 1.0, 7.0]]"),
+        ("paper", "segment = [[0.4, 0.1], [0.3, 0.2]]", "segment = [[0.4, 0.1], [0.3, 0.2], [0.2, 0.3]]"),
+        ("paper", "segment = [[0.4, 0.1], [0.3, 0.2]]", "segment = [[0.4, 0.1]]"),
+        ("block", "position = [0.5, 0.5, 0.5]", "position = [0.5, 0.5, 0.5, 7.0]"),
+        ("block", "axis = [0.0, 0.0, -1.0]", "axis = [0.0, 0.0, -1.0, 7.0]"),
+        ("block", "min = [0.6, 0.4, 0.3]", "min = [0.6, 0.4, 0.3, 7.0]"),
+    ] {
+        let text = bundled(name);
+        assert!(text.contains(given), "{name}: {given}");
+        let text = text.replacen(given, wrong, 1);
+        let said = AnyScene::parse(&text, "wrong.toml").expect_err(wrong).to_string();
+        assert!(said.contains("values where there must be"), "{wrong}: {said}");
+    }
 }

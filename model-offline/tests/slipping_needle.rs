@@ -220,6 +220,74 @@ fn base_force_and_target_settle_as_the_mesh_is_refined() {
     }
 }
 
+/// Refined nodes are finest beside paddles. Stations that lie as close together along the needle, where nodes do not, have
+/// more forces than there are freedoms, and none are found that settle.
+#[test]
+fn a_needle_goes_through_nodes_that_are_finer_elsewhere() {
+    let keys = "cutting_force = 15.0\nstatic_friction = 1.5\nkinetic_friction = 1.0\ntip_length = 1.5";
+    let refined = "tolerance = 0.05\nintegration";
+    let [even, meshfree, quadratic] =
+        ["spacing = 2.0", &format!("{refined} = \"scni-stabilised\""), &format!("{refined} = \"fem-t6\"")].map(
+            |nodes| {
+                let (model, _) = discretise(&scene("prostate", 10.0, keys, nodes)).unwrap();
+                let needle = within(&model, Some(2), 10);
+                let places: Vec<f64> = needle.stations().iter().map(|station| station.arc_length).collect();
+                // The tip may be anywhere; the skin counts as well.
+                let stations = &places[..places.len() - 1];
+                let closest = stations.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+                assert!(closest > 0.05, "{nodes}: {places:?}");
+                needle.target_displacement()
+            },
+        );
+    for refined in [meshfree, quadratic] {
+        assert!((refined - even).norm() < 0.03 * even.norm(), "{even} {refined}");
+    }
+}
+
+/// An L whose nodes are finest at its inner corner, far from the needle.
+#[test]
+fn a_needle_goes_into_an_l_on_quadratic_nodes() {
+    let found = ["spacing = 0.03", "tolerance = 0.02\nintegration = \"fem-t6\""].map(|discretization| {
+        let (model, _) = discretise(&an_l(discretization)).unwrap();
+        within(&model, Some(0), 6).target_displacement()
+    });
+    assert!((found[0] - found[1]).norm() < 0.03 * found[1].norm(), "{found:?}");
+}
+
+fn an_l(discretization: &str) -> Scene {
+    let text = format!(
+        r#"
+[scene]
+name = "an L"
+dimension = 2
+units = {{ length = "1", stress = "1" }}
+[domain]
+outline = [[0.0, 0.0], [3.0, 0.0], [3.0, 1.0], [2.0, 1.0], [2.0, 2.0], [0.0, 2.0]]
+[material]
+model = "linear"
+lambda = 4.0
+mu = 1.0
+[immobile]
+paths = [[[0.0, 2.0], [0.0, 0.0]]]
+[needle]
+contact = [[1.2, 0.0], [1.6, 0.0]]
+axis = [0.0, 1.0]
+depth = 0.2
+mechanics = "shaft"
+kinetic_friction = 0.2
+tip_length = 0.016
+[target]
+position = [1.3, 1.0]
+[[paddle]]
+index = 3
+segment = [[2.0, 1.2], [2.0, 1.8]]
+[discretization]
+{discretization}
+"#
+    );
+    Scene::parse(&text, "l.toml").unwrap_or_else(|error| panic!("{error}"))
+}
+
 #[test]
 fn skin_that_holds_is_pushed_as_a_patch_and_skin_that_never_gives_way_is_one() {
     let keys = |force: &str| format!("cutting_force = 1.0\npuncture_force = {force}");

@@ -59,7 +59,10 @@ pub(crate) enum CliError {
     },
     /// The needle cannot go on.
     #[error(transparent)]
-    #[diagnostic(help("insert less deep or in more increments, or with less cutting force and friction"))]
+    #[diagnostic(help(
+        "spread the cutting force over more tip_length (tissue beside a tip bears no more than twice its shear modulus per \
+         length of it, which coarse nodes hide), insert less deep or in more increments, or with less cutting force and friction"
+    ))]
     Needle(#[from] NeedleError),
     /// The model of everything that a scene has cannot be followed.
     #[error(transparent)]

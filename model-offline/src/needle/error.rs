@@ -21,9 +21,7 @@ pub enum NeedleError {
         source: Failure,
     },
     /// No forces along the shaft were found that the tissue and the laws of friction agree on.
-    #[error(
-        "no forces along the shaft fit tissue and friction on the way to depth {depth}: insert in smaller increments"
-    )]
+    #[error("no forces along the shaft fit tissue and friction on the way to depth {depth}")]
     NoForces {
         /// Depth that was asked for, length.
         depth: f64,

@@ -3,6 +3,7 @@
 use super::error::NeedleError;
 use super::path::{CutPath, hat_integrals};
 use super::station::{Slide, Station, StationState, spread};
+use crate::discretization::Integration;
 use crate::geometry::Point2;
 use crate::mechanics::Constraints;
 use crate::model::{Pose, TissueModel};
@@ -93,6 +94,8 @@ pub struct SlippingNeedle<'m> {
     pub(super) last: Vec<f64>,
 }
 
+/// Of one stretch of a needle's way.
+const MOST_STATIONS: usize = 1000;
 /// Largest step of Newton's method at an equilibrium that is kept, over the spacing.
 pub(super) const STEP_TOLERANCE: f64 = 1e-8;
 
@@ -160,12 +163,55 @@ impl<'m> SlippingNeedle<'m> {
         }
         let mut filled = vec![places[0]];
         for pair in places.windows(2) {
-            let gap = pair[1] - pair[0];
-            let count = if self.is_crossed_by_nodes(pair) { (gap / self.model.spacing()).ceil() } else { 1.0 };
-            let count = count.clamp(1.0, 1000.0) as usize;
-            filled.extend((1..=count).map(|k| pair[0] + gap * k as f64 / count as f64));
+            if self.is_crossed_by_nodes(pair) {
+                filled.extend(self.between(pair));
+            }
+            filled.push(pair[1]);
         }
         filled
+    }
+
+    /// Arc lengths within a stretch of the way that are as far apart as the nodes around it.
+    fn between(&self, ends: &[f64]) -> Vec<f64> {
+        let (from, gap) = (ends[0], ends[1] - ends[0]);
+        let at = |s: f64| self.shaft.entry + self.axis() * s;
+        // How many spacings lie before an arc length: straight between points that are half a spacing apart.
+        let mut passed = vec![(from, 0.0)];
+        while let Some(&(s, spacings)) = passed.last()
+            && s < ends[1]
+            && passed.len() < MOST_STATIONS
+        {
+            let step = self.spacing_around(&at(s));
+            let next = f64::min(ends[1], s + 0.5 * step);
+            passed.push((next, spacings + (next - s) / step));
+        }
+        let Some(&(_, all)) = passed.last() else { return Vec::new() };
+        let count = (all - 1e-9).ceil().clamp(1.0, MOST_STATIONS as f64);
+        let even = passed.iter().all(|(s, spacings)| ((s - from) * all - gap * spacings).abs() <= 1e-9 * gap * all);
+        let place = |k: usize| {
+            let share = k as f64 / count;
+            if even {
+                return from + gap * share;
+            }
+            let beyond = passed.partition_point(|(_, spacings)| *spacings < share * all).clamp(1, passed.len() - 1);
+            let ((s, n), (next, then)) = (passed[beyond - 1], passed[beyond]);
+            s + (next - s) * (share * all - n) / (then - n)
+        };
+        (1..count as usize).map(place).collect()
+    }
+
+    /// Distance of the nodes around a point from each other: more stations than they have freedoms would hold each other
+    /// with forces that mean nothing. Of quadratic elements that of the corners.
+    fn spacing_around(&self, x: &Point2) -> f64 {
+        let positions = self.model.positions();
+        let nearest = positions.iter().min_by(|a, b| (*a - x).norm().total_cmp(&(*b - x).norm()));
+        let around = nearest.map_or(0.0, |nearest| {
+            let others = positions.iter().map(|p| (p - nearest).norm()).filter(|distance| *distance > 0.0);
+            others.fold(f64::INFINITY, f64::min)
+        });
+        let per_node =
+            if self.model.scene().discretization.method.integration == Integration::FemT6 { 2.0 } else { 1.0 };
+        (per_node * around).max(self.model.spacing())
     }
 
     /// Whether nodes lie nearer to the middle of a stretch of the way than its ends do.

@@ -17,13 +17,18 @@ const AGREED: f64 = 1e-7;
 const SETTLED: f64 = 1e-6;
 /// Part of the largest force so far below which forces are none: of a body that has come back to rest all are rounding.
 const NEGLIGIBLE: f64 = 1e-3;
-/// Change of the stations' displacements, over the spacing, that is rounding, whatever it is of the forces: of a body that is
-/// carried along there are none.
+/// Change of the stations' displacements that is rounding, whatever it is of the forces (of a body that is carried along there
+/// are none): over the spacing, and over how far from the origin they are.
 const ROUNDING: f64 = 1e-13;
+const ROUNDING_OF_PLACES: f64 = 4.0 * f64::EPSILON;
 /// Rounds of forces and equilibria, and of breaking loose.
 const ROUNDS: usize = 40;
 /// Round from which on what has broken loose stays loose: just where it does, one round may hold it and the next not.
 const DOUBTFUL: usize = 10;
+/// Round from which on only a part of the way to the next forces is taken where the rounds do not come nearer, and the
+/// smallest part: under a tip the tissue stiffens, so that what is found at one force may lead back to the one before.
+const DAMPED: usize = 6;
+const SMALLEST_SHARE: f64 = 0.125;
 /// A compliance that leaves more than this part of the error is computed anew.
 const STALE: f64 = 0.5;
 /// Error of the equilibria on the way, over what the forces changed last, and the largest.
@@ -143,7 +148,7 @@ impl SlippingNeedle<'_> {
         });
         let enough = AGREED * self.model.spacing();
         let mut compliance: Option<DMatrix<f64>> = None;
-        let (mut last, mut fresh) = (f64::INFINITY, false);
+        let (mut last, mut fresh, mut share) = (f64::INFINITY, false, 1.0);
         for round in 0..ROUNDS {
             let external = self.external(&contacts, &forces, &spread);
             let loose = self.drive(depth, &external, last)?;
@@ -174,7 +179,7 @@ impl SlippingNeedle<'_> {
             let moved = &known * (&found - &forces);
             let change = moved.amax().max(off);
             let scale = found.amax().max(NEGLIGIBLE * self.largest_force);
-            let settled = (&found - &forces).amax() <= SETTLED * scale || change <= ROUNDING * self.model.spacing();
+            let settled = (&found - &forces).amax() <= SETTLED * scale || change <= self.rounding();
             if change <= enough && settled && loose <= STEP_TOLERANCE {
                 for (k, contact) in contacts.iter_mut().enumerate() {
                     (contact.across, contact.along) = (forces[k], forces[m + k]);
@@ -185,16 +190,27 @@ impl SlippingNeedle<'_> {
                 self.largest_force = self.largest_force.max(forces.amax());
                 return Ok(Trial { contacts, tip_force: forces[2 * m], tip_displacement });
             }
+            if round >= DAMPED && change > (1.0 - 0.5 * share) * last {
+                share = f64::max(SMALLEST_SHARE, 0.5 * share);
+            } else {
+                share = f64::min(1.0, 2.0 * share);
+            }
+            forces += (found - &forces) * share;
             // Where the tissue will be under the new forces: behind them this would converge half as fast.
-            self.follow_the_tissue(&mut contacts, &(&felt + &moved))?;
+            self.follow_the_tissue(&mut contacts, &(&felt + &(moved * share)))?;
             fresh = change > STALE * last && !fresh;
             if !fresh {
                 compliance = Some(known);
             }
             last = change;
-            forces = found;
         }
         Err(NeedleError::NoForces { depth })
+    }
+
+    /// What is no change of a station's displacement.
+    fn rounding(&self) -> f64 {
+        let (entry, depth) = (self.shaft.entry, self.model.scene().needle.depth);
+        f64::max(ROUNDING * self.model.spacing(), ROUNDING_OF_PLACES * (entry.norm() + depth))
     }
 
     /// Takes the tissue to its equilibrium under loads, as good as the forces are that it is for, which changed it by `last`;

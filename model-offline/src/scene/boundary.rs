@@ -1,5 +1,6 @@
 //! Parts of the boundary as a scene file gives them: by points, or by an edge of the outline and fractions of it.
 
+use super::exactly::{Coordinates, Exactly};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
@@ -39,10 +40,10 @@ pub enum OnBoundary<T> {
 }
 
 /// A polyline.
-pub type BoundaryPath = OnBoundary<Vec<[f64; 2]>>;
+pub type BoundaryPath = OnBoundary<Vec<Coordinates<2>>>;
 
 /// Two ends.
-pub type BoundarySegment = OnBoundary<[[f64; 2]; 2]>;
+pub type BoundarySegment = OnBoundary<Exactly<Coordinates<2>, 2>>;
 
 impl<'de, T: Deserialize<'de>> Deserialize<'de> for OnBoundary<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {

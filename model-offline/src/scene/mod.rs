@@ -3,6 +3,7 @@
 pub mod boundary;
 mod effect;
 mod error;
+pub mod exactly;
 mod facts;
 pub mod import;
 pub mod limits;

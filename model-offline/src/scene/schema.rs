@@ -3,6 +3,7 @@
 
 use super::boundary::{BoundaryPath, BoundarySegment};
 use super::effect::Effect;
+use super::exactly::{Coordinates, Exactly};
 use super::sensor::SensorPreset;
 use super::shaft::Mechanics;
 use crate::choice::choice;
@@ -147,7 +148,7 @@ impl Default for UnitsSection {
 #[serde(deny_unknown_fields)]
 pub struct DomainSection {
     /// Simple polygon, either orientation.
-    pub outline: Located<Vec<[f64; 2]>>,
+    pub outline: Located<Vec<Coordinates<2>>>,
 }
 
 /// A region of another stiffness or material.
@@ -155,7 +156,7 @@ pub struct DomainSection {
 #[serde(deny_unknown_fields)]
 pub struct InclusionSection {
     /// Simple polygon, either orientation.
-    pub outline: Located<Vec<[f64; 2]>>,
+    pub outline: Located<Vec<Coordinates<2>>>,
     /// Factor on the energy (default 1).
     #[serde(default = "unit_stiffness")]
     pub stiffness: Located<f64>,
@@ -190,7 +191,7 @@ pub struct NeedleSection {
     /// Polyline of tissue that moves with the needle, on the boundary or inside, or a part of an edge of the outline.
     pub contact: Located<BoundaryPath>,
     /// Direction of insertion; normalised on reading.
-    pub axis: Located<[f64; 2]>,
+    pub axis: Located<Coordinates<2>>,
     /// How far the needle goes, length units.
     pub depth: Located<f64>,
     /// Into how many increments the insertion is divided (default 10).
@@ -200,7 +201,7 @@ pub struct NeedleSection {
     #[serde(default)]
     pub mechanics: Mechanics,
     /// Where a shaft enters the body (default: the middle of the contact).
-    pub entry: Option<Located<[f64; 2]>>,
+    pub entry: Option<Located<Coordinates<2>>>,
     /// Radius of a shaft, length units (default: a hundredth of the depth).
     pub radius: Option<Located<f64>>,
     /// Length behind the tip that the cutting force is spread over, length units (default: twice the radius).
@@ -232,7 +233,7 @@ pub struct MotionSection {
     /// A cough, or a jerk: there and back once.
     pub surge: Option<SurgeSection>,
     /// A recorded motion: rows of time in s and displacement x, y, linear between them, its ends held.
-    pub recorded: Option<Located<Vec<[f64; 3]>>>,
+    pub recorded: Option<Located<Vec<Exactly<f64, 3>>>>,
 }
 
 /// Breathing: `amplitude · (1 − cos⁴(π t / period))`.
@@ -244,7 +245,7 @@ pub struct BreathingSection {
     /// From exhaled to inhaled, length units.
     pub amplitude: Located<f64>,
     /// Where the body goes with the breath; normalised on reading.
-    pub direction: Located<[f64; 2]>,
+    pub direction: Located<Coordinates<2>>,
     /// Each breath takes up to this part longer or shorter, 0 (the default) to 0.5.
     pub period_variation: Option<Located<f64>>,
     /// Each breath is up to this part larger or smaller, 0 (the default) to 0.5.
@@ -262,7 +263,7 @@ pub struct SurgeSection {
     /// Its largest displacement, length units.
     pub amplitude: Located<f64>,
     /// Where the body goes; normalised on reading.
-    pub direction: Located<[f64; 2]>,
+    pub direction: Located<Coordinates<2>>,
 }
 
 fn ten() -> Located<u32> {
@@ -274,7 +275,7 @@ fn ten() -> Located<u32> {
 #[serde(deny_unknown_fields)]
 pub struct TargetSection {
     /// Where it is before the insertion.
-    pub position: Located<[f64; 2]>,
+    pub position: Located<Coordinates<2>>,
 }
 
 /// A paddle position.
@@ -314,7 +315,7 @@ pub struct SensorSection {
     /// Step of what it reports, length units.
     pub quantisation: Option<Located<f64>>,
     /// Added to every measurement, length units.
-    pub bias: Option<Located<[f64; 2]>>,
+    pub bias: Option<Located<Coordinates<2>>>,
     /// Times without measurements, which begin at random.
     pub outages: Option<Located<OutagesSection>>,
 }

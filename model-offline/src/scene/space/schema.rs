@@ -3,6 +3,7 @@
 use crate::discretization::{Basis, Integration};
 use crate::geometry::{Point, Solid};
 use crate::material::MaterialSection;
+use crate::scene::exactly::{Coordinates, Exactly};
 use crate::scene::schema::{ActuatorSection, Located, SceneSection};
 use schemars::{JsonSchema, Schema};
 use serde::Deserialize;
@@ -56,37 +57,37 @@ pub enum SolidSection {
     /// A box along the axes. One that is flat in a coordinate is, as a region, the part of a face.
     Box {
         /// Lowest corner.
-        min: [f64; 3],
+        min: Coordinates<3>,
         /// Highest corner.
-        max: [f64; 3],
+        max: Coordinates<3>,
     },
     /// A ball.
     Sphere {
         /// Its centre.
-        centre: [f64; 3],
+        centre: Coordinates<3>,
         /// Its radius.
         radius: f64,
     },
     /// An ellipsoid along the axes.
     Ellipsoid {
         /// Its centre.
-        centre: [f64; 3],
+        centre: Coordinates<3>,
         /// Half its extents.
-        semi_axes: [f64; 3],
+        semi_axes: Coordinates<3>,
     },
     /// All that lies opposite to the normal.
     HalfSpace {
         /// A point of the boundary.
-        point: [f64; 3],
+        point: Coordinates<3>,
         /// Normal, outwards, of any length.
-        normal: [f64; 3],
+        normal: Coordinates<3>,
     },
     /// A circular cylinder with flat ends.
     Cylinder {
         /// Centre of one end.
-        from: [f64; 3],
+        from: Coordinates<3>,
         /// Centre of the other end.
-        to: [f64; 3],
+        to: Coordinates<3>,
         /// Its radius.
         radius: f64,
     },
@@ -152,9 +153,9 @@ impl SolidSection {
 #[serde(deny_unknown_fields)]
 pub struct BoxSection {
     /// Lowest corner.
-    pub min: [f64; 3],
+    pub min: Coordinates<3>,
     /// Highest corner.
-    pub max: [f64; 3],
+    pub max: Coordinates<3>,
 }
 
 /// The body: one of these.
@@ -230,7 +231,7 @@ pub struct InclusionSection {
 #[serde(deny_unknown_fields)]
 pub struct SphereSection {
     /// Its centre.
-    pub centre: [f64; 3],
+    pub centre: Coordinates<3>,
     /// Its radius.
     pub radius: f64,
 }
@@ -240,9 +241,9 @@ pub struct SphereSection {
 #[serde(deny_unknown_fields)]
 pub struct EllipsoidSection {
     /// Its centre.
-    pub centre: [f64; 3],
+    pub centre: Coordinates<3>,
     /// Half its extents.
-    pub semi_axes: [f64; 3],
+    pub semi_axes: Coordinates<3>,
 }
 
 fn one() -> f64 {
@@ -264,7 +265,7 @@ pub struct NeedleSection {
     /// What of the surface lies inside moves with the needle.
     pub region: Located<SolidSection>,
     /// Direction of insertion; normalised on reading.
-    pub axis: Located<[f64; 3]>,
+    pub axis: Located<Coordinates<3>>,
     /// How far the needle goes, length units.
     pub depth: Located<f64>,
     /// Into how many increments the insertion is divided (default 10).
@@ -281,7 +282,7 @@ pub struct NeedleSection {
 #[serde(deny_unknown_fields)]
 pub struct TargetSection {
     /// Where it is before the insertion.
-    pub position: Located<[f64; 3]>,
+    pub position: Located<Coordinates<3>>,
 }
 
 /// A paddle position.
@@ -309,7 +310,7 @@ pub enum PairsOf {
     /// "all" or "none".
     Word(String),
     /// Pairs of paddle indices.
-    List(Vec<[u32; 2]>),
+    List(Vec<Exactly<u32, 2>>),
 }
 
 /// How fine and by which method the tissue is modelled.

@@ -10,6 +10,7 @@ use crate::geometry::{Implicit, Point, Solid};
 use crate::material::{Law, MaterialSection};
 use crate::scene::Actuator;
 use crate::scene::error::{SceneError, Source};
+use crate::scene::exactly::{Coordinates, Exactly};
 use crate::scene::limits::{self, LimitError};
 use crate::scene::schema::Located;
 use sha2::{Digest, Sha256};
@@ -134,9 +135,9 @@ impl Validator<'_> {
         self.source.error(span, message, help)
     }
 
-    fn point(&self, located: &Located<[f64; 3]>, what: &str) -> Checked<Point<3>> {
+    fn point(&self, located: &Located<Coordinates<3>>, what: &str) -> Checked<Point<3>> {
         match located.get() {
-            p if p.iter().all(|v| v.is_finite()) => Ok(Point::<3>::from(*p)),
+            p if p.iter().all(|v| v.is_finite()) => Ok(Point::<3>::from(p.0)),
             _ => Err(self.error(
                 located.span(),
                 format!("{what}: coordinates must be finite numbers"),
@@ -263,7 +264,7 @@ impl Validator<'_> {
             })
         };
         let mut pairs: Vec<[usize; 2]> = Vec::new();
-        for &[first, second] in list {
+        for &Exactly([first, second]) in list {
             let (a, b) = (place(first)?, place(second)?);
             let pair = [a.min(b), a.max(b)];
             if a == b || pairs.contains(&pair) {

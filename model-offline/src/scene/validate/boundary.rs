@@ -4,6 +4,7 @@ use super::{Checked, Validator};
 use crate::geometry::{Location, Nearest, Point2, Polygon, nearest_on_loop};
 use crate::number::{coordinate, in_unit, short};
 use crate::scene::boundary::{EdgePart, OnBoundary};
+use crate::scene::exactly::Coordinates;
 use crate::scene::schema::Located;
 use std::ops::Range;
 
@@ -29,9 +30,9 @@ pub(super) struct Boundary<'a> {
 }
 
 impl<'a> Boundary<'a> {
-    pub(super) fn new(outline: &'a Polygon, vertices: &[[f64; 2]], unit: &'a str) -> Self {
+    pub(super) fn new(outline: &'a Polygon, vertices: &[Coordinates<2>], unit: &'a str) -> Self {
         let size = outline.size();
-        let vertices = vertices.iter().map(|v| Point2::from(*v)).collect();
+        let vertices = vertices.iter().map(|v| Point2::from(v.0)).collect();
         Self { outline, vertices, tolerance: TOUCHING * size, snap: SNAP * size, unit }
     }
 
@@ -122,7 +123,7 @@ impl Validator<'_> {
     }
 
     /// The points of something on the boundary, by points or by an edge; points near the boundary are put onto it.
-    pub(super) fn points_on<T: serde::de::DeserializeOwned + AsRef<[[f64; 2]]>>(
+    pub(super) fn points_on<T: serde::de::DeserializeOwned + AsRef<[Coordinates<2>]>>(
         &self,
         located: &Located<OnBoundary<T>>,
         boundary: &Boundary<'_>,

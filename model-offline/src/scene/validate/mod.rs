@@ -7,6 +7,7 @@ mod shaft;
 
 use self::boundary::Boundary;
 use super::error::{SceneError, Source};
+use super::exactly::Coordinates;
 use super::limits::{self, LimitError};
 use super::schema::{DiscretizationSection, InclusionSection, Located, SceneFile, dimension_of};
 use super::{Actuator, Inclusion, Needle, PaddlePosition, Scene, Shaft};
@@ -75,7 +76,7 @@ impl Validator<'_> {
             .map(|i| self.inclusion(i, &outline, needle.shaft.as_ref()))
             .collect::<Checked<_>>()?;
         let scene = Scene {
-            clockwise: outline.vertices()[0] != Point2::from(file.domain.outline.get()[0]),
+            clockwise: outline.vertices()[0] != Point2::from(file.domain.outline.get()[0].0),
             name: file.scene.name.clone(),
             length_unit: file.scene.units.length.clone(),
             stress_unit: file.scene.units.stress.clone(),
@@ -128,7 +129,7 @@ impl Validator<'_> {
         }
     }
 
-    fn polyline(&self, points: &[[f64; 2]], span: Range<usize>, what: &str) -> Checked<Vec<Point2>> {
+    fn polyline(&self, points: &[Coordinates<2>], span: Range<usize>, what: &str) -> Checked<Vec<Point2>> {
         let path: Vec<Point2> = points.iter().map(|p| self.point(p, span.clone(), what)).collect::<Checked<_>>()?;
         if path.len() < 2 || path.windows(2).any(|s| s[0] == s[1]) {
             return Err(self.error(
@@ -140,7 +141,7 @@ impl Validator<'_> {
         Ok(path)
     }
 
-    fn polygon(&self, points: &Located<Vec<[f64; 2]>>, what: &str) -> Checked<Polygon> {
+    fn polygon(&self, points: &Located<Vec<Coordinates<2>>>, what: &str) -> Checked<Polygon> {
         let count = points.get().len();
         if count > MAX_VERTICES {
             return Err(self.error(

@@ -2,6 +2,7 @@
 
 use super::{Checked, Validator, direction_of};
 use crate::geometry::Point2;
+use crate::scene::exactly::{Coordinates, Exactly};
 use crate::scene::schema::Located;
 use crate::scene::{Breathing, Motion, Surge};
 
@@ -44,15 +45,15 @@ impl Validator<'_> {
         ))
     }
 
-    fn direction(&self, direction: &Located<[f64; 2]>) -> Checked<Point2> {
+    fn direction(&self, direction: &Located<Coordinates<2>>) -> Checked<Point2> {
         let vector = self.point(direction.get(), direction.span(), "direction")?;
         direction_of(vector)
             .ok_or_else(|| self.error(direction.span(), "this motion has no direction", "e.g. direction = [0.0, 1.0]"))
     }
 
-    fn recorded(&self, rows: &Located<Vec<[f64; 3]>>) -> Checked<Vec<(f64, Point2)>> {
+    fn recorded(&self, rows: &Located<Vec<Exactly<f64, 3>>>) -> Checked<Vec<(f64, Point2)>> {
         let given = rows.get();
-        let finite = given.iter().flatten().all(|value| value.is_finite());
+        let finite = given.iter().flat_map(|row| row.0).all(|value| value.is_finite());
         if !finite || given.is_empty() || given.windows(2).any(|pair| pair[1][0] <= pair[0][0]) {
             return Err(self.error(
                 rows.span(),
@@ -60,6 +61,6 @@ impl Validator<'_> {
                 "give rows [time in s, x, y] of finite numbers whose times grow",
             ));
         }
-        Ok(given.iter().map(|&[time, x, y]| (time, Point2::new(x, y))).collect())
+        Ok(given.iter().map(|&Exactly([time, x, y])| (time, Point2::new(x, y))).collect())
     }
 }
