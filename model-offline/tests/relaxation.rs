@@ -261,7 +261,7 @@ fn scenes_say_what_is_wrong_with_a_relaxation() {
     let text = model_offline::scene::BUNDLED[0].1;
     for (section, says) in [
         ("g = [0.3]\ntau = [1.0, 2.0]", "1 shares g and 2 times tau"),
-        ("g = []\ntau = []", "a term of the relaxation is missing"),
+        ("g = []\ntau = [1.0]", "0 shares g and 1 times tau"),
         ("g = [0.7, 0.4]\ntau = [1.0, 2.0]", "nothing would hold in the end"),
         ("g = [0.7]\ntau = [-1.0]", "must be positive"),
         ("g = [nan]\ntau = [1.0]", "not a finite number"),
@@ -272,6 +272,10 @@ fn scenes_say_what_is_wrong_with_a_relaxation() {
         let error = Scene::parse(&text, "bad.toml").unwrap_err();
         assert!(error.to_string().contains(says), "{section}: {error}");
     }
+    // Without terms: none, as with a preset.
+    let none = text.replace("[[inclusion]]", "[material.relaxation]\ng = []\ntau = []\n[[inclusion]]");
+    assert_eq!(Scene::parse(&none, "none.toml").unwrap().hash(), Scene::parse(text, "plain.toml").unwrap().hash());
+
     let text = text.replace("[[inclusion]]", "[material.relaxation]\ng = [0.5]\ntau = [1.0]\n[[inclusion]]");
     let weakly = text.replace("[discretization]", "[discretization]\nessential = \"nitsche\"");
     let error = TissueModel::new(&Scene::parse(&weakly, "weakly.toml").unwrap()).unwrap_err();

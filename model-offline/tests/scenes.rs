@@ -417,6 +417,6 @@ fn coordinates_of_another_dimension_are_refused_wherever_they_stand() {
         assert!(text.contains(given), "{name}: {given}");
         let text = text.replacen(given, wrong, 1);
         let said = AnyScene::parse(&text, "wrong.toml").expect_err(wrong).to_string();
-        assert!(said.contains("values where there must be"), "{wrong}: {said}");
+        assert!(said.contains("expected an array of length"), "{wrong}: {said}");
     }
 }

@@ -129,7 +129,9 @@ impl Law {
             if g.len() != tau.len() {
                 return Err(MaterialError::Unpaired(g.len(), tau.len()));
             }
-            law = law.relaxing(Relaxation::new(g.iter().copied().zip(tau.iter().copied()))?);
+            if !g.is_empty() {
+                law = law.relaxing(Relaxation::new(g.iter().copied().zip(tau.iter().copied()))?);
+            }
         }
         Ok(law)
     }

@@ -56,6 +56,11 @@ pub(super) struct Trial {
     pub(super) tip_displacement: f64,
 }
 
+/// Part of the way to the next forces: half of the last one where that did not come as much nearer as it should have.
+fn next_share(share: f64, left: f64) -> f64 {
+    if left > 1.0 - 0.5 * share { f64::max(SMALLEST_SHARE, 0.5 * share) } else { f64::min(1.0, 2.0 * share) }
+}
+
 impl SlippingNeedle<'_> {
     /// The stations that the shaft holds when its tip is at this arc length, and the tip.
     pub(super) fn contacts(&self, depth: f64, ahead: Point2, engaged: f64) -> Result<Vec<Station>, NeedleError> {
@@ -190,11 +195,7 @@ impl SlippingNeedle<'_> {
                 self.largest_force = self.largest_force.max(forces.amax());
                 return Ok(Trial { contacts, tip_force: forces[2 * m], tip_displacement });
             }
-            if round >= DAMPED && change > (1.0 - 0.5 * share) * last {
-                share = f64::max(SMALLEST_SHARE, 0.5 * share);
-            } else {
-                share = f64::min(1.0, 2.0 * share);
-            }
+            share = if round >= DAMPED { next_share(share, change / last) } else { 1.0 };
             forces += (found - &forces) * share;
             // Where the tissue will be under the new forces: behind them this would converge half as fast.
             self.follow_the_tissue(&mut contacts, &(&felt + &(moved * share)))?;

@@ -85,7 +85,10 @@ mod tests {
 
     #[test]
     fn points_and_edges_are_told_apart_and_each_has_its_own_errors() {
-        assert_eq!(read("[[0, 1.5], [2.0, 3]]").unwrap(), OnBoundary::Points(vec![[0.0, 1.5], [2.0, 3.0]]));
+        assert_eq!(
+            read("[[0, 1.5], [2.0, 3]]").unwrap(),
+            OnBoundary::Points([[0.0, 1.5], [2.0, 3.0]].map(Exactly).into())
+        );
         let part = |from, to| OnBoundary::Edge(EdgePart { edge: 3, from, to });
         assert_eq!(read("{ edge = 3, from = 0.2, to = 0.4 }").unwrap(), part(0.2, 0.4));
         assert_eq!(read("{ edge = 3 }").unwrap(), part(0.0, 1.0));

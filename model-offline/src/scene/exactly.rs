@@ -32,11 +32,9 @@ impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for Exactly<T, N
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let values = Vec::<T>::deserialize(deserializer)?;
         let found = values.len();
-        let values = values.try_into().map_err(|_| {
-            D::Error::custom(format!(
-                "{found} values where there must be {N}: are they coordinates of another dimension?"
-            ))
-        })?;
+        let values = values
+            .try_into()
+            .map_err(|_| D::Error::invalid_length(found, &format!("an array of length {N}").as_str()))?;
         Ok(Self(values))
     }
 }
