@@ -25,21 +25,7 @@ fn every_bundled_scene_is_valid_and_carries_its_own_name() {
 fn results_do_not_depend_on_the_units() {
     let length = 1000.0;
     let text = BUNDLED[0].1;
-    let scaled: String = text
-        .lines()
-        .map(|line| {
-            let (code, comment) = line.split_once('#').unwrap_or((line, ""));
-            let key = code.split('=').next().unwrap_or("").trim();
-            let factor = match key {
-                "outline" | "paths" | "contact" | "depth" | "position" | "segment" | "spacing" => length,
-                "lambda" | "mu" | "c" => 7.0,
-                _ => return format!("{code}\n"),
-            };
-            let _ = comment;
-            let (key, values) = code.split_once('=').unwrap();
-            format!("{key}={}\n", times(values, factor))
-        })
-        .collect();
+    let scaled = measured(text, length, 7.0);
     let solve = |text: &str| {
         let model = TissueModel::new(&Scene::parse(text, "scaled").unwrap()).unwrap();
         place(&model, &PlacementOptions { threads: 1, ..Default::default() }).unwrap()
@@ -50,6 +36,42 @@ fn results_do_not_depend_on_the_units() {
         assert!((a.controllability_measure / b.controllability_measure - 1.0).abs() < 1e-9);
         assert!((a.static_study.max_orthogonal * length / b.static_study.max_orthogonal - 1.0).abs() < 1e-6);
     }
+}
+
+/// A scene's text with so many times its lengths and moduli.
+fn measured(text: &str, length: f64, stress: f64) -> String {
+    let line = |line: &str| {
+        let code = line.split('#').next().unwrap_or("");
+        let factor = match code.split('=').next().unwrap_or("").trim() {
+            "outline" | "paths" | "contact" | "depth" | "position" | "segment" | "spacing" => length,
+            "lambda" | "mu" | "c" => stress,
+            _ => return format!("{code}\n"),
+        };
+        let (key, values) = code.split_once('=').unwrap();
+        format!("{key}={}\n", times(values, factor))
+    };
+    text.lines().map(line).collect()
+}
+
+/// In metres the lengths of a small body are told as well as in millimetres, not as zeros.
+#[test]
+fn small_lengths_are_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let [scene, table] = ["small.toml", "small.table"].map(|name| directory.path().join(name));
+    // A body of a centimetre, in metres.
+    std::fs::write(&scene, measured(BUNDLED[0].1, 0.01, 1.0)).unwrap();
+    let said = |arguments: &[&str]| {
+        let output = model_offline().args(arguments).arg(&scene).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let told = said(&["table", "--paddle", "4", "--knots", "5", "--output", table.to_str().unwrap()]);
+    for part in ["depth 0.0000 to 0.001000\n", "displacement 0.002000,", "  0.000250  ("] {
+        assert!(told.contains(part), "{part}: {told}");
+    }
+    let told = said(&["compare"]);
+    let shaft = told.lines().find(|line| line.starts_with("linear law")).unwrap_or_else(|| panic!("{told}"));
+    assert!(shaft.split_whitespace().any(|word| word.trim_start_matches("0.0000").len() > 2), "{shaft}");
 }
 
 /// Every number in `text` times `factor`.

@@ -1,5 +1,6 @@
 //! A controller table as text and JSON, for people and scripts.
 
+use crate::number::{decimals, length};
 use firmware::contract::{Header, Table, TableError, decode};
 use firmware::scalar::ScalarKind;
 use std::fmt::Write as _;
@@ -27,11 +28,12 @@ pub fn hex(bytes: &[u8]) -> String {
 pub fn summary(table: &Table<f64, 2>) -> String {
     let mut out = head(table);
     out.push_str("\n   depth   paddle path            J⁻¹n norm   axial target  static orthogonal\n");
+    let places = decimals(table.validity.depth_end, 4);
     for knot in &table.knots {
         let measure = knot.jacobian[0].try_inverse().map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
         let _ = writeln!(
             out,
-            "{:8.4}  ({:9.6}, {:9.6})  {:9.4}  {:12.6}  {:16.6}",
+            "{:8.places$}  ({:9.6}, {:9.6})  {:9.4}  {:12.6}  {:16.6}",
             knot.depth,
             knot.paddle_path.x,
             knot.paddle_path.y,
@@ -49,16 +51,18 @@ pub(super) fn head<const D: usize, const N: usize, const P: usize>(table: &Table
     let (max_displacement, max_rate) =
         table.paddles.first().map_or((0.0, 0.0), |paddle| (paddle.max_displacement, paddle.max_rate));
     format!(
-        "paddle {} · {} tissue · {} knots, depth {:.4} to {:.4}\nscene {}\n\
-         limits: displacement {max_displacement:.4}, rate {max_rate:.4} per s, needle speed {:.4} per s; loop gain {:.4} \
+        "paddle {} · {} tissue · {} knots, depth {} to {}\nscene {}\n\
+         limits: displacement {}, rate {} per s, needle speed {} per s; loop gain {:.4} \
          (delay {} samples, model error {:.2})\n",
         names.join(" and "),
         table.tissue,
         table.knots.len(),
-        table.validity.depth_start,
-        table.validity.depth_end,
+        length(table.validity.depth_start),
+        length(table.validity.depth_end),
         hex(&table.scene_hash),
-        table.validity.needle_speed,
+        length(max_displacement),
+        length(max_rate),
+        length(table.validity.needle_speed),
         table.gains.loop_gain,
         table.gains.delay_samples,
         table.gains.lambda_max,

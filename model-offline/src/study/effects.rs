@@ -7,6 +7,7 @@
 
 use crate::model::{ModelError, TissueModel};
 use crate::needle::{Course, NeedleError};
+use crate::number::{decimals, length};
 use crate::output::chart::{Axis, Bars, Colour, Dash, Figure, Panel, Place, ReferenceLine};
 use crate::output::csv;
 use crate::parallel;
@@ -228,10 +229,10 @@ impl Effects {
         };
         let mut out = format!(
             "{}: what each effect changes, against a contact that moves with the needle in elastic tissue; paddle {} held, \
-             target moved by up to {:.4}{unit}\n\n{:<12} {:>13} {:>13} {:>11} {:>10} {:>16}\n",
+             target moved by up to {}{unit}\n\n{:<12} {:>13} {:>13} {:>11} {:>10} {:>16}\n",
             self.scene,
             self.paddle,
-            self.target_displacement,
+            length(self.target_displacement),
             "effect",
             format!("across{unit}"),
             format!("along{unit}"),
@@ -239,12 +240,13 @@ impl Effects {
             "Jacobian",
             "controllability"
         );
+        let places = decimals(10.0 * self.target_displacement, 5);
         for tried in &self.effects {
             let name = tried.variation.name();
             let _ = match (&tried.added, &tried.failure) {
                 (Some(added), _) => writeln!(
                     out,
-                    "{name:<12} {:>13.5} {:>13.5} {:>9.1} % {:>8.1} % {:>14.1} %",
+                    "{name:<12} {:>13.places$} {:>13.places$} {:>9.1} % {:>8.1} % {:>14.1} %",
                     added.orthogonal,
                     added.axial,
                     100.0 * added.base_force,
@@ -272,7 +274,7 @@ impl Effects {
             (_, true) => writeln!(out),
             (Some(added), false) => writeln!(
                 out,
-                " Left out: {}; together they would add {:.5} across and {:.5} along{unit}, {:.1} % of controllability.",
+                " Left out: {}; together they would add {:.places$} across and {:.places$} along{unit}, {:.1} % of controllability.",
                 left.join(", "),
                 added.orthogonal,
                 added.axial,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use model_offline::number::length;
+use model_offline::number::{decimals, length};
 
 use crate::bench::in_process::Errors;
 use crate::bench::worlds::{Controlled, OtherTissue, OtherTissueRow, Spread, WorldRow, Worlds};
@@ -37,8 +37,8 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
                 text,
                 "| {needle} | {tissue} | {patient} | {} | {} | {} | {known} | {} |",
                 sensor.sensor,
-                errors(&row.none),
-                errors(&row.fixture),
+                errors(&row.none, &row.none),
+                errors(&row.fixture, &row.none),
                 controlled(&sensor.simple, &row.none),
             )?;
         }
@@ -59,8 +59,8 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
                 breaths(row.varies),
                 row.wait_s,
                 sensor.sensor,
-                errors(&row.none),
-                errors(&row.fixture),
+                errors(&row.none, &row.none),
+                errors(&row.fixture, &row.none),
                 controlled(&sensor.followed, &row.none),
                 controlled(&sensor.predicted, &row.none),
             )?;
@@ -102,9 +102,9 @@ fn write_other_tissue(text: &mut String, other: &OtherTissue, simplest: &WorldRo
         writeln!(
             text,
             "| {sensor} | {} | {} | {} | {} | {} |",
-            errors(&simplest.none),
-            errors(&simplest.fixture),
-            errors(&other.fed_forward),
+            errors(&simplest.none, &simplest.none),
+            errors(&simplest.fixture, &simplest.none),
+            errors(&other.fed_forward, &simplest.none),
             controlled(homogeneous, &simplest.none),
             controlled(known, &simplest.none),
         )?;
@@ -130,19 +130,26 @@ fn breaths([period, amplitude]: [f64; 2]) -> String {
     format!("±{:.0} % long, ±{:.0} % large", 100.0 * period, 100.0 * amplitude)
 }
 
-fn errors(Errors { peak, rms }: &Errors) -> String {
-    format!("{peak:.3} / {rms:.3}")
+/// Decimals for errors of a world: three digits of what they are without a paddle, in metres as in millimetres.
+fn places(none: &Errors) -> usize {
+    decimals(10.0 * none.peak, 3)
+}
+
+fn errors(Errors { peak, rms }: &Errors, none: &Errors) -> String {
+    let places = places(none);
+    format!("{peak:.places$} / {rms:.places$}")
 }
 
 fn controlled(run: &Controlled, none: &Errors) -> String {
     let Spread { low, median, high } = run.peak;
+    let places = places(none);
     let hurts = if median > none.peak { " (−)" } else { "" };
     let share = if run.run_share < 1.0 { format!("; {:.0} % in RUN", 100.0 * run.run_share) } else { String::new() };
     // What the simulated tissue itself is off by, where that counts.
     let off = match run.tissue_error {
         Some(error) if error < 0.1 * median => String::new(),
-        Some(error) => format!("; tissue ±{error:.3}"),
+        Some(error) => format!("; tissue ±{error:.places$}"),
         None => "; tissue not verified".to_owned(),
     };
-    format!("{median:.3} / {:.3} ({low:.3}–{high:.3}{share}{off}){hurts}", run.rms.median)
+    format!("{median:.places$} / {:.places$} ({low:.places$}–{high:.places$}{share}{off}){hurts}", run.rms.median)
 }

@@ -2,6 +2,7 @@
 
 use super::Fit;
 use super::plant::EndToEnd;
+use crate::number::length;
 use crate::scene::schema::FitSection;
 
 impl Fit {
@@ -67,11 +68,11 @@ impl Fit {
         );
         let nodes = match c.level {
             Some(level) => format!("graded nodes, level {level}"),
-            None => format!("nodes {:.4} apart", c.spacing),
+            None => format!("nodes {} apart", length(c.spacing)),
         };
         let support = c.support.map_or(String::new(), |s| format!(", {} basis, support {s}", c.basis));
         let mut out = format!(
-            "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {plant} to depth {:.4}; {} table knots, {}\n\
+            "{} · {} tissue · tolerance {}\n\nchosen: {}{support}, {nodes} ({}); {} law; {plant} to depth {}; {} table knots, {}\n\
              estimated error {:.3} %, distance from the next finer model {:.3} %\n\
              all Jacobians in {:.2} ms, {step} (fitted in {:.1} s)\n",
             self.scene,
@@ -80,7 +81,7 @@ impl Fit {
             c.integration,
             c.nodes,
             c.law,
-            c.plant_depth,
+            length(c.plant_depth),
             c.table_knots,
             c.table_scalar,
             100.0 * self.error_estimate,
