@@ -28,12 +28,14 @@ pub fn hex(bytes: &[u8]) -> String {
 pub fn summary(table: &Table<f64, 2>) -> String {
     let mut out = head(table);
     out.push_str("\n   depth   paddle path            J⁻¹n norm   axial target  static orthogonal\n");
-    let places = decimals(table.validity.depth_end, 4);
+    let depth = table.validity.depth_end;
+    let (places, small) = (decimals(depth, 4), decimals(0.01 * depth, 6));
+    let wide = small + 3;
     for knot in &table.knots {
         let measure = knot.jacobian[0].try_inverse().map_or(f64::INFINITY, |j| (j * table.orthogonal).norm());
         let _ = writeln!(
             out,
-            "{:8.places$}  ({:9.6}, {:9.6})  {:9.4}  {:12.6}  {:16.6}",
+            "{:8.places$}  ({:wide$.small$}, {:wide$.small$})  {:9.4}  {:12.small$}  {:16.small$}",
             knot.depth,
             knot.paddle_path.x,
             knot.paddle_path.y,
