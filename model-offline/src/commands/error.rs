@@ -60,7 +60,7 @@ pub(crate) enum CliError {
     /// The needle cannot go on.
     #[error(transparent)]
     #[diagnostic(help(
-        "spread the cutting force over more tip_length (tissue beside a tip bears no more than twice its shear modulus per \
+        "spread the cutting force over more tip_length (tissue beside a tip bears about twice its shear modulus per \
          length of it, which coarse nodes hide), insert less deep or in more increments, or with less cutting force and friction"
     ))]
     Needle(#[from] NeedleError),
