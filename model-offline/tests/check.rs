@@ -91,8 +91,9 @@ fn nothing_is_unusual_in_the_bundled_scenes_and_in_the_block() {
 /// One scene for every warning, which has it and no other; lengths are those of the sketch.
 #[test]
 fn every_warning_is_given_with_its_numbers_where_it_is_due() {
+    let tip = |length: f64| format!("{SHAFT}kinetic_friction = 0.2\ntip_length = {length}\n");
     type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
-    let cases: [Case<'_>; 19] = [
+    let cases: [Case<'_>; 21] = [
         (&[(AXIS, "axis = [0.0, 1.0]")], &["points out of the body: 180°", "turn the axis round"]),
         (&[(AXIS, "axis = [0.5, 1.0]")], &["points out of the body: 153°"]),
         (&[(AXIS, "axis = [1.0, -0.1]")], &["along the surface: 5.7°", "turn the axis inwards"]),
@@ -141,6 +142,23 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
                 ("stiffness = 10.0", "stiffness = 10.0\nstatic_friction = 0.7\nkinetic_friction = 0.0"),
             ],
             &["the friction of inclusion 1 only sticks: static_friction is 0.7"],
+        ),
+        (
+            // Twice the shear modulus of 1 on 0.4 is 0.8, in the inclusion 8; nodes that are 5 apart do not see the tip.
+            &[(DEPTH, &tip(0.4)), ("spacing = 5.0", "tolerance = 0.05")],
+            &[
+                "the cutting force of the needle on a length of 0.4 mm",
+                "bears it from 0.5 mm on",
+                "a longer tip_length",
+            ],
+        ),
+        (
+            &[
+                (DEPTH, &tip(0.6)),
+                ("stiffness = 10.0", "stiffness = 10.0\ncutting_force = 20.0"),
+                ("spacing = 5.0", "tolerance = 0.05"),
+            ],
+            &["the tip is 0.6 mm long", "the cutting force of inclusion 1 from 1 mm on"],
         ),
         (
             &[(

@@ -316,6 +316,7 @@ fn scenes_say_what_sees_the_target() {
         ("mm", "noise = 1e9", "noise"),
         ("mm", "noise = inf", "noise"),
         ("mm", "quantisation = -1.0", "quantisation"),
+        ("mm", "quantisation = 1e300", "quantisation: 1e300 is no sensor"),
         ("mm", "bias = [nan, 0.0]", "bias"),
         ("mm", "outages = { every = 1e12, last = 1.0 }", "every"),
         ("mm", "outages = { every = 1.0, last = 1e-9 }", "last"),
@@ -325,6 +326,28 @@ fn scenes_say_what_sees_the_target() {
         let refused = with(unit, section).unwrap_err();
         let text = format!("{refused:?} {refused}");
         assert!(text.contains(said), "{section}: {text}");
+    }
+}
+
+/// What paddles and needle are capable of has the unit of the depth, in the plane and in space.
+#[test]
+fn limits_of_another_unit_are_refused_where_they_stand() {
+    use model_offline::scene::BUNDLED_IN_SPACE;
+    use model_offline::scene::space::AnyScene;
+
+    for (scene, text) in [BUNDLED[0], BUNDLED_IN_SPACE[0]] {
+        assert!(!text.contains("[actuator]"), "{scene}");
+        let with =
+            |key: &str, value: &str| AnyScene::parse(&format!("{text}\n[actuator]\n{key} = {value}\n"), "limits.toml");
+        for key in ["max_displacement", "max_rate", "max_needle_speed"] {
+            for value in ["1e-300", "1e300", "5e-324"] {
+                let refused = with(key, value).unwrap_err();
+                let told = format!("{refused:?} {refused}");
+                assert!(told.contains(&format!("{key}: ")) && told.contains("has another unit"), "{scene}: {told}");
+            }
+            with(key, "0.01").unwrap();
+            with(key, "-1").unwrap_err();
+        }
     }
 }
 

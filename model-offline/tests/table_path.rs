@@ -36,3 +36,20 @@ fn the_path_holds_the_target_at_every_knot_of_scenes_in_other_units() {
         assert!(unheld > 1e5 * LEFT * size, "{name}: {unheld:e}");
     }
 }
+
+/// Critical damping of an integrator that is d samples late takes dᵈ / (d + 1)ᵈ⁺¹, over the model error that is allowed for.
+#[test]
+fn the_gain_is_for_the_delay_of_the_scenes_own_sensor() {
+    for (name, delay, damped) in [("paper", 1, 1.0 / 4.0), ("breast", 2, 4.0 / 27.0)] {
+        let mut scene = Scene::bundled(name).unwrap();
+        scene.discretization.resolution = Resolution::Spacing(0.1 * scene.outline.size());
+        let model = TissueModel::new(&scene).unwrap();
+        let paddle = scene.paddles[2].index;
+        let gains = |options| build(&model, paddle, &options).unwrap().gains;
+        let few = TableOptions { knots: 2, ..TableOptions::default() };
+        let own = gains(few);
+        assert_eq!(own.delay_samples, delay, "{name}");
+        assert!((own.loop_gain * own.lambda_max - damped).abs() < 1e-12, "{name}: {own:?}");
+        assert_eq!(gains(TableOptions { delay_samples: Some(0), ..few }).loop_gain * own.lambda_max, 1.0, "{name}");
+    }
+}

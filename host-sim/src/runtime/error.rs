@@ -66,6 +66,9 @@ pub enum RuntimeError {
     #[error(
         "no answer from the {peer} process for {silent_s:.1} s; the run is void. Is it stopped, or does --link differ?"
     )]
+    #[diagnostic(help(
+        "a plant solves its tissue before it answers: give controller and plant a longer --patience, e.g. 600"
+    ))]
     PeerSilent {
         /// Who.
         peer: Role,

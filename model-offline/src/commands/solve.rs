@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::json::write_json;
 use super::solve_space::{self, SpaceArgs};
 use model_offline::model::{Body, ModelError, Pose, TissueModel};
-use model_offline::needle::{Inserted, SlippingNeedle, Way, insert};
+use model_offline::needle::{EnergyAccount, Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::length;
 use model_offline::output;
 use model_offline::output::vtu::{self, Shown};
@@ -268,14 +268,35 @@ fn print(scene: &Scene, solved: &Solved<'_>, held: Held, args: &SolveArgs) {
     );
     match solved {
         Solved::Pushing(body) => println!("base force {:.6}", body.contact_force()),
-        Solved::Within(needle, punctured_at) => println!(
-            "punctured at depth {}; base force {:.6}, of it at the tip {:.6}; cut {}; the target is at depth {} now",
-            length(*punctured_at),
-            needle.base_force(),
-            needle.tip_force(),
-            length(needle.cut_length()),
-            length(needle.depth_of_target())
-        ),
+        Solved::Within(needle, punctured_at) => {
+            println!(
+                "punctured at depth {}; base force {:.6}, of it at the tip {:.6}; cut {}; the target is at depth {} now",
+                length(*punctured_at),
+                needle.base_force(),
+                needle.tip_force(),
+                length(needle.cut_length()),
+                length(needle.depth_of_target())
+            );
+            print_balance(needle.energy());
+        }
+    }
+}
+
+/// Part of the work that may be missing from where it went before that is told as a fault of the increments.
+const BALANCED: f64 = 0.01;
+
+/// Where the work at base and paddle went, and whether it is all there.
+fn print_balance(energy: EnergyAccount) {
+    let EnergyAccount { stored, friction, cutting, .. } = energy;
+    let done = energy.work + energy.paddle + energy.base;
+    println!("work {done:.6}: stored {stored:.6}, friction {friction:.6}, cutting {cutting:.6}");
+    let imbalance = energy.imbalance();
+    if imbalance.abs() > BALANCED {
+        println!(
+            "{:.1} % of the work is {}: forces and way are followed no better than that; take more increments",
+            100.0 * imbalance.abs(),
+            if imbalance > 0.0 { "missing" } else { "too much in what it went into" }
+        );
     }
 }
 
@@ -310,6 +331,7 @@ fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveA
     }
     if let Solved::Within(needle, _) = solved {
         document["strain_energy"] = needle.energy().stored.into();
+        document["energy_imbalance"] = needle.energy().imbalance().into();
     }
     write_json(args.json.as_deref(), &document)?;
     let within = matches!(solved, Solved::Within(..));

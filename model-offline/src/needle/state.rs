@@ -38,6 +38,14 @@ pub struct EnergyAccount {
 }
 
 impl EnergyAccount {
+    /// Part of the work done that is found nowhere; negative where more is found than has been done. Zero before any work.
+    /// It says how well the increments follow the needle's way: of tissue that relaxes nothing, whose stored energy is what
+    /// is left of the work.
+    pub fn imbalance(&self) -> f64 {
+        let done = self.put_in();
+        if done == 0.0 { 0.0 } else { (done - self.stored - self.friction - self.cutting) / done }
+    }
+
     /// What has been done through open skin.
     pub(super) fn put_in(&self) -> f64 {
         self.work + self.paddle + self.base
@@ -179,9 +187,8 @@ impl<'m> SlippingNeedle<'m> {
         let mut passed = vec![(from, 0.0)];
         while let Some(&(s, spacings)) = passed.last()
             && s < ends[1]
-            && passed.len() < MOST_STATIONS
         {
-            let step = self.spacing_around(&at(s));
+            let step = self.spacing_around(&at(s)).max(gap / MOST_STATIONS as f64);
             let next = f64::min(ends[1], s + 0.5 * step);
             passed.push((next, spacings + (next - s) / step));
         }

@@ -3,6 +3,7 @@
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Discretization, Integration, Resolution};
 use crate::geometry::{Point, Polygon};
+use crate::number;
 
 /// More nodes than this are refused before any memory is taken.
 const MAX_NODES: f64 = 2.0e6;
@@ -38,6 +39,16 @@ pub enum LimitError {
     /// A kernel support that does not work.
     #[error("support is {0}")]
     Support(f64),
+    /// A limit of a paddle or of the needle that has another unit than the depth, or none.
+    #[error("{what}: {} has another unit than a needle that goes {} deep", number::short(*.value), number::short(*.depth))]
+    OtherUnit {
+        /// Which.
+        what: &'static str,
+        /// What it is, length units, or those per second.
+        value: f64,
+        /// Depth of the needle, length units.
+        depth: f64,
+    },
     /// A rule that is not there in the plane.
     #[error("integration {0} is one of space, and this scene is planar")]
     Spatial(Integration),
@@ -56,6 +67,10 @@ impl LimitError {
             Self::Tolerance(_) => "give a relative error between 0.0001 and 0.5".to_owned(),
             Self::Level(_) => format!("give a refinement level between {MIN_LEVEL} and {MAX_LEVEL}"),
             Self::Support(_) => "give a kernel support between 1 and 6 spacings; 2 is usual".to_owned(),
+            Self::OtherUnit { what, depth, .. } => {
+                let [least, most] = [depth / OTHER_UNIT, depth * OTHER_UNIT].map(number::short);
+                format!("give {what} in the scene's units, from {least} to {most}, or leave it out")
+            }
             Self::Planar(_) => {
                 let known: Vec<&str> = Integration::SPATIAL.iter().map(|i| i.name()).collect();
                 format!("take one of {}", known.join(", "))
@@ -97,6 +112,21 @@ fn check_spacing(h: f64, outline: &Polygon) -> Result<(), LimitError> {
         return Err(LimitError::TooManyNodes { spacing: h, nodes });
     }
     Ok(())
+}
+
+/// Limits of paddles and needle that are so many times the depth, or less than its so manieth part, have another unit.
+const OTHER_UNIT: f64 = 1e9;
+
+/// Whether a limit of a paddle or of the needle, length units or those per second, is one of this scene.
+///
+/// # Errors
+/// [`LimitError::OtherUnit`].
+pub(super) fn check_actuator(what: &'static str, value: f64, depth: f64) -> Result<f64, LimitError> {
+    if (depth / OTHER_UNIT..=depth * OTHER_UNIT).contains(&value) {
+        Ok(value)
+    } else {
+        Err(LimitError::OtherUnit { what, value, depth })
+    }
 }
 
 /// More cells than this are refused before any memory is taken.

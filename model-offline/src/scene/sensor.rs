@@ -112,7 +112,16 @@ impl SensorPreset {
     }
 }
 
+/// Period of the loop that tables suggest a gain for, ns.
+const LOOP_PERIOD_NS: u64 = 1_000_000;
+
 impl Sensor {
+    /// Delay of a loop of 1 kHz that sees the target with it, in its samples.
+    pub fn delay_samples(&self) -> u32 {
+        let [period_ns, latency_ns] = [1.0 / self.rate, self.latency].map(|seconds| (1e9 * seconds).round() as u64);
+        firmware::Settings::new(LOOP_PERIOD_NS, period_ns, latency_ns).delay_samples()
+    }
+
     /// How reports call it.
     pub fn title(&self) -> String {
         let changed = if self.is_changed { ", changed" } else { "" };
@@ -133,6 +142,15 @@ mod tests {
             let sensor = SensorPreset::Mri.sensor(1.0, unit).unwrap();
             assert!((sensor.quantisation * unit_mm - 0.5).abs() < 1e-12, "{unit}: {sensor:?}");
         }
+    }
+
+    /// What is measured until a correction acts, latency and two ticks later, in whole samples: 22 ms of 20, 22 of 16.7, 68 of
+    /// 33.3, 302 of 200.
+    #[test]
+    fn a_loop_is_as_many_samples_late_as_its_sensor_says() {
+        use SensorPreset::{Camera, Ideal, Mri, Ultrasound};
+        let late = [Ideal, Camera, Ultrasound, Mri].map(|preset| preset.sensor(1.0, "mm").unwrap().delay_samples());
+        assert_eq!(late, [1, 1, 2, 1]);
     }
 
     #[test]

@@ -32,8 +32,9 @@ use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 pub struct TableOptions {
     /// Depth knots, at least 2.
     pub knots: usize,
-    /// Delay of the feedback loop that the suggested gain is for, in target samples.
-    pub delay_samples: u32,
+    /// Delay of the feedback loop that the suggested gain is for, in target samples; none: that of the scene's sensor in a
+    /// loop of 1 kHz, in space of the ideal one's.
+    pub delay_samples: Option<u32>,
     /// Largest |λ| of J·Ĵ⁻¹ that the gain allows for at least. Where the scene's own tissues (with its inclusions and
     /// without), mistaken for each other, reach more at some depth, the table says so and its gain allows for that. On the
     /// paper's scene they give 0.9 to 1.28 (`host-sim loop-stability`).
@@ -45,7 +46,7 @@ pub struct TableOptions {
 
 impl Default for TableOptions {
     fn default() -> Self {
-        Self { knots: 21, delay_samples: 1, lambda_max: 1.3, needle_speed: 0.0 }
+        Self { knots: 21, delay_samples: None, lambda_max: 1.3, needle_speed: 0.0 }
     }
 }
 
@@ -129,6 +130,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
         axis: scene.needle.axis,
         orthogonal: scene.needle.orthogonal(),
         target: scene.target,
+        delay_samples: scene.sensor.delay_samples(),
     };
     of.table([paddle], knots, lambda_max, options)
 }
@@ -143,6 +145,8 @@ struct Described<'a, const D: usize, const N: usize> {
     axis: SVector<f64, D>,
     orthogonal: SMatrix<f64, D, N>,
     target: SVector<f64, D>,
+    /// Of a loop with the scene's sensor, in its samples.
+    delay_samples: u32,
 }
 
 impl<const D: usize, const N: usize> Described<'_, D, N> {
@@ -155,6 +159,7 @@ impl<const D: usize, const N: usize> Described<'_, D, N> {
         options: &TableOptions,
     ) -> Result<Table<f64, D, N, P>, TableBuildError> {
         let Actuator { max_displacement, max_rate, max_needle_speed } = *self.actuator;
+        let delay_samples = options.delay_samples.unwrap_or(self.delay_samples);
         let depths = [knots.first(), knots.last()].map(|knot| knot.map_or(0.0, |knot| knot.depth));
         let table = Table {
             scene_hash: self.scene_hash,
@@ -170,11 +175,7 @@ impl<const D: usize, const N: usize> Described<'_, D, N> {
                 paddle_displacement: max_displacement,
                 needle_speed: max_needle_speed.max(SPEED_MARGIN * options.needle_speed),
             },
-            gains: Gains {
-                loop_gain: default_gain(options.delay_samples, lambda_max),
-                delay_samples: options.delay_samples,
-                lambda_max,
-            },
+            gains: Gains { loop_gain: default_gain(delay_samples, lambda_max), delay_samples, lambda_max },
             knots,
         };
         table.validate().map_err(TableBuildError::Invalid)?;

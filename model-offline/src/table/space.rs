@@ -76,6 +76,9 @@ impl SpaceTable {
     }
 }
 
+/// Delay of a loop of 1 kHz with the ideal sensor, 50 Hz and 20 ms late: scenes in space name none.
+const IDEAL_DELAY_SAMPLES: u32 = firmware::Settings::new(1_000_000, 20_000_000, 20_000_000).delay_samples();
+
 fn build<const P: usize>(
     model: &InsertionModel,
     indices: [u32; P],
@@ -104,6 +107,7 @@ fn build<const P: usize>(
         axis: scene.needle.axis,
         orthogonal: scene.needle.orthogonal(),
         target: scene.target,
+        delay_samples: IDEAL_DELAY_SAMPLES,
     };
     of.table(extents, knots, lambda_max, options)
 }

@@ -347,8 +347,11 @@ impl Validator<'_> {
 
     fn actuator(&self, needle: &Needle) -> Checked<Actuator> {
         let section = &self.file.actuator;
-        let or = |value: &Option<Located<f64>>, what: &str, default: f64| {
-            value.as_ref().map_or(Ok(default), |v| self.positive(v, what))
+        let or = |value: &Option<Located<f64>>, what: &'static str, default: f64| {
+            let Some(given) = value else { return Ok(default) };
+            let value = self.positive(given, what)?;
+            limits::check_actuator(what, value, needle.depth)
+                .map_err(|error| self.error(given.span(), error.to_string(), error.help()))
         };
         Ok(Actuator {
             max_displacement: or(&section.max_displacement, "max_displacement", needle.depth)?,

@@ -12,7 +12,7 @@ impl Validator<'_> {
         let breathing = section.breathing.as_ref().map(|breathing| {
             Ok(Breathing {
                 period: self.positive(&breathing.period, "period")?,
-                amplitude: self.positive(&breathing.amplitude, "amplitude")?,
+                amplitude: self.not_negative(&breathing.amplitude, "amplitude")?,
                 direction: self.direction(&breathing.direction)?,
                 period_variation: self.variation(breathing.period_variation.as_ref())?,
                 amplitude_variation: self.variation(breathing.amplitude_variation.as_ref())?,
@@ -22,7 +22,7 @@ impl Validator<'_> {
             Ok(Surge {
                 at: self.not_negative(&surge.at, "at")?,
                 last: self.positive(&surge.last, "last")?,
-                amplitude: self.positive(&surge.amplitude, "amplitude")?,
+                amplitude: self.not_negative(&surge.amplitude, "amplitude")?,
                 direction: self.direction(&surge.direction)?,
             })
         });

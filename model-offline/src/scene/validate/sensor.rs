@@ -1,6 +1,7 @@
 //! The rules of what sees the target.
 
 use super::{Checked, Validator};
+use crate::number::short;
 use crate::scene::schema::Located;
 use crate::scene::sensor::{Outages, Sensor, SensorPreset};
 
@@ -49,12 +50,21 @@ impl Validator<'_> {
         if let Some(noise) = &section.noise {
             sensor.noise = self.not_negative(noise, "noise")?;
             if sensor.noise > MOST_NOISE {
-                let message = format!("noise: {} is no sensor of a target in this body", sensor.noise);
+                let message = format!("noise: {} is no sensor of a target in this body", short(sensor.noise));
                 return Err(self.error(noise.span(), message, "give a standard deviation in length units"));
             }
         }
         if let Some(quantisation) = &section.quantisation {
             sensor.quantisation = self.not_negative(quantisation, "quantisation")?;
+            if sensor.quantisation > MOST_NOISE {
+                let message =
+                    format!("quantisation: {} is no sensor of a target in this body", short(sensor.quantisation));
+                return Err(self.error(
+                    quantisation.span(),
+                    message,
+                    "give the step between two readings in length units",
+                ));
+            }
         }
         if let Some(bias) = &section.bias {
             sensor.bias = self.point(bias.get(), bias.span(), "bias")?;

@@ -72,6 +72,15 @@ pub enum SceneWarning {
         /// Static friction, force per length.
         static_friction: f64,
     },
+    /// Tissue may not bear what the tip presses with, and fine nodes see it.
+    TipTooShort {
+        /// Whose cutting force it is: an inclusion's, or the needle's.
+        inclusion: Option<usize>,
+        /// Length that the cutting force is spread over.
+        tip_length: f64,
+        /// Length from which on tissue bears it.
+        least: f64,
+    },
     /// The target is next to the boundary.
     TargetNearBoundary {
         /// Its distance from the boundary.
@@ -179,9 +188,13 @@ impl SceneWarning {
             }
             Self::FrictionOnlySticks { inclusion, static_friction } => format!(
                 "the friction of {} only sticks: static_friction is {} and what slides is not held at all",
-                inclusion.map_or("the needle".to_owned(), |number| format!("inclusion {number}")),
+                whose(inclusion),
                 short(static_friction)
             ),
+            Self::TipTooShort { inclusion, tip_length, least } => {
+                let (whose, on, from) = (whose(inclusion), long(tip_length), long(least));
+                format!("the tip is {on} long, and tissue bears the cutting force of {whose} from {from} on")
+            }
             Self::TargetNearBoundary { distance, spacing } => format!(
                 "the target is nearer to the boundary than the nodes are to each other: {} of {}",
                 long(distance),
@@ -231,6 +244,9 @@ impl SceneWarning {
             Self::NeedleMeetsImmobile { .. } => "insert less deep, or turn the axis: what cannot move stops a needle",
             Self::ContactShort { .. } | Self::PaddleShort { .. } => "lengthen it, or take a smaller spacing",
             Self::FrictionOnlySticks { .. } => "give kinetic_friction too",
+            Self::TipTooShort { .. } => {
+                "give a longer tip_length, or a spacing in place of the tolerance: on fine nodes there may be no equilibrium"
+            }
             Self::TargetNearBoundary { .. } => "take a smaller spacing, or move the target inwards",
             Self::InclusionPartlyOutside { .. } => "the part outside does nothing: move it, or cut it off",
             Self::InclusionNarrow { .. } => {
@@ -258,6 +274,11 @@ impl fmt::Display for SceneWarning {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         formatter.write_str(&self.told("1"))
     }
+}
+
+/// What resists: an inclusion, or everything that the needle goes through.
+fn whose(inclusion: Option<usize>) -> String {
+    inclusion.map_or("the needle".to_owned(), |number| format!("inclusion {number}"))
 }
 
 /// A part of something, never 0 and never all of it.
