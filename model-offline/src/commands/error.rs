@@ -169,6 +169,15 @@ impl CliError {
         }
     }
 
+    /// Depth of the last converged state, or of the one that was not found; none where it is not about depths.
+    fn depth(&self) -> Option<f64> {
+        match self {
+            Self::Solve { depth, .. } => Some(*depth),
+            Self::Needle(error) => error.depth(),
+            _ => None,
+        }
+    }
+
     /// The error, told in the JSON too when a computation failed, so that a script sees the reason.
     pub(super) fn reported(self, file: Option<&Path>, scene: &Scene) -> Self {
         self.reported_of(file, &scene.name, scene.tissue())
@@ -179,7 +188,7 @@ impl CliError {
         if self.exit_code() == 1 && file.is_some() {
             let document = serde_json::json!({
                 "scene": scene, "tissue": tissue,
-                "failure": {"reason": self.reason(), "detail": self.to_string()},
+                "failure": {"reason": self.reason(), "depth": self.depth(), "detail": self.to_string()},
             });
             if let Err(output) = json::write_json(file, &document) {
                 return output.into();

@@ -106,12 +106,23 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
             "raise depth in [needle]: nodes are placed along its shaft",
         ));
     }
+    note_what_is_too_deep(&scene, args.depth);
     let beside = args.vtu.as_deref().map(beside);
     let [parts, script] = [0, 1].map(|i| ("--vtu", beside.as_ref().map(|files| files[i].as_path())));
     let [json, vtu, svg] = [&args.json, &args.vtu, &args.svg].map(Option::as_deref);
     let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg), parts, script];
     check_outputs(&[&args.scene.scene], &outputs)?;
     solve(&scene, Held { paddle, displacement }, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
+}
+
+/// Says what would be unusual about the scene if its needle went as deep as is asked for.
+fn note_what_is_too_deep(scene: &Scene, depth: f64) {
+    let mut deeper = scene.clone();
+    deeper.needle.depth = depth.max(scene.needle.depth);
+    let known = scene.warnings();
+    for warning in deeper.warnings().iter().filter(|warning| !known.contains(warning)) {
+        eprintln!("note: {}", warning.told(&scene.length_unit));
+    }
 }
 
 /// The same of a scene in space, without the options of the plane.

@@ -95,7 +95,7 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached: the best estimate is {}; take a larger tolerance, or fem-t6 (in space fem-t10), which converge faster than the others",
+        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}; take a larger tolerance, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
         short(*reached)
     )]
     ToleranceNotReached {

@@ -60,6 +60,11 @@ impl SlippingNeedle<'_> {
             };
             *self = before;
             if parts >= MOST_PARTS || outcome.is_err() && goal - done < SHORTEST_PART {
+                if !self.is_sprung && !self.is_small_strain() {
+                    // From here on with springs.
+                    (self.is_sprung, goal, parts) = (true, 1.0, 0);
+                    continue;
+                }
                 return outcome.and(Err(NeedleError::NoForces { depth: pose.depth }));
             }
             goal = done + (goal - done) * shorter;

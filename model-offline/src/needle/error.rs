@@ -39,3 +39,13 @@ pub enum NeedleError {
     #[error("the shaft would leave the body, or lie between nodes that are too far apart: {0}")]
     Shape(#[from] ShapeError),
 }
+
+impl NeedleError {
+    /// Depth that was asked for, length; none where that did not matter.
+    pub fn depth(&self) -> Option<f64> {
+        match self {
+            Self::Equilibrium { depth, .. } | Self::NoForces { depth } | Self::Outrun { depth } => Some(*depth),
+            Self::NoShaft | Self::HeldWeakly | Self::Shape(_) => None,
+        }
+    }
+}

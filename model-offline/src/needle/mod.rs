@@ -31,6 +31,7 @@ mod insertion;
 mod jacobian;
 mod path;
 mod reading;
+mod springs;
 mod state;
 mod station;
 mod trial;

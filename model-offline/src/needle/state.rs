@@ -2,6 +2,7 @@
 
 use super::error::NeedleError;
 use super::path::{CutPath, hat_integrals};
+use super::springs::Springs;
 use super::station::{Slide, Station, StationState, spread};
 use crate::discretization::Integration;
 use crate::geometry::Point2;
@@ -11,6 +12,7 @@ use crate::scene::Shaft;
 use crate::solver::equilibrium::{Equilibrium, NewtonSettings};
 use nalgebra::Vector2;
 use serde::Serialize;
+use std::sync::Arc;
 
 /// Where the work at the needle's base and of the paddle went on the way through open skin:
 /// work + paddle + base = stored + friction + cutting. Where the skin had to be punctured more was done before, which it took
@@ -98,6 +100,9 @@ pub struct SlippingNeedle<'m> {
     pub(super) energy: EnergyAccount,
     /// Of all that have been found.
     pub(super) largest_force: f64,
+    /// Whether springs keep tissue on the line while forces are sought, and those that do.
+    pub(super) is_sprung: bool,
+    pub(super) springs: Option<Arc<Springs>>,
     /// Coefficients at the end of the last increment.
     pub(super) last: Vec<f64>,
 }
@@ -145,6 +150,8 @@ impl<'m> SlippingNeedle<'m> {
             last_forces: [Vector2::zeros(); 2],
             energy: EnergyAccount::default(),
             largest_force: 0.0,
+            is_sprung: false,
+            springs: None,
             last: vec![0.0; model.dofs()],
         };
         let places = needle.places();

@@ -3,6 +3,7 @@
 use super::complementarity::{Bounds, forces_between};
 use super::error::NeedleError;
 use super::path::hat_integrals;
+use super::springs::Springs;
 use super::state::{STEP_TOLERANCE, SlippingNeedle, newton_settings};
 use super::station::{Slide, Station, add_force, spread};
 use crate::geometry::Point2;
@@ -153,7 +154,9 @@ impl SlippingNeedle<'_> {
         });
         let enough = AGREED * self.model.spacing();
         let mut compliance: Option<DMatrix<f64>> = None;
-        let (mut last, mut fresh, mut share) = (f64::INFINITY, false, 1.0);
+        self.hold_by_springs(&contacts);
+        // What is known of the tissue without springs says nothing of it with them.
+        let (mut last, mut fresh, mut share) = (f64::INFINITY, self.is_sprung, 1.0);
         for round in 0..ROUNDS {
             let external = self.external(&contacts, &forces, &spread);
             let loose = self.drive(depth, &external, last)?;
@@ -206,6 +209,23 @@ impl SlippingNeedle<'_> {
             last = change;
         }
         Err(NeedleError::NoForces { depth })
+    }
+
+    /// Puts springs on the stations that are held on the line, where forces have not been found without.
+    fn hold_by_springs(&mut self, contacts: &[Station]) {
+        if !self.is_sprung {
+            return;
+        }
+        let there = |at: Point2| self.pose.lateral - self.normal().dot(&(at - self.shaft.entry));
+        let held = contacts.iter().filter(|contact| !self.lies_where_it_is(contact));
+        let stations = held.map(|contact| (contact, there(contact.at)));
+        let stiffness = self.equilibrium.rest_stiffness();
+        let springs = Springs::new((self.normal(), stiffness), stations, self.model.analysis().pattern());
+        if self.springs.as_deref() != Some(&springs) {
+            let springs = Arc::new(springs);
+            self.springs = Some(Arc::clone(&springs));
+            self.equilibrium.hold(springs);
+        }
     }
 
     /// What is no change of a station's displacement.

@@ -4,6 +4,7 @@ use super::chart::Dash;
 use super::chart::number::number;
 use super::chart::{Axis, Bars, Colour, Figure, Marker, Panel, Place, ReferenceLine, Series};
 use super::result_file::{ResultError, read_value};
+use crate::placement::accuracy::measure_range;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -143,14 +144,15 @@ impl Does {
         self.controllability_measure.unwrap_or(f64::NAN)
     }
 
-    /// What the measure may be off by, in its own unit.
-    fn measure_error(&self) -> Option<f64> {
-        Some(self.error.as_ref()?.controllability_measure? * self.measure())
+    /// Between what the measure may lie.
+    fn measure_range(&self) -> Option<[f64; 2]> {
+        Some(measure_range(self.measure(), self.error.as_ref()?.controllability_measure?))
     }
 
-    /// What the displacement may be off by, length.
-    fn held_error(&self) -> Option<f64> {
-        self.error.as_ref()?.held.as_ref()?.max_orthogonal
+    /// Between what the displacement may lie, length.
+    fn held_range(&self) -> Option<[f64; 2]> {
+        let error = self.error.as_ref()?.held.as_ref()?.max_orthogonal?;
+        Some([self.held.max_orthogonal - error, self.held.max_orthogonal + error])
     }
 }
 
@@ -160,8 +162,8 @@ struct Shown<'a> {
     y: Axis,
     best: Option<&'a Set>,
     colour: Colour,
-    /// The height, and what it may be off by.
-    of: fn(&Does) -> (f64, Option<f64>),
+    /// The height, and between what it may really lie.
+    of: fn(&Does) -> (f64, Option<[f64; 2]>),
 }
 
 impl DrawnStudy {
@@ -189,18 +191,19 @@ impl DrawnStudy {
         let name = |name: &String| if best.as_ref() == Some(name) { format!("{name}\nbest") } else { name.clone() };
         let places = Axis::categories("paddle position", sets.iter().map(|(set, _)| name(set)).collect());
         let mut panel = Panel::new(&title, places, y);
-        let heights: Vec<(f64, f64, Option<f64>)> = sets
+        let heights: Vec<(f64, f64, Option<[f64; 2]>)> = sets
             .iter()
             .enumerate()
             .map(|(k, (_, does))| (k as f64, of(does)))
-            .map(|(x, (height, error))| (x, height, error))
+            .map(|(x, (height, range))| (x, height, range))
             .collect();
         let bars = heights.iter().filter(|(_, height, _)| height.is_finite()).map(|&(x, y, _)| [x - 0.35, x + 0.35, y]);
         panel.bars.push(Bars { label: earlier.map_or("", |_| "this study").to_owned(), colour, bars: bars.collect() });
         panel.lines.push(ReferenceLine::new("", Place::Y(0.0), Dash::Solid));
-        let range = |&(x, height, error): &(f64, f64, Option<f64>)| {
-            let error = error.filter(|error| error.is_finite())?;
-            Some([(x, (height - error).max(0.0)), (x, height + error)])
+        // What may be any number is drawn to twice what was found.
+        let range = |&(x, height, range): &(f64, f64, Option<[f64; 2]>)| {
+            let [least, most] = range.filter(|[least, _]| least.is_finite())?;
+            Some([(x, least.max(0.0)), (x, most.min(2.0 * height.max(0.0)).max(height))])
         };
         let ranges: Vec<[(f64, f64); 2]> = heights.iter().filter_map(range).collect();
         for (k, range) in ranges.into_iter().enumerate() {
@@ -246,7 +249,7 @@ pub fn svg(study: &DrawnStudy, earlier: Earlier) -> String {
         y: axis,
         best: dynamic.as_ref(),
         colour: Colour::Blue,
-        of: |does| (does.measure(), does.measure_error()),
+        of: |does| (does.measure(), does.measure_range()),
     };
     let axis = Axis::linear("largest displacement orthogonal to the needle", study.length());
     let still = Shown {
@@ -254,7 +257,7 @@ pub fn svg(study: &DrawnStudy, earlier: Earlier) -> String {
         y: axis,
         best: held.as_ref(),
         colour: Colour::Vermillion,
-        of: |does| (does.held.max_orthogonal, does.held_error()),
+        of: |does| (does.held.max_orthogonal, does.held_range()),
     };
     let mut fixture = study.panel(still, earlier);
     fixture.lines.push(ReferenceLine::new("no paddle", Place::Y(study.no_paddle.held.max_orthogonal), Dash::Dashed));

@@ -18,7 +18,7 @@ const LEVEL: i32 = -2;
 pub struct PaddleErrors {
     /// Of the Jacobian at rest: Frobenius norm, over that of the Jacobian.
     pub jacobian: f64,
-    /// Of ‖J⁻¹n‖, over itself; none where the paddle cannot control the target.
+    /// Of ‖J⁻¹n‖, over what it is on ever finer nodes (see [`measure_range`]); none where the paddle cannot control the target.
     pub controllability_measure: Option<f64>,
     /// Of J⁻¹n: length of the difference; none where there is no J⁻¹n.
     pub best_direction: Option<f64>,
@@ -70,11 +70,12 @@ impl Accuracy {
         let best = placement.paddles.iter().find(|paddle| paddle.index == optimum.static_paddle);
         let deep = best.map_or(0, |paddle| paddle.static_study.depth.len());
         let held = all().filter(|(paddle, _)| paddle.static_study.depth.len() == deep).map(|(paddle, errors)| {
-            (paddle.index, paddle.static_study.max_orthogonal, errors.static_study.max_orthogonal)
+            let largest = paddle.static_study.max_orthogonal;
+            (paddle.index, errors.static_study.max_orthogonal.map(|error| [largest - error, largest + error]))
         });
         let moved = all().map(|(paddle, errors)| {
-            let measure = paddle.controllability_measure;
-            (paddle.index, measure, errors.controllability_measure.map(|error| error * measure))
+            let error = errors.controllability_measure;
+            (paddle.index, error.map(|error| measure_range(paddle.controllability_measure, error)))
         });
         AsGood {
             static_paddles: not_told_from(optimum.static_paddle, held),
@@ -83,11 +84,17 @@ impl Accuracy {
     }
 }
 
-/// Of paddles with what is to be small and its error, those whose range meets that of the best one.
-fn not_told_from(best: u32, all: impl Iterator<Item = (u32, f64, Option<f64>)>) -> Vec<u32> {
-    let known: Vec<(u32, f64, f64)> = all.filter_map(|(index, value, error)| Some((index, value, error?))).collect();
-    let Some((_, value, error)) = known.iter().find(|paddle| paddle.0 == best) else { return Vec::new() };
-    let reaches = |paddle: &&(u32, f64, f64)| paddle.0 != best && paddle.1 - paddle.2 <= value + error;
+/// Between what a measure may lie that was found with this relative error, which is over what it really is: a measure that came
+/// out at twice what it is has an error of 1, and nothing says that it may be none.
+pub fn measure_range(found: f64, error: f64) -> [f64; 2] {
+    [found / (1.0 + error), if error < 1.0 { found / (1.0 - error) } else { f64::INFINITY }]
+}
+
+/// Of paddles with the range of what is to be small, those whose range meets that of the best one.
+fn not_told_from(best: u32, all: impl Iterator<Item = (u32, Option<[f64; 2]>)>) -> Vec<u32> {
+    let known: Vec<(u32, [f64; 2])> = all.filter_map(|(index, range)| Some((index, range?))).collect();
+    let Some((_, [_, most])) = known.iter().find(|paddle| paddle.0 == best) else { return Vec::new() };
+    let reaches = |(index, [least, _]): &&(u32, [f64; 2])| *index != best && least <= most;
     known.iter().filter(reaches).map(|paddle| paddle.0).collect()
 }
 
@@ -222,10 +229,26 @@ mod tests {
     /// Ranges that meet are not told from each other; a range that is not known says nothing, of others nor of the best.
     #[test]
     fn who_is_within_the_errors_of_the_best_is_named() {
-        let all = [(3, 1.0, Some(0.1)), (5, 1.25, Some(0.2)), (8, 1.25, Some(0.1)), (9, 1.05, None)];
+        let all = [(3, Some([0.9, 1.1])), (5, Some([1.05, 1.45])), (8, Some([1.15, 1.35])), (9, None)];
         assert_eq!(not_told_from(3, all.into_iter()), [5]);
         assert_eq!(not_told_from(9, all.into_iter()), [0; 0]);
-        let exact = [(1, 2.0, Some(0.0)), (2, 2.0, Some(0.0)), (4, 2.1, Some(0.0))];
+        let exact = [(1, Some([2.0, 2.0])), (2, Some([2.0, 2.0])), (4, Some([2.1, 2.1]))];
         assert_eq!(not_told_from(1, exact.into_iter()), [2], "equal to the last digit");
+    }
+
+    /// Whatever a measure really is, what was found of it has it in its range, and the range ends there on one side.
+    #[test]
+    fn the_range_of_a_measure_holds_what_it_really_is() {
+        for (found, really) in [(105.86, 48.84), (2.55, 2.94), (1.0, 1.0), (0.2, 40.0), (3.0, 1.5)] {
+            let error = f64::abs(found / really - 1.0);
+            let [least, most] = measure_range(found, error);
+            assert!(
+                least <= really * (1.0 + 1e-12) && really <= most * (1.0 + 1e-12),
+                "{found} for {really}: {least} to {most}"
+            );
+            let end = if found > really { least } else { most };
+            assert!((end / really - 1.0).abs() < 1e-12, "{found} for {really}: {least} to {most}");
+        }
+        assert_eq!(measure_range(3.0, 1.0)[1], f64::INFINITY);
     }
 }

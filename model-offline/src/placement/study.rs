@@ -255,7 +255,14 @@ pub(super) fn follow(
     for increment in 1..=increments {
         progress();
         let depth = scene.needle.depth * f64::from(increment) / f64::from(increments);
-        let outcome = body.drive(depth, Vector2::zeros());
+        let mut outcome = body.drive(depth, Vector2::zeros());
+        // Few cuts find where a law loses stability; what did not converge is asked again with all of them.
+        if let Err(Failure { reason: FailureReason::NotConverged, .. }) = outcome {
+            body.equilibrium_mut()
+                .set_settings(NewtonSettings { max_cutbacks: NewtonSettings::default().max_cutbacks, ..newton });
+            outcome = body.drive(depth, Vector2::zeros());
+            body.equilibrium_mut().set_settings(newton);
+        }
         let jacobian = outcome.and_then(|()| paddle.map(|_| body.actuation_jacobian()).transpose());
         match jacobian {
             Ok(jacobian) => {

@@ -36,7 +36,7 @@ impl ShapeError {
 }
 
 /// Values of the shape functions that are not zero at a point, with gradients when asked for.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Stencil<const D: usize> {
     /// Nodes I, ascending.
     pub nodes: Vec<u32>,

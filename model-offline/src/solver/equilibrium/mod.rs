@@ -172,6 +172,17 @@ impl<const D: usize> Equilibrium<D> {
         self.settings = settings;
     }
 
+    /// Adds a term to the energy, in place of the last one, on nodes that the tangent couples; nothing is prescribed by it.
+    pub(crate) fn hold(&mut self, by: Arc<dyn WeaklyImposed>) {
+        self.weak = Some(by);
+        (self.factor_is_current, self.factor_exists) = (false, false);
+    }
+
+    /// Mean force per displacement of a node at rest.
+    pub(crate) fn rest_stiffness(&self) -> f64 {
+        self.solver.rest_stiffness()
+    }
+
     /// Nodal coefficients d, D numbers per node.
     pub fn coefficients(&self) -> &[f64] {
         &self.at.coefficients
