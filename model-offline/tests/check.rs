@@ -146,11 +146,7 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
         (
             // Twice the shear modulus of 1 on 0.4 is 0.8, in the inclusion 8; nodes that are 5 apart do not see the tip.
             &[(DEPTH, &tip(0.4)), ("spacing = 5.0", "tolerance = 0.05")],
-            &[
-                "the cutting force of the needle on a length of 0.4 mm",
-                "bears it from 0.5 mm on",
-                "a longer tip_length",
-            ],
+            &["the tip is 0.4 mm long", "the cutting force of the needle from 0.5 mm on", "a longer tip_length"],
         ),
         (
             &[

@@ -69,7 +69,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
     };
     limits::check_tolerance(args.tolerance)?;
     check_outputs(&[&args.scene.scene], &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
-    let outcome = fit::fit(&scene, args.tolerance, parallel::threads(args.threads))
+    let told = |what: &str| {
+        if !args.quiet {
+            eprintln!("{what} …");
+        }
+    };
+    let outcome = fit::fit_told(&scene, args.tolerance, parallel::threads(args.threads), &told)
         .map_err(CliError::from)
         .and_then(|fit| Ok((scene_with(&fit, &args.scene.scene)?, fit)));
     let (text, fit) = outcome.map_err(|error| error.reported(args.json.as_deref(), &scene))?;

@@ -136,18 +136,31 @@ pub struct Fit {
 /// [`ModelError::ToleranceNotReached`](crate::ModelError::ToleranceNotReached) when no candidate keeps it, others when the
 /// scene cannot be modelled at all, has no table, or has effects with which it cannot be followed.
 pub fn fit(scene: &Scene, tolerance: f64, threads: usize) -> Result<Fit, FitError> {
+    fit_told(scene, tolerance, threads, &|_| {})
+}
+
+/// The same, telling what it does before it does it: each may take from a moment to minutes.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_told(scene: &Scene, tolerance: f64, threads: usize, told: &dyn Fn(&str)) -> Result<Fit, FitError> {
     let start = Instant::now();
     let has_a_past = scene.has_a_past();
     let shares = if has_a_past { WORLD_SHARES } else { SHARES };
+    if has_a_past {
+        told("following the insertion with each of the scene's effects left out");
+    }
     let judged = if has_a_past { Some(judge_world(scene, shares.effects * tolerance, threads)?) } else { None };
     let effects_rejected = judged.as_ref().map_or_else(Vec::new, |judged| judged.rejected.clone());
     let simple = if has_a_past { scene.without_a_past() } else { scene.clone() };
     let share = shares.discretization * tolerance;
+    told("finding what the numbers are on ever finer nodes");
     let reference = Reference::compute(&simple, REFERENCE_SHARE * share)?;
+    told("trying methods and nodes");
     let found = discretization(&simple, share, &reference)?;
     let wall_s = assess(found.discretization, &simple, &reference, REPEATS)?.wall_s;
     let plant_tolerance = shares.plant * tolerance;
-    let parts = Parts { scene: &simple, chosen: &found.discretization, plant_tolerance, threads };
+    let parts = Parts { scene: &simple, chosen: &found.discretization, plant_tolerance, threads, told };
     let table_tolerance = shares.table * tolerance;
     let rest = match &judged {
         Some(judged) if !judged.needed.is_empty() => parts.of_a_world(judged, table_tolerance)?,
@@ -196,6 +209,7 @@ struct Parts<'a> {
     chosen: &'a Discretization,
     plant_tolerance: f64,
     threads: usize,
+    told: &'a dyn Fn(&str),
 }
 
 /// What is chosen besides effects and discretization.
@@ -220,7 +234,9 @@ impl Parts<'_> {
     /// A contact that moves with the needle in elastic tissue at rest.
     fn without_a_past(&self, judged: Option<&JudgedWorld>, table_tolerance: f64) -> Result<Rest, FitError> {
         let model = self.model()?;
+        (self.told)(&format!("training reduced plants on {} nodes, and trying them", model.nodes()));
         let (plant, plants_rejected) = plant::plant(&model, self.plant_tolerance, self.threads)?;
+        (self.told)("following the insertion on finer nodes, and trying knots of the table");
         Ok(Rest {
             law: plant.law,
             plant: plant.plant,
@@ -236,6 +252,7 @@ impl Parts<'_> {
     /// The neighbourhood of an insertion.
     fn of_a_world(&self, judged: &JudgedWorld, table_tolerance: f64) -> Result<Rest, FitError> {
         let (law, plants_rejected) = judged.law(self.plant_tolerance);
+        (self.told)("following the insertion on finer nodes, and trying knots of the table");
         let world = judged.against_finer(self.chosen, law, self.threads);
         let table = match judged.needs_a_table_along_the_insertion() {
             false => table::table(&self.model()?, table_tolerance)?,

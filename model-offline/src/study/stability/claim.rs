@@ -1,6 +1,7 @@
 //! The claim that meshfree methods are more stable than finite elements under large deformation, counted.
 
 use super::plan::{Experiment, Parameter, Safeguards, Value};
+use super::zero_energy::Unmeasured;
 use super::{ExperimentResult, Stability};
 use crate::discretization::{Integration, Method};
 use std::fmt::Write as _;
@@ -232,6 +233,9 @@ fn write_zero_energy(study: &Stability, out: &mut String) {
             z.least_energy_ratio,
             z.bloch_share.max(0.0)
         );
+    }
+    for Unmeasured { integration, jitter, error } in &study.unmeasured {
+        let _ = writeln!(out, "  {:<15} is not measured on nodes jittered by {jitter}: {error}", integration.name());
     }
     out.push_str(
         "  0 in the last column is a ghost mode: a second body of nodes that alternate, which no inner cell holds and the \

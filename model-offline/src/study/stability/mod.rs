@@ -27,7 +27,7 @@ use law_limit::{Lateral, limit_stretch};
 use plan::{Entry, Experiment};
 use probe::ExperimentResult;
 use setting::Setting;
-use zero_energy::ZeroEnergy;
+use zero_energy::{Unmeasured, ZeroEnergy};
 
 pub use chart::figure;
 pub use claim::{ClaimCounts, Pairs, claim_counts, summary};
@@ -59,6 +59,8 @@ pub struct Stability {
     pub limits: Vec<LawLimit>,
     /// Zero-energy modes by method; in space they are not measured.
     pub zero_energy: Vec<ZeroEnergy>,
+    /// Methods that have no model on those nodes.
+    pub unmeasured: Vec<Unmeasured>,
 }
 
 impl Stability {
@@ -116,7 +118,7 @@ impl Plan {
     ) -> Result<Stability, ModelError> {
         let place = scene.paddle_position(paddle)?;
         let mut study = self.with(paddle, threads, progress, &|experiment| probe::run(scene, place, experiment))?;
-        study.zero_energy = zero_energy::measure(scene, study.spacing)?;
+        (study.zero_energy, study.unmeasured) = zero_energy::measure(scene, study.spacing);
         Ok(study)
     }
 
@@ -165,6 +167,7 @@ impl Plan {
             rows,
             limits: limits(&self.setting, &self.entries),
             zero_energy: Vec::new(),
+            unmeasured: Vec::new(),
             setting: self.setting.clone(),
         })
     }

@@ -46,19 +46,30 @@ pub struct ZeroEnergy {
     pub bloch_share: f64,
 }
 
-/// Measures every method at a spacing, on a regular lattice and with nodes jittered by 40 %.
-///
-/// # Errors
-/// [`ModelError`] when a model cannot be made.
-pub fn measure(scene: &Scene, spacing: f64) -> Result<Vec<ZeroEnergy>, ModelError> {
+/// A method that cannot be measured on some nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unmeasured {
+    /// Method.
+    pub integration: Integration,
+    /// Node jitter over spacing.
+    pub jitter: f64,
+    /// Why there is no model.
+    pub error: ModelError,
+}
+
+/// Measures every method at a spacing, on a regular lattice and with nodes jittered by 40 %; and which have no model there.
+pub fn measure(scene: &Scene, spacing: f64) -> (Vec<ZeroEnergy>, Vec<Unmeasured>) {
     let setting = &Setting::from(scene);
-    [0.0, 0.4]
-        .into_iter()
-        .flat_map(|jitter| {
-            Integration::PLANAR.iter().map(move |m| Experiment { jitter, ..plan::base(setting, *m, spacing) })
-        })
-        .map(|experiment| measure_one(scene, &experiment))
-        .collect()
+    let (mut measured, mut not) = (Vec::new(), Vec::new());
+    for jitter in [0.0, 0.4] {
+        for &integration in Integration::PLANAR {
+            match measure_one(scene, &Experiment { jitter, ..plan::base(setting, integration, spacing) }) {
+                Ok(found) => measured.push(found),
+                Err(error) => not.push(Unmeasured { integration, jitter, error }),
+            }
+        }
+    }
+    (measured, not)
 }
 
 fn measure_one(scene: &Scene, experiment: &Experiment) -> Result<ZeroEnergy, ModelError> {
