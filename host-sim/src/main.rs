@@ -5,6 +5,8 @@ mod commands;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    // Its warnings show whole data structures of a link whose other side has gone; what matters of that is an error of ours.
+    iceoryx2::prelude::set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Error);
     let command = commands::parse();
     // Two processes share one terminal: whose error is it?
     let is_controller = matches!(command, commands::Command::Controller(_));

@@ -75,12 +75,6 @@ pub enum RuntimeError {
         /// How long, s.
         silent_s: f64,
     },
-    /// The plant ended before the controller had a tick.
-    #[error("the plant ended before the first tick; it says why: maybe it refuses this table")]
-    #[diagnostic(help(
-        "read what the plant has printed, and give both sides the same scene: the table is to be of it"
-    ))]
-    NoTick,
     /// The peer says something impossible.
     #[error("the {peer} process broke the protocol: {what}")]
     Protocol {

@@ -11,6 +11,8 @@ use crate::model::TissueModel;
 /// Width of the picture, and room around the body as a part of its size.
 const WIDTH: f64 = 640.0;
 const MARGIN: f64 = 0.06;
+/// Part of the margin that is left beside a body that has moved into it.
+const BESIDE: f64 = 0.3;
 
 /// A picture of a body, self-contained.
 pub fn svg(model: &TissueModel, state: State<'_>) -> String {
@@ -50,7 +52,13 @@ impl<'a> Picture<'a> {
     fn new(model: &'a TissueModel, coefficients: &'a [f64]) -> Self {
         let (low, high) = model.scene().outline.bounds();
         let margin = MARGIN * (high - low).max();
-        let plane = Plane::new([low.x - margin, low.y - margin], [high.x + margin, high.y + margin], WIDTH);
+        let (mut low, mut high) = (low.add_scalar(-margin), high.add_scalar(margin));
+        // A body that leaves its place takes the picture with it.
+        for x in model.positions() {
+            let now = x + model.displacement_at(x, coefficients);
+            (low, high) = (low.inf(&now.add_scalar(-BESIDE * margin)), high.sup(&now.add_scalar(BESIDE * margin)));
+        }
+        let plane = Plane::new([low.x, low.y], [high.x, high.y], WIDTH);
         Self { model, coefficients, plane }
     }
 

@@ -9,6 +9,7 @@ use crate::random::SplitMix64;
 use crate::solver::equilibrium::{Failure, LinearSolver, NewtonSettings};
 use nalgebra::Vector2;
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Depths of the snapshots over the trained depth, with a paddle. Denser towards the end, where the response bends most.
 const DEPTHS: [f64; 5] = [0.0, 0.3, 0.6, 0.8, 1.0];
@@ -87,11 +88,12 @@ pub(super) fn states(
     let wanted = asked;
     let mut failed = None;
     for _ in 0..=SHRINKS {
-        let taken = take_snapshots(at_rest, grid, asked, threads);
+        let narrows = asked.paddle.amax() > NARROWEST * wanted.paddle.amax();
+        let taken = take_snapshots(at_rest, grid, asked, narrows, threads);
         if taken.reached < asked.depth {
             let deepest = if taken.reached_alone < asked.depth { taken.reached_alone } else { taken.reached };
             // Every insertion goes deep and few paddles go far: room for the paddle is given up first, where that helps.
-            if taken.reached_alone == asked.depth && asked.paddle.amax() > NARROWEST * wanted.paddle.amax() {
+            if taken.reached_alone == asked.depth && narrows {
                 asked.paddle *= NARROWER;
             } else {
                 asked.depth = KEPT * deepest;
@@ -120,28 +122,46 @@ struct Taken {
     reached_alone: f64,
 }
 
-fn take_snapshots(at_rest: &Body<'_>, grid: &Grid, asked: Domain, threads: usize) -> Taken {
-    let runs = parallel::map(grid.places.len(), threads, |k| {
+/// Where the paddle rests first: where that fails nothing else matters, and neither does how far the others get when the first
+/// of them fails and the range of the paddle `narrows` then.
+fn take_snapshots(at_rest: &Body<'_>, grid: &Grid, asked: Domain, narrows: bool, threads: usize) -> Taken {
+    let stop = AtomicBool::new(false);
+    let run = |place: &Vector2<f64>| {
         let mut body = at_rest.clone();
-        let place = grid.places[k].component_mul(&asked.paddle);
+        let place = place.component_mul(&asked.paddle);
         // The paddle's way is not what is looked for, and long: as carefully as it takes.
         body.equilibrium_mut().set_settings(NewtonSettings::default());
-        if body.drive(0.0, place).is_err() {
-            return (Vec::new(), 0.0);
-        }
-        body.equilibrium_mut().set_settings(SNAPSHOT_SETTINGS);
         let mut taken = Vec::new();
-        for depth in grid.depths.iter().map(|share| share * asked.depth) {
-            if body.drive(depth, place).is_err() {
-                break;
+        let mut reached = 0.0;
+        if body.drive(0.0, place).is_ok() {
+            body.equilibrium_mut().set_settings(SNAPSHOT_SETTINGS);
+            for depth in grid.depths.iter().map(|share| share * asked.depth) {
+                if stop.load(Ordering::Relaxed) || body.drive(depth, place).is_err() {
+                    break;
+                }
+                taken.push(snapshot(&body));
             }
-            taken.push(snapshot(&body));
+            reached = body.depth();
         }
-        (taken, body.depth())
-    });
-    let reached = runs.iter().map(|run| run.1).fold(asked.depth, f64::min);
+        if reached < asked.depth && narrows {
+            stop.store(true, Ordering::Relaxed);
+        }
+        (taken, reached)
+    };
     let alone = grid.places.iter().position(|place| *place == Vector2::zeros());
-    let reached_alone = alone.map_or(reached, |k| runs[k].1);
+    let rested = alone.map(|k| (k, run(&grid.places[k])));
+    if let Some((_, (_, reached))) = rested
+        && reached < asked.depth
+    {
+        return Taken { snapshots: Vec::new(), reached, reached_alone: reached };
+    }
+    let others: Vec<usize> = (0..grid.places.len()).filter(|k| Some(*k) != alone).collect();
+    let mut runs = parallel::map(others.len(), threads, |k| run(&grid.places[others[k]]));
+    let reached = runs.iter().map(|run| run.1).fold(asked.depth, f64::min);
+    let reached_alone = if rested.is_some() { asked.depth } else { reached };
+    if let Some((k, rested)) = rested {
+        runs.insert(k, rested);
+    }
     // The state at rest teaches nothing.
     let snapshots = runs.into_iter().flat_map(|run| run.0).filter(|s| s.controls.iter().any(|c| *c != 0.0)).collect();
     Taken { snapshots, reached, reached_alone }
