@@ -4,6 +4,8 @@ mod commands;
 
 use std::process::ExitCode;
 
+use model_offline::output::terminal::all_was_said;
+
 fn main() -> ExitCode {
     // Its warnings show whole data structures of a link whose other side has gone; what matters of that is an error of ours.
     iceoryx2::prelude::set_log_level_from_env_or(iceoryx2::prelude::LogLevel::Error);
@@ -11,7 +13,8 @@ fn main() -> ExitCode {
     // Two processes share one terminal: whose error is it?
     let is_controller = matches!(command, commands::Command::Controller(_));
     match commands::execute(command) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) if all_was_said() => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::FAILURE,
         Err(error) => {
             let code = error.exit_code();
             if is_controller {

@@ -58,10 +58,19 @@ fn traces(part: &str) -> Vec<PathBuf> {
         .collect()
 }
 
+/// Whether a process has a handler for SIGTERM: bit 14 of those that it catches.
+fn catches_term(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap().trim();
+    u64::from_str_radix(caught, 16).unwrap() & (1 << 14) != 0
+}
+
 /// SIGTERM after `after`: exit code 1 with a word, soon.
 fn obeys(arguments: &[&str], after: Duration) {
     let mut child = start(arguments);
     std::thread::sleep(after);
+    // A busy machine may not have come to `main` by then, and nothing can be asked of a program before.
+    wait_for("it catches SIGTERM", || catches_term(child.id()).then_some(()));
     signal(child.id(), "TERM");
     let asked = Instant::now();
     // Its own end counts: whoever holds its pipes open is another matter.

@@ -4,9 +4,12 @@ mod commands;
 
 use std::process::ExitCode;
 
+use model_offline::output::terminal::all_was_said;
+
 fn main() -> ExitCode {
     match commands::run(commands::parse()) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) if all_was_said() => ExitCode::SUCCESS,
+        Ok(()) => ExitCode::FAILURE,
         Err(error) => {
             let code = error.exit_code();
             eprintln!("{:?}", miette::Report::new(error));

@@ -29,6 +29,13 @@ pub fn smallest_told(column: impl Iterator<Item = f64>) -> f64 {
     sizes.into_iter().filter(|size| *size > rounding).min_by(f64::total_cmp).unwrap_or(0.0)
 }
 
+/// The number in the middle, of an even count the mean of the two; none of nothing.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let upper = *values.get(values.len() / 2)?;
+    if values.len() % 2 == 1 { Some(upper) } else { Some(0.5 * (values[values.len() / 2 - 1] + upper)) }
+}
+
 /// A length with four digits or more.
 pub fn length(value: f64) -> String {
     format!("{value:.*}", decimals(value, 4))
@@ -97,6 +104,13 @@ mod tests {
         assert_eq!(decimals(3.1e-6, 6), 9);
         assert_eq!(decimals(1e-300, 6), 12);
         assert_eq!(decimals(f64::NAN, 6), 6);
+    }
+
+    #[test]
+    fn a_median_of_an_even_count_lies_between_the_two_in_the_middle() {
+        assert_eq!(median(vec![5.0, 1.0, 3.0]), Some(3.0));
+        assert_eq!(median(vec![9.0, 1.0, 2.0, 4.0]), Some(3.0));
+        assert_eq!(median(Vec::new()), None);
     }
 
     #[test]

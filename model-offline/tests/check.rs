@@ -195,6 +195,23 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
     assert!(wrong.is_empty(), "{} of them:\n{}", wrong.len(), wrong.join("\n"));
 }
 
+/// Ten thousand pairs of inclusions on each other: the list of them would say no more, and take all of the memory.
+#[test]
+fn of_many_overlaps_a_hundred_are_told() {
+    let again = format!("[[inclusion]]\noutline = {INCLUSION}\nstiffness = 2.0\n").repeat(140);
+    let overlaps = warnings(&[("[immobile]", &format!("{again}[immobile]"))]);
+    assert_eq!(overlaps.len(), 100);
+}
+
+/// A name is shown as it is, on a terminal as well.
+#[test]
+fn names_and_units_have_no_characters_that_a_terminal_obeys() {
+    for edit in [(r#"name = "block""#, r#"name = "a\u001b[2J""#), (r#"length = "mm""#, r#"length = "m\u009bm""#)] {
+        let refused = read(&[edit]).unwrap_err().to_string();
+        assert!(refused.contains("control character"), "{edit:?}: {refused}");
+    }
+}
+
 /// What is not unusual, though near to it.
 #[test]
 fn what_is_meant_is_not_warned_of() {

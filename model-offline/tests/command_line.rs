@@ -47,6 +47,28 @@ fn place_reproduces_the_papers_optima_and_the_reference_measures() {
     }
 }
 
+/// `| head` and a full disk. Nobody reads the first, and the files are wanted all the same; the second loses what was said.
+#[test]
+fn standard_output_may_be_closed_but_not_be_full() {
+    use std::process::{Command, Stdio};
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("result.json");
+    let (reader, closed) = std::io::pipe().unwrap();
+    drop(reader);
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    for (stdout, code, said) in
+        [(Stdio::from(closed), 0, ""), (Stdio::from(full), 1, "cannot write to standard output")]
+    {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_model-offline"));
+        command.arg("check").arg(scene("paper.toml")).arg("--json").arg(&out);
+        let ended = command.stdout(stdout).stderr(Stdio::piped()).output().unwrap();
+        let stderr = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(code), "{stderr}");
+        assert!(stderr.contains(said) && !stderr.contains("panicked"), "{stderr}");
+        std::fs::remove_file(&out).unwrap();
+    }
+}
+
 #[test]
 fn bad_scenes_give_one_error_with_file_line_and_column_and_write_nothing() {
     let good = std::fs::read_to_string(scene("paper.toml")).unwrap();

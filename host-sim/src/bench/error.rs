@@ -114,6 +114,16 @@ pub enum SimError {
         /// Why.
         reason: String,
     },
+    /// The new report lies there, or could not be put there, and what was there before could not be moved back.
+    #[error("{}: what was there before is in {} now; move it back", directory.display(), path.display())]
+    FormerReport {
+        /// Directory of the report.
+        directory: PathBuf,
+        /// Where the former one is.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// The tissue cannot be modelled.
     #[error("the tissue cannot be modelled")]
     Model(#[from] ModelError),

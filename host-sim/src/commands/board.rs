@@ -13,6 +13,7 @@ use host_sim::record::recording::Recording;
 use host_sim::report::board_chart;
 
 use model_offline::output::check_outputs;
+use model_offline::tell;
 
 /// Options of `board`.
 #[derive(clap::Args, Clone, Debug)]
@@ -53,7 +54,7 @@ pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
         if args.twice && scenarios.measure(&image)? != figures {
             complaints.push(Complaint::Unsteady { image: name.clone() });
         }
-        print!("{}", table(&name, &figures));
+        tell!("{}", table(&name, &figures));
         if let Some(budget) = &budget {
             match budget.get(&name) {
                 Some(allowed) => complaints.extend(measure::exceeded(&figures, allowed, &name)),

@@ -10,12 +10,14 @@ use host_sim::bench::usage::UsageError;
 use host_sim::exchange::Space;
 use host_sim::exchange::udp::{Addresses, Socket};
 use host_sim::record::files::write_json;
+use host_sim::runtime::bridge::accounts::BridgeResult;
 use host_sim::runtime::bridge::{BridgeSettings, ServedController, serve};
 use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::peer::introduction::Introduction;
 use host_sim::runtime::signals;
 use host_sim::world::error::OptionRange;
 use model_offline::output::check_outputs;
+use model_offline::say;
 
 use super::world_args::PATIENCE;
 
@@ -69,9 +71,9 @@ pub(crate) fn bridge(args: &BridgeArgs) -> Result<(), SimError> {
     let space = Space::new(&args.link)?;
     let socket = Socket::open(addresses).map_err(RuntimeError::from)?;
     let Addresses { listen, send_to, peer } = socket.addresses();
-    println!("Samples from {peer} to {listen}, commands to {send_to}, link {}", args.link);
+    say!("Samples from {peer} to {listen}, commands to {send_to}, link {}", args.link);
     if args.network {
-        println!("UDP is not authenticated and not encrypted: whoever can send as {peer} is the rig");
+        say!("UDP is not authenticated and not encrypted: whoever can send as {peer} is the rig");
     }
     let settings = BridgeSettings {
         patience: Duration::from_secs_f64(args.patience),
@@ -81,13 +83,18 @@ pub(crate) fn bridge(args: &BridgeArgs) -> Result<(), SimError> {
     let met = |told: &Introduction| {
         let Introduction { dimension, units: [unit, _], paddles, .. } = told;
         let paddles: Vec<_> = paddles.iter().map(u32::to_string).collect();
-        println!("Controller in {dimension} dimensions, unit of length {unit}, paddle {}", paddles.join(" + "));
+        say!("Controller in {dimension} dimensions, unit of length {unit}, paddle {}", paddles.join(" + "));
     };
-    let ServedController { result, ended } = serve(socket, &space, &settings, &met)?;
+    // Its accounts say as well that no controller came.
+    let ServedController { result, ended } =
+        serve(socket, &space, &settings, &met).unwrap_or_else(|error| ServedController {
+            result: BridgeResult { ended: Some(error.to_string()), ..BridgeResult::default() },
+            ended: Err(error),
+        });
     if let Some(path) = &args.json {
         write_json(path, &result)?;
     }
-    println!("{}", result.summary());
+    say!("{}", result.summary());
     Ok(ended?)
 }
 

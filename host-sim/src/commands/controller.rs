@@ -11,6 +11,7 @@ use host_sim::record::error::FileError;
 use host_sim::record::files::{read_bytes, write_json};
 use host_sim::record::recording::RecordingHeader;
 use host_sim::record::recording::stream::StreamRecorder;
+use host_sim::runtime::accounting::accounts::ControllerAccounts;
 use host_sim::runtime::controller::ControlLoop;
 use host_sim::runtime::controller::process::{ControllerResult, ServedPlant, Service, serve};
 use host_sim::runtime::executor::{AnyTable, Hardware, on_emulated_board};
@@ -25,6 +26,7 @@ use model_offline::table::TableBuildError;
 
 use super::world_args::PATIENCE;
 use model_offline::output::check_outputs;
+use model_offline::say;
 
 /// Options of the controller process.
 #[derive(clap::Args, Clone, Debug)]
@@ -88,6 +90,7 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     };
     let dimension = Header::read(&bytes).map_err(TableBuildError::Invalid)?.dimension;
     let header = RecordingHeader { mode: args.mode, seed: 0, scene_hash: table.scene_hash(), settings, table: bytes };
+    let space = Space::new(&args.link)?;
     let mut control_loop = ControlLoop::new(executor, args.capacity as usize).rearmed_by(signals::install_rearming());
     if let Some(path) = &args.record {
         control_loop = control_loop.recorded_by(Box::new(StreamRecorder::create(path, &header)?));
@@ -99,7 +102,12 @@ pub(crate) fn controller(args: &ControllerArgs) -> Result<(), SimError> {
     let (scene_hash, units, paddles) = (hex(&table.scene_hash()), table.units(), table.paddles());
     let introduction = Introduction { dimension, scene_hash, units, paddles };
     let service = Service { mode: args.mode, loop_settings, timeout, parent, introduction };
-    let served = serve(control_loop, &Space::new(&args.link)?, &service)?;
+    // Its accounts say as well that no plant came.
+    let served = serve(control_loop, &space, &service).unwrap_or_else(|error| ServedPlant {
+        accounts: ControllerAccounts::default(),
+        ticks: Vec::new(),
+        ended: Err(error),
+    });
     hand_in(args, served)
 }
 
@@ -123,9 +131,12 @@ fn hand_in(args: &ControllerArgs, served: ServedPlant) -> Result<(), SimError> {
         said.map_err(|source| FileError::Write { path: "standard output".into(), source })?;
     } else {
         let final_state = names::mode::name(accounts.final_state);
-        println!(
+        say!(
             "{} ticks ({} without room in the record), {} commands, final state {final_state}, faults seen: {}",
-            accounts.ticks.due, accounts.not_kept, accounts.commands, accounts.faults
+            accounts.ticks.due,
+            accounts.not_kept,
+            accounts.commands,
+            accounts.faults
         );
         if accounts.ticks.due == 0 {
             eprintln!(

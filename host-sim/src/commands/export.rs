@@ -15,6 +15,7 @@ use model_offline::model::space::SpaceModel;
 use model_offline::output::check_outputs;
 use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::placement::space::workflow::coarse;
+use model_offline::say;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::scene::{Scene, TissueVariant};
 
@@ -57,7 +58,7 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
     for (path, bytes) in files? {
         said.push(written(path, &bytes)?);
     }
-    println!("{} ticks, {}\n{}", recording.records.len(), recording.header.mode, said.join("\n"));
+    say!("{} ticks, {}\n{}", recording.records.len(), recording.header.mode, said.join("\n"));
     Ok(())
 }
 

@@ -20,6 +20,7 @@ use host_sim::runtime::signals;
 use host_sim::world::error::OptionRange;
 
 use model_offline::output::check_outputs;
+use model_offline::say;
 
 /// Options of `faults`.
 #[derive(Args, Clone, Debug)]
@@ -110,7 +111,7 @@ fn tried(args: &FaultsArgs, asked: &[u32], session: &dyn Session) -> Result<(), 
     let (failed, schedules) = (result.failed(), result.composed.as_ref().map_or(0, |sums| sums.failures.len()));
     if failed + schedules > 0 {
         let space = if in_space { " --dimension 3" } else { "" };
-        println!("seed {}: host-sim faults{space} --seed {} shows it again", args.seed, args.seed);
+        say!("seed {}: host-sim faults{space} --seed {} shows it again", args.seed, args.seed);
         return Err(SimError::Faults { failed, rows: result.rows.len(), schedules });
     }
     Ok(())
@@ -121,7 +122,7 @@ fn without_monitors(args: &FaultsArgs, session: &dyn Session) -> Result<(), SimE
     let monitors = session.monitors_off()?;
     for MonitorOff { monitor, rows } in &monitors {
         let rows: Vec<String> = rows.iter().map(ToString::to_string).collect();
-        println!(
+        say!(
             "{:<20}  {}",
             monitor.to_string(),
             if rows.is_empty() { "nobody notices".to_owned() } else { rows.join(" ") }
@@ -149,7 +150,7 @@ fn write(args: &FaultsArgs, result: &FaultsResult) -> Result<(), SimError> {
 
 /// Prints a row as soon as it is known.
 fn print_row(row: &RowResult, wall_s: f64) {
-    println!(
+    say!(
         "{:>2}  {:<46} {:>8} injected {:>8} detected {:>6} ticks  {:<4} unaccounted {}  {}  ({wall_s:.1} s)",
         row.id,
         row.name,
@@ -162,7 +163,7 @@ fn print_row(row: &RowResult, wall_s: f64) {
     );
     if row.result != RowVerdict::Passed {
         for note in &row.notes {
-            println!("    {note}");
+            say!("    {note}");
         }
     }
 }
@@ -170,7 +171,7 @@ fn print_row(row: &RowResult, wall_s: f64) {
 /// Prints what became of the random schedules.
 fn print_composed(composed: &Composed, wall_s: f64) {
     let [hold, run, safe] = composed.modes;
-    println!(
+    say!(
         "{} random schedules of {} faults: {} ticks ({run} RUN, {hold} HOLD, {safe} SAFE), {} injections, {} commands \
          with fault codes, {} re-armings, largest error {:.3e}, unaccounted {}  ({wall_s:.1} s)",
         composed.schedules,
@@ -183,6 +184,6 @@ fn print_composed(composed: &Composed, wall_s: f64) {
         composed.unaccounted,
     );
     for failure in &composed.failures {
-        println!("    {failure}");
+        say!("    {failure}");
     }
 }

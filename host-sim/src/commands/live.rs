@@ -2,6 +2,7 @@
 
 use host_sim::view::{Knobs, View};
 use host_sim::world::loop_settings::LoopSettings;
+use model_offline::say;
 
 /// The page's knobs at first: as the command line has it.
 pub(super) fn first_knobs(loop_settings: &LoopSettings) -> Knobs {
@@ -11,9 +12,9 @@ pub(super) fn first_knobs(loop_settings: &LoopSettings) -> Knobs {
 
 /// Says where a page is, and where Foxglove connects to: what even a quiet run must say, since without it nobody gets in.
 pub(super) fn said(view: View) -> View {
-    println!("Live view: {}", view.address());
+    say!("Live view: {}", view.address());
     #[cfg(feature = "foxglove")]
-    println!("Foxglove: {}", view.foxglove_address());
+    say!("Foxglove: {}", view.foxglove_address());
     view
 }
 
@@ -26,7 +27,7 @@ pub(super) fn going_on(view: &View) -> String {
 pub(super) fn say(quiet: bool) -> impl Fn(&str) {
     move |line: &str| {
         if !quiet {
-            println!("{line}");
+            say!("{line}");
         }
     }
 }

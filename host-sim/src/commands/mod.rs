@@ -30,6 +30,7 @@ use host_sim::record::error::FileError;
 use host_sim::runtime::signals;
 use indicatif::ProgressBar;
 use model_offline::output::terminal;
+use model_offline::{say, tell};
 
 use self::board::{BoardArgs, board};
 use self::bridge::{BridgeArgs, bridge};
@@ -173,11 +174,13 @@ pub(crate) fn execute(command: Command) -> Result<(), SimError> {
         }
         Command::Export(args) => export(&args),
         Command::Schema { of } => {
-            println!("{:#}", schema(of));
+            say!("{:#}", schema(of));
             Ok(())
         }
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut std::io::stdout());
+            let mut script = Vec::new();
+            clap_complete::generate(shell, &mut Cli::command(), "host-sim", &mut script);
+            tell!("{}", String::from_utf8_lossy(&script));
             Ok(())
         }
         Command::Man { directory } => man(&directory),
@@ -202,7 +205,7 @@ fn sweep() {
 fn man(directory: &Path) -> Result<(), SimError> {
     std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
     clap_mangen::generate_to(Cli::command(), directory).map_err(FileError::write(directory))?;
-    println!("{}", directory.join("host-sim.1").display());
+    say!("{}", directory.join("host-sim.1").display());
     Ok(())
 }
 

@@ -28,6 +28,7 @@ use model_offline::table::TableBuildError;
 
 use super::world_args::{PATIENCE, WorldArgs};
 use model_offline::output::check_outputs;
+use model_offline::say;
 
 /// Options of the plant process.
 #[derive(Args, Clone, Debug)]
@@ -147,7 +148,7 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
 
 /// Refuses a result that would replace what is read.
 fn check_json(args: &PlantArgs, files: &[&Path]) -> Result<(), SimError> {
-    let inputs: Vec<&Path> = args.world.scene.iter().map(PathBuf::as_path).chain(files.iter().copied()).collect();
+    let inputs: Vec<&Path> = args.world.files().map(PathBuf::as_path).chain(files.iter().copied()).collect();
     Ok(check_outputs(&inputs, &[("--json", args.json.as_deref())])?)
 }
 
@@ -167,6 +168,6 @@ fn end(args: &PlantArgs, result: &PlantResult, with: &str) -> Result<(), SimErro
     if let Some(path) = &args.json {
         write_json(path, result)?;
     }
-    println!("{} ticks with {with}; largest orthogonal target displacement {:.6}", result.ticks, result.largest_error);
+    say!("{} ticks with {with}; largest orthogonal target displacement {:.6}", result.ticks, result.largest_error);
     Ok(())
 }

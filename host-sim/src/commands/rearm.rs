@@ -1,5 +1,6 @@
 //! `host-sim rearm`: somebody has looked, and lets a controller out of SAFE.
 
+use model_offline::say;
 use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
@@ -33,7 +34,7 @@ pub(crate) fn rearm(args: &RearmArgs) -> Result<(), SimError> {
     };
     let pid = Pid::from_raw(process).ok_or(UsageError::NotAController { process })?;
     kill_process(pid, Signal::USR1).map_err(|error| RuntimeError::Spawn(error.into()))?;
-    println!("asked controller {process} to re-arm");
+    say!("asked controller {process} to re-arm");
     Ok(())
 }
 

@@ -1,5 +1,6 @@
 //! `host-sim replay`.
 
+use model_offline::say;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -25,12 +26,15 @@ pub(crate) fn replay(args: &ReplayArgs) -> Result<(), SimError> {
     let Salvaged { recording, damage } =
         if args.salvage { Recording::salvage(&args.recording)? } else { Recording::read(&args.recording)?.into() };
     if let Some(damage) = damage {
-        println!("damaged: {damage}");
+        say!("damaged: {damage}");
     }
     let replayed = replay_recording(&recording, &args.recording)?;
-    println!(
+    say!(
         "{} of {} commands agree bit by bit ({}, seed {})",
-        replayed.ticks, replayed.ticks, replayed.mode, replayed.seed
+        replayed.ticks,
+        replayed.ticks,
+        replayed.mode,
+        replayed.seed
     );
     Ok(())
 }

@@ -1,5 +1,6 @@
 //! `host-sim report`.
 
+use model_offline::say;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -22,10 +23,10 @@ pub(crate) struct ReportArgs {
 /// [`SimError::File`], [`SimError::NotARun`].
 pub(crate) fn report(args: &ReportArgs) -> Result<(), SimError> {
     rebuild_report(&args.directory)?;
-    println!("{}", args.directory.join("report.html").display());
+    say!("{}", args.directory.join("report.html").display());
     if let Some(into) = &args.svg_dir {
         for path in write_pictures(&args.directory, into)? {
-            println!("{}", path.display());
+            say!("{}", path.display());
         }
     }
     Ok(())

@@ -19,6 +19,7 @@ use model_offline::output::terminal::LongRun;
 use model_offline::parallel;
 use model_offline::scene::TableScalar;
 use model_offline::scene::TissueVariant;
+use model_offline::tell;
 
 use super::live::{first_knobs, going_on, said, say};
 use super::outputs::check_json_beside_report;
@@ -163,7 +164,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     let scene = args.world.scene()?;
     let simulation = args.world.simulation(&scene)?;
     check_directory(&args.out)?;
-    let inputs: Vec<&Path> = args.table.iter().chain(&args.world.scene).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = args.table.iter().chain(args.world.files()).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json.as_deref(), &args.out)?;
     let progress = if args.quiet { LongRun::hidden() } else { LongRun::new() };
     let options = args.options()?;
@@ -177,7 +178,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
         write_json(path, &compared.result)?;
     }
     if !args.quiet {
-        print!("{}", summary(&compared.result, &args.out));
+        tell!("{}", summary(&compared.result, &args.out));
     }
     view.map_or(Ok(()), |view| go_on(args, &view, &comparison))
 }

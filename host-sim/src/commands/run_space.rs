@@ -15,6 +15,7 @@ use host_sim::view::{View, insertions_in_space};
 use model_offline::parallel;
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
+use model_offline::tell;
 use std::path::{Path, PathBuf};
 
 use super::live::{first_knobs, going_on, said, say};
@@ -60,7 +61,7 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     }
     let simulation = args.world.simulation_in_space(scene)?;
     check_directory(args.out)?;
-    let inputs: Vec<&Path> = args.world.scene.iter().chain(&scene.files).map(PathBuf::as_path).collect();
+    let inputs: Vec<&Path> = args.world.files().chain(&scene.files).map(PathBuf::as_path).collect();
     check_json_beside_report(&inputs, args.json, args.out)?;
     let threads = parallel::threads(args.threads);
     let program = std::env::current_exe().map_err(RuntimeError::Spawn)?;
@@ -80,7 +81,7 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     }
     if !args.quiet {
         scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
-        print!("{}", summary(&compared, args.out));
+        tell!("{}", summary(&compared, args.out));
     }
     let Some(view) = view else { return Ok(()) };
     let say = say(args.quiet);

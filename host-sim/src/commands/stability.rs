@@ -14,6 +14,7 @@ use host_sim::runtime::signals;
 use model_offline::parallel;
 use model_offline::scene::Scene;
 use model_offline::study::Extent;
+use model_offline::tell;
 
 /// Parts of the simulation.
 const PARTS: u64 = 3;
@@ -55,7 +56,7 @@ pub(crate) fn stability(args: &LoopStabilityArgs) -> Result<(), SimError> {
     write_bytes(&args.out.join("closed_loop.csv"), &csv(&result))?;
     write_bytes(&args.out.join("closed_loop.svg"), figure(&result).svg().as_bytes())?;
     if !args.quiet {
-        print!("{}", summary(&result));
+        tell!("{}", summary(&result));
     }
     Ok(())
 }

@@ -13,6 +13,7 @@ use model_offline::parallel;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
 use model_offline::scene::TissueVariant;
+use model_offline::tell;
 
 /// Options of `tables`.
 #[derive(Args, Clone, Debug)]
@@ -51,7 +52,7 @@ pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
     let svg = figure(&trials, &scene.name, &scene.length_unit).svg();
     write_bytes(&args.out.join("tables.svg"), svg.as_bytes())?;
     if !args.quiet {
-        print!("{}", summary(&trials));
+        tell!("{}", summary(&trials));
     }
     Ok(())
 }

@@ -17,6 +17,7 @@ use host_sim::runtime::time::clock::FIFO_PRIORITY;
 use host_sim::world::error::OptionRange;
 
 use model_offline::output::check_outputs;
+use model_offline::tell;
 
 const RATE: OptionRange = OptionRange::new("--rate", 0.1, 1e5, " Hz");
 const INTERVAL: OptionRange = OptionRange::new("--interval", 10.0, 1e7, " µs");
@@ -93,8 +94,8 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
         sweep: args.sweep,
         program: std::env::current_exe().map_err(RuntimeError::Spawn)?,
     })?;
-    print!("{}", timing_summary(&result, args.priority));
     write(args, &result)?;
+    tell!("{}", timing_summary(&result, args.priority));
     if let Some(limit_us) = args.max_lateness {
         result.check_lateness(limit_us)?;
     }

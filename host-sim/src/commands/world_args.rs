@@ -16,7 +16,8 @@ use model_offline::scene::{Effect, Motion, Scene, Sensor, SensorPreset};
 
 /// How long a silent peer is waited for.
 pub(super) const PATIENCE: OptionRange = OptionRange::new("--patience", 1e-3, 86_400.0, " s");
-const INSERTION_TIME: OptionRange = OptionRange::new("--insertion-time", 1e-3, 86_400.0, " s");
+/// Less is more speed than a table may allow: a hundred depths per second, with what a drive is faster at times.
+const INSERTION_TIME: OptionRange = OptionRange::new("--insertion-time", 0.02, 86_400.0, " s");
 const WAIT: OptionRange = OptionRange::new("--wait", 0.0, 3600.0, " s");
 const STEPS: OptionRange = OptionRange::new("--steps", 1.0, 1000.0, "");
 const PAUSE: OptionRange = OptionRange::new("--pause", 0.0, 3600.0, " s");
@@ -93,6 +94,11 @@ fn own_insertion_time(depth: f64, speed: f64) -> f64 {
 }
 
 impl WorldArgs {
+    /// Files that are read.
+    pub(crate) fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.scene.iter().chain(&self.needle_motion)
+    }
+
     /// Reads the scene.
     ///
     /// # Errors

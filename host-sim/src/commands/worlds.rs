@@ -13,6 +13,7 @@ use host_sim::runtime::signals;
 use model_offline::output::check_outputs;
 use model_offline::parallel;
 use model_offline::scene::Scene;
+use model_offline::tell;
 
 /// Options of `worlds`.
 #[derive(Args, Clone, Debug)]
@@ -58,7 +59,7 @@ pub(crate) fn worlds(args: &WorldsArgs) -> Result<(), SimError> {
         write_bytes(path, figure(&result).svg().as_bytes())?;
     }
     if !args.quiet {
-        print!("{}", summary(&result));
+        tell!("{}", summary(&result));
     }
     Ok(())
 }

@@ -28,6 +28,12 @@ pub enum LinkError {
         /// Where.
         path: PathBuf,
     },
+    /// The directory of the link's name has other things in it.
+    #[error("{} is no link's: other files are in it; choose another --link name, or move them", path.display())]
+    Occupied {
+        /// Where.
+        path: PathBuf,
+    },
     /// The link was taken down and made anew by others in the meantime.
     #[error("the link `{name}` was taken down by its last user just now; start again")]
     Replaced {

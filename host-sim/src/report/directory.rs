@@ -1,9 +1,11 @@
 //! Files of a run: the directory appears whole, or not at all.
 
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use model_offline::scene::TissueVariant;
 use serde::{Deserialize, Serialize};
 
 use super::{Attachments, pictures, render, render_with};
@@ -18,6 +20,8 @@ use crate::report::page::space;
 /// The result in a report's directory; also the mark by which a former run is known.
 const RESULT_FILE: &str = "result.json";
 const REPORT_FILE: &str = "report.html";
+/// What a run has of every insertion ends in one of these, and starts with the tissue.
+const ENDINGS: [&str; 7] = [".rec", ".csv", ".mcap", ".foxglove.json", ".vtu", ".pvd", ".py"];
 
 fn parent(directory: &Path) -> &Path {
     match directory.parent() {
@@ -35,14 +39,25 @@ pub fn check_directory(directory: &Path) -> Result<(), SimError> {
         let parent = parent(directory).to_owned();
         return Err(UsageError::NoParent { directory: directory.to_owned(), parent }.into());
     }
+    tempfile::tempfile_in(parent(directory)).map_err(FileError::write(directory))?;
     let Ok(metadata) = directory.symlink_metadata() else {
         return Ok(());
     };
     let empty = || std::fs::read_dir(directory).is_ok_and(|mut entries| entries.next().is_none());
-    if metadata.is_dir() && (empty() || directory.join(RESULT_FILE).is_file()) {
+    if metadata.is_dir() && (empty() || Kind::read(directory).is_ok()) {
         return Ok(());
     }
     Err(UsageError::NotAReport { directory: directory.to_owned() }.into())
+}
+
+/// Whether a run writes files of this name: those of a former run are replaced, whatever else is there stays.
+fn is_of_a_run(name: &OsStr) -> bool {
+    let Some(name) = name.to_str() else { return false };
+    let of_a_tissue = TissueVariant::ALL.iter().any(|tissue| {
+        name.strip_prefix(tissue.name())
+            .is_some_and(|rest| rest.starts_with('-') && ENDINGS.iter().any(|e| rest.ends_with(e)))
+    });
+    of_a_tissue || name == RESULT_FILE || name == REPORT_FILE
 }
 
 /// Writes the whole report directory; one of a former run is replaced.
@@ -74,9 +89,11 @@ fn encoded(directory: &Path, result: &impl Serialize) -> Result<Artifact, SimErr
     Ok(Artifact { name: RESULT_FILE.to_owned(), bytes })
 }
 
-/// Writes a directory that appears whole; a former one is replaced.
+/// Writes a directory that appears whole; files of a former run are replaced, others go on being there.
 fn write_directory(directory: &Path, artifacts: &[Artifact]) -> Result<(), SimError> {
-    let parent = parent(directory);
+    // Where it really is: a path through the directory itself leads nowhere once that is moved.
+    let resolved = resolve(directory).map_err(FileError::write(directory))?;
+    let (directory, parent) = (resolved.as_path(), parent(&resolved));
     let temporary =
         tempfile::Builder::new().prefix(".stillpoint-").tempdir_in(parent).map_err(FileError::write(parent))?;
     let new = temporary.path().join("new");
@@ -91,13 +108,37 @@ fn write_directory(directory: &Path, artifacts: &[Artifact]) -> Result<(), SimEr
     if replaced {
         std::fs::rename(directory, &old).map_err(FileError::write(directory))?;
     }
-    std::fs::rename(&new, directory).map_err(|source| {
-        if replaced {
-            let _ = std::fs::rename(&old, directory);
+    let put =
+        std::fs::rename(&new, directory).and_then(|()| if replaced { keep_others(&old, directory) } else { Ok(()) });
+    if let Err(source) = put {
+        // Nothing of what was there is thrown away, if it cannot be put back.
+        if replaced && (directory.exists() || std::fs::rename(&old, directory).is_err()) {
+            let path = temporary.keep().join("old");
+            return Err(SimError::FormerReport { directory: directory.to_owned(), path, source });
         }
-        FileError::write(directory)(source)
-    })?;
+        return Err(FileError::write(directory)(source).into());
+    }
     Ok(sync(parent).map_err(FileError::write(parent))?)
+}
+
+/// A path without links and detours; of what does not exist yet, that of its parent.
+fn resolve(directory: &Path) -> std::io::Result<PathBuf> {
+    match directory.file_name() {
+        Some(name) if !directory.exists() => Ok(parent(directory).canonicalize()?.join(name)),
+        _ => directory.canonicalize(),
+    }
+}
+
+/// Moves what no run writes from a former directory to the one in its place.
+fn keep_others(former: &Path, directory: &Path) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(former)? {
+        let entry = entry?;
+        let to = directory.join(entry.file_name());
+        if !is_of_a_run(&entry.file_name()) && to.symlink_metadata().is_err() {
+            std::fs::rename(entry.path(), to)?;
+        }
+    }
+    Ok(())
 }
 
 /// Writes a file and waits until the disk has it: a report that appears whole must be whole after a power cut as well.
@@ -126,6 +167,22 @@ pub fn read_run(directory: &Path) -> Result<RunResult, SimError> {
     }
 }
 
+/// What tells results apart.
+#[derive(Deserialize)]
+struct Kind {
+    format: u32,
+    dimension: Option<u32>,
+}
+
+impl Kind {
+    fn read(directory: &Path) -> Result<(Self, Vec<u8>), SimError> {
+        let path = directory.join(RESULT_FILE);
+        let bytes = read_bytes(&path)?;
+        let kind = serde_json::from_slice(&bytes);
+        Ok((kind.map_err(|error| SimError::NotARun { path, reason: error.to_string() })?, bytes))
+    }
+}
+
 /// The result of a finished run.
 enum AnyRun {
     Plane(Box<RunResult>),
@@ -134,17 +191,10 @@ enum AnyRun {
 
 impl AnyRun {
     fn read(directory: &Path) -> Result<Self, SimError> {
-        /// What tells results apart.
-        #[derive(Deserialize)]
-        struct Kind {
-            format: u32,
-            dimension: Option<u32>,
-        }
         let path = directory.join(RESULT_FILE);
-        let bytes = read_bytes(&path)?;
+        let (Kind { format, dimension }, bytes) = Kind::read(directory)?;
         let not_a_run = |reason: String| SimError::NotARun { path: path.clone(), reason };
         let failed = |error: serde_json::Error| not_a_run(error.to_string());
-        let Kind { format, dimension } = serde_json::from_slice(&bytes).map_err(failed)?;
         if format != FORMAT {
             return Err(not_a_run(format!("its format is {format}, this program reads {FORMAT}")));
         }
@@ -182,4 +232,47 @@ pub fn write_pictures(directory: &Path, into: &Path) -> Result<Vec<PathBuf>, Sim
     std::fs::create_dir_all(into).map_err(FileError::write(into))?;
     let pictures = pictures.into_iter().map(|(name, svg)| (into.join(name), svg));
     pictures.map(|(path, svg)| Ok(write_bytes(&path, svg.as_bytes()).map(|()| path)?)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The least that is known as a former run.
+    fn run(bytes: &[u8]) -> Vec<Artifact> {
+        let named = |name: &str, bytes: &[u8]| Artifact { name: name.to_owned(), bytes: bytes.to_vec() };
+        vec![named(RESULT_FILE, br#"{"format": 1}"#), named("inclusion-dynamic.rec", bytes)]
+    }
+
+    fn names(directory: &Path) -> Vec<String> {
+        let entries = std::fs::read_dir(directory).unwrap();
+        let mut names: Vec<_> = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_new_run_replaces_a_former_one_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let report = folder.path().join("report");
+        write_directory(&report, &run(b"first")).unwrap();
+        std::fs::write(report.join("homogeneous-none.csv"), "of the first run").unwrap();
+        std::fs::write(report.join("pareto.json"), "of another command").unwrap();
+        std::fs::create_dir(report.join("notes")).unwrap();
+        std::fs::write(report.join("notes/bench.txt"), "a day's work").unwrap();
+        check_directory(&report).unwrap();
+        // Through itself: once it is moved, the path leads nowhere.
+        write_directory(&report.join("../report"), &run(b"second")).unwrap();
+        assert_eq!(names(&report), ["inclusion-dynamic.rec", "notes", "pareto.json", RESULT_FILE]);
+        assert_eq!(std::fs::read(report.join("inclusion-dynamic.rec")).unwrap(), b"second");
+        assert_eq!(std::fs::read(report.join("notes/bench.txt")).unwrap(), b"a day's work");
+        assert_eq!(names(folder.path()), ["report"], "nothing is left beside it");
+    }
+
+    #[test]
+    fn another_program_s_result_is_no_report() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join(RESULT_FILE), r#"{"other": "tool"}"#).unwrap();
+        assert!(matches!(check_directory(folder.path()), Err(SimError::Usage(UsageError::NotAReport { .. }))));
+    }
 }

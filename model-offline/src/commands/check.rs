@@ -7,6 +7,7 @@ use super::json::write_json;
 use model_offline::number::{area, coordinate, in_unit, short};
 use model_offline::output::check_outputs;
 use model_offline::scene::{MaterialFacts, Scene, SceneFacts};
+use model_offline::tell;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -37,7 +38,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<(), CliError> {
     document["effects"] = json!(scene.effects());
     document["warnings"] = json!(warnings);
     write_json(args.json.as_deref(), &document)?;
-    print!("{}", text(&scene, &facts, &warnings));
+    tell!("{}", text(&scene, &facts, &warnings));
     Ok(())
 }
 

@@ -10,6 +10,7 @@ use model_offline::model::space::meshing::{MeshSize, even_mesh, mesh};
 use model_offline::model::space::survey::{PatchSurvey, Survey};
 use model_offline::number::{area, coordinate, in_unit, short};
 use model_offline::scene::space::SpaceScene;
+use model_offline::tell;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -35,7 +36,7 @@ fn check(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
     document["notes"] = json!(scene.notes);
     document["warnings"] = json!(warnings);
     write_json(file, &document)?;
-    print!("{}", text(&Told { scene, survey: &survey }, &warnings));
+    tell!("{}", text(&Told { scene, survey: &survey }, &warnings));
     Ok(())
 }
 

@@ -5,6 +5,7 @@ use super::error::CliError;
 use super::json::write_json;
 use model_offline::output::{self, check_outputs};
 use model_offline::study::effects;
+use model_offline::tell;
 use std::path::PathBuf;
 
 /// Options of `compare`.
@@ -49,7 +50,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), CliError> {
         output::write_whole(path, &found.csv())?;
     }
     if !args.run.quiet {
-        print!("{}", found.table());
+        tell!("{}", found.table());
     }
     Ok(())
 }

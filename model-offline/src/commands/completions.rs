@@ -1,6 +1,7 @@
 //! `model-offline completions`: a completion script for a shell.
 
 use super::error::CliError;
+use model_offline::tell;
 
 /// Options of `completions`.
 #[derive(Debug, clap::Args)]
@@ -10,6 +11,8 @@ pub(super) struct CompletionsArgs {
 }
 
 pub(super) fn run(args: &CompletionsArgs, command: &mut clap::Command) -> Result<(), CliError> {
-    clap_complete::generate(args.shell, command, "model-offline", &mut std::io::stdout());
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, command, "model-offline", &mut script);
+    tell!("{}", String::from_utf8_lossy(&script));
     Ok(())
 }

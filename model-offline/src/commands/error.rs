@@ -49,7 +49,9 @@ pub(crate) enum CliError {
     /// No equilibrium.
     #[error("no equilibrium: {failure}; last converged state at depth {depth:.4}")]
     #[diagnostic(help(
-        "the tissue law loses stability under strong compression: reduce the depth, or add a barrier to the material"
+        "the tissue law loses stability under strong compression: reduce the depth, or add a barrier to the material; \
+         where tissue is much softer or stiffer than what is beside it, another rule may go on for longer (fem-t6, in \
+         space fem-t10)"
     ))]
     Solve {
         /// Why.

@@ -10,6 +10,7 @@ use model_offline::output::check_outputs;
 use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
 use model_offline::study::fit;
+use model_offline::tell;
 use std::path::{Path, PathBuf};
 
 /// Options of `fit`.
@@ -83,7 +84,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
     }
     write_json(args.json.as_deref(), &fit)?;
     if !args.quiet {
-        print!("{}", fit.summary());
+        tell!("{}", fit.summary());
     }
     Ok(())
 }

@@ -8,6 +8,7 @@ use model_offline::parallel;
 use model_offline::scene::space::SpaceScene;
 use model_offline::scene::{Scene, limits};
 use model_offline::study::fit::space::{SpaceFit, fit_in_space};
+use model_offline::tell;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -52,7 +53,7 @@ pub(super) fn run(scene: &SpaceScene, args: &Asked<'_>) -> Result<(), CliError> 
     }
     write_json(args.json, &fit)?;
     if !args.quiet {
-        print!("{}", fit.summary());
+        tell!("{}", fit.summary());
     }
     Ok(())
 }

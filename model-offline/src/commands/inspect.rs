@@ -5,6 +5,7 @@ use super::json::write_json;
 use firmware::contract::{Header, TableError};
 use model_offline::output::check_outputs;
 use model_offline::output::{space_table_text, table_text};
+use model_offline::say;
 use model_offline::table::space::SpaceTable;
 use std::path::PathBuf;
 
@@ -34,7 +35,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<(), CliError> {
         }
     };
     write_json(args.json.as_deref(), &json)?;
-    println!("{}: {} bytes, checked", args.table.display(), bytes.len());
-    println!("{summary}");
+    say!("{}: {} bytes, checked", args.table.display(), bytes.len());
+    say!("{summary}");
     Ok(())
 }

@@ -2,6 +2,7 @@
 
 use super::error::CliError;
 use model_offline::output::OutputError;
+use model_offline::say;
 use std::path::PathBuf;
 
 /// Options of `man`.
@@ -15,6 +16,6 @@ pub(super) fn run(args: &ManArgs, command: clap::Command) -> Result<(), CliError
     let fail = |source| OutputError { path: args.directory.clone(), source };
     std::fs::create_dir_all(&args.directory).map_err(fail)?;
     clap_mangen::generate_to(command, &args.directory).map_err(fail)?;
-    println!("{}", args.directory.join("model-offline.1").display());
+    say!("{}", args.directory.join("model-offline.1").display());
     Ok(())
 }

@@ -4,6 +4,7 @@ use super::error::CliError;
 use super::json::write_json;
 use model_offline::material::{MaterialError, NamedMaterial, Preset, RelaxationSection};
 use model_offline::output::check_outputs;
+use model_offline::tell;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use strum::VariantArray as _;
@@ -25,7 +26,7 @@ pub(super) fn run(args: &MaterialsArgs) -> Result<(), CliError> {
         Preset::VARIANTS.iter().map(|preset| NamedMaterial::of(*preset)).collect();
     let all = all.map_err(|error| CliError::usage(error.to_string(), error.help()))?;
     write_json(args.json.as_deref(), &all)?;
-    print!("{}", text(&all));
+    tell!("{}", text(&all));
     Ok(())
 }
 

@@ -7,6 +7,7 @@ use model_offline::scene::TissueVariant;
 use model_offline::study::Extent;
 use model_offline::study::pareto::{self, Pareto};
 use model_offline::study::pareto_space::compare_in_space;
+use model_offline::{say, tell};
 use std::path::PathBuf;
 
 /// What it writes.
@@ -58,8 +59,8 @@ fn written(args: &ParetoArgs, comparison: &Pareto, scene: &str, tissue: TissueVa
     output::write_whole(&csv, &comparison.csv())?;
     output::write_whole(&svg, comparison.svg(scene, tissue).as_bytes())?;
     if !args.run.quiet {
-        print!("{}", comparison.table());
-        println!("{}\n{}", csv.display(), svg.display());
+        tell!("{}", comparison.table());
+        say!("{}\n{}", csv.display(), svg.display());
     }
     Ok(())
 }

@@ -12,6 +12,7 @@ use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;
 use model_offline::table::{self, TableOptions};
+use model_offline::tell;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -77,7 +78,7 @@ fn place(scene: &Scene, args: &PlaceArgs) -> Result<Placed, CliError> {
     let table = args.table.as_ref().map(|_| table_of(&study));
     write_json(args.json.as_deref(), &document(&study, accuracy.as_ref(), table.as_ref()))?;
     if !args.run.quiet {
-        print!("{}", place_text::summary(&study, accuracy.as_ref()));
+        tell!("{}", place_text::summary(&study, accuracy.as_ref()));
     }
     Ok(Placed { table })
 }

@@ -8,6 +8,7 @@ use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::space::SpaceStudy;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
 use model_offline::scene::space::SpaceScene;
+use model_offline::tell;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -34,7 +35,7 @@ fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), C
         for [a, b] in overlapping(&study) {
             eprintln!("note: paddles {a} and {b} overlap, and cannot be attached together: no such pair is the best");
         }
-        print!("{}", summary(&study));
+        tell!("{}", summary(&study));
     }
     Ok(())
 }

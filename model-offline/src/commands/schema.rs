@@ -2,6 +2,7 @@
 
 use super::error::CliError;
 use super::json::pretty;
+use model_offline::say;
 use model_offline::scene::schema::json_schema;
 use model_offline::scene::space;
 
@@ -15,6 +16,6 @@ pub(super) struct SchemaArgs {
 
 pub(super) fn run(args: &SchemaArgs) -> Result<(), CliError> {
     let schema = if args.dimension == 3 { space::schema::json_schema() } else { json_schema() };
-    println!("{}", pretty(&schema));
+    say!("{}", pretty(&schema));
     Ok(())
 }

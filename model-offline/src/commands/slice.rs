@@ -9,6 +9,7 @@ use model_offline::output::check_outputs;
 use model_offline::scene::Scene;
 use model_offline::scene::space::SpaceScene;
 use model_offline::study::slice::{Slice, Through};
+use model_offline::tell;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -41,7 +42,7 @@ pub(super) fn run(args: &SliceArgs) -> Result<(), CliError> {
     output::write_whole(&args.output, slice.text.as_bytes())?;
     write_json(args.json.as_deref(), &document(&slice))?;
     if !args.quiet {
-        print!("{}", summary(&slice));
+        tell!("{}", summary(&slice));
     }
     Ok(())
 }

@@ -11,6 +11,7 @@ use model_offline::output;
 use model_offline::output::vtu::{self, Shown};
 use model_offline::output::{Geometry, NodalFields, State, body, check_outputs, has_stress};
 use model_offline::placement::{controllability, discretise};
+use model_offline::say;
 use model_offline::scene::Scene;
 use model_offline::scene::space::SpaceScene;
 use model_offline::solver::equilibrium::{Equilibrium, NewtonSettings};
@@ -267,7 +268,7 @@ fn print(scene: &Scene, solved: &Solved<'_>, held: Held, args: &SolveArgs) {
         Some(index) => format!("paddle {index} at ({}, {})", displacement.x, displacement.y),
         None => "no paddle".to_owned(),
     };
-    println!(
+    say!(
         "{} · {} tissue · {paddle} · depth {}\ntarget displacement ({:.8}, {:.8}), orthogonal {:.8}, axial {:.8}",
         scene.name,
         scene.tissue(),
@@ -278,9 +279,9 @@ fn print(scene: &Scene, solved: &Solved<'_>, held: Held, args: &SolveArgs) {
         target.dot(&scene.needle.axis)
     );
     match solved {
-        Solved::Pushing(body) => println!("base force {:.6}", body.contact_force()),
+        Solved::Pushing(body) => say!("base force {:.6}", body.contact_force()),
         Solved::Within(needle, punctured_at) => {
-            println!(
+            say!(
                 "punctured at depth {}; base force {:.6}, of it at the tip {:.6}; cut {}; the target is at depth {} now",
                 length(*punctured_at),
                 needle.base_force(),
@@ -300,10 +301,10 @@ const BALANCED: f64 = 0.01;
 fn print_balance(energy: EnergyAccount) {
     let EnergyAccount { stored, friction, cutting, .. } = energy;
     let done = energy.work + energy.paddle + energy.base;
-    println!("work {done:.6}: stored {stored:.6}, friction {friction:.6}, cutting {cutting:.6}");
+    say!("work {done:.6}: stored {stored:.6}, friction {friction:.6}, cutting {cutting:.6}");
     let imbalance = energy.imbalance();
     if imbalance.abs() > BALANCED {
-        println!(
+        say!(
             "{:.1} % of the work is {}: forces and way are followed no better than that; take more increments",
             100.0 * imbalance.abs(),
             if imbalance > 0.0 { "missing" } else { "too much in what it went into" }

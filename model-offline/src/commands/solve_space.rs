@@ -13,6 +13,7 @@ use model_offline::parallel;
 use model_offline::placement::space::workflow;
 use model_offline::scene::space::SpaceScene;
 use model_offline::solver::equilibrium::NewtonSettings;
+use model_offline::tell;
 use nalgebra::{Matrix3xX, Vector3};
 use serde_json::json;
 use std::path::Path;
@@ -87,7 +88,7 @@ fn solve(scene: &SpaceScene, paddles: &[Displaced], args: SpaceArgs<'_>) -> Resu
     }
     write(&model, &mut body, paddles, args)?;
     if !args.quiet {
-        print!("{}", text(&model, &body, paddles, args));
+        tell!("{}", text(&model, &body, paddles, args));
     }
     Ok(())
 }

@@ -11,6 +11,7 @@ use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::study::Extent;
 use model_offline::study::stability::setting::Setting;
 use model_offline::study::stability::{self, Plan, Stability};
+use model_offline::tell;
 use std::path::PathBuf;
 
 /// A spacing to begin with, over the size of the body.
@@ -112,7 +113,7 @@ fn studied(
     }
     output::write_whole(&svg, stability::figure(&result).svg().as_bytes())?;
     if !args.run.quiet {
-        print!("{}", stability::summary(&result));
+        tell!("{}", stability::summary(&result));
     }
     Ok(())
 }

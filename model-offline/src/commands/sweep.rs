@@ -3,6 +3,7 @@
 use super::common::{RunArgs, SceneArgs, VariedArgs, study_files};
 use super::error::CliError;
 use model_offline::output;
+use model_offline::say;
 use model_offline::study::sweep;
 use std::path::PathBuf;
 
@@ -29,7 +30,7 @@ pub(super) fn run(args: &SweepArgs) -> Result<(), CliError> {
     output::write_whole(&csv, &found.csv())?;
     output::write_whole(&svg, found.svg().as_bytes())?;
     if !args.run.quiet {
-        println!("{}\n{}\n{}", found.table(), csv.display(), svg.display());
+        say!("{}\n{}\n{}", found.table(), csv.display(), svg.display());
     }
     Ok(())
 }

@@ -7,6 +7,7 @@ use model_offline::output::{self, space_table_text, table_text};
 use model_offline::parallel;
 use model_offline::placement::model_with_paddle;
 use model_offline::placement::space::workflow::insertion_model;
+use model_offline::say;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
 use model_offline::table::{self, TableBuildError, TableOptions};
@@ -49,7 +50,7 @@ pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
     let bytes = table::to_bytes(&table)?;
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
-        println!("{}: {} bytes\n{}", args.output.display(), bytes.len(), table_text::summary(&table));
+        say!("{}: {} bytes\n{}", args.output.display(), bytes.len(), table_text::summary(&table));
     }
     Ok(())
 }
@@ -67,7 +68,7 @@ fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
     let bytes = table.to_bytes()?;
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
-        println!("{}: {} bytes\n{}", args.output.display(), bytes.len(), space_table_text::summary(&table));
+        say!("{}: {} bytes\n{}", args.output.display(), bytes.len(), space_table_text::summary(&table));
     }
     Ok(())
 }

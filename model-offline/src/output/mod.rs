@@ -47,14 +47,16 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
         return std::fs::write(path, bytes).map_err(fail);
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".stillpoint-").tempfile_in(folder).map_err(fail)?;
-    file.write_all(bytes).map_err(fail)?;
-    // Temporary files are private; a result is for all to read, as with the usual umask. The process's own cannot be asked
-    // for without changing it, under the eyes of other threads.
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".stillpoint-");
+    // Temporary files are private; a result is for whom the umask lets read it.
     #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        let _ = file.as_file().set_permissions(std::fs::Permissions::from_mode(0o644));
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.tempfile_in(folder).map_err(fail)?;
+    file.write_all(bytes).map_err(fail)?;
+    // Who has closed a file to others finds it closed afterwards.
+    if let Ok(before) = path.metadata() {
+        file.as_file().set_permissions(before.permissions()).map_err(fail)?;
     }
     file.as_file().sync_all().map_err(fail)?;
     file.persist(path).map_err(|e| fail(e.error))?;

@@ -43,7 +43,7 @@ pub fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, Option<&Path>)]
     let mut seen: Vec<(&'static str, Identity)> = Vec::new();
     for (option, path) in outputs.iter().filter_map(|&(option, path)| Some((option, path?))) {
         let refused = |reason| OutputRefused { option, path: path.to_owned(), reason };
-        if path.is_dir() {
+        if path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/") {
             return Err(refused(RefusalReason::IsDirectory));
         }
         if path.exists() && !path.is_file() {

@@ -1,7 +1,9 @@
 //! What commands show on a terminal besides their results.
 
 use std::any::TypeId;
-use std::io::{IsTerminal as _, Write as _};
+use std::fmt;
+use std::io::{ErrorKind, IsTerminal as _, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -9,6 +11,42 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 /// Time between the lines that take a progress bar's place.
 const LINES_EVERY: Duration = Duration::from_secs(4);
+
+/// Whether something that was to be said could not be, and somebody wants to read it.
+static UNSAID: AtomicBool = AtomicBool::new(false);
+
+/// Says a line on standard output. Where its reader has gone (`| head`) the work goes on in silence: files that are asked for
+/// are written all the same. Another reason why it cannot be written is told once, and [`all_was_said`] knows.
+#[macro_export]
+macro_rules! say {
+    ($($what:tt)*) => { $crate::output::terminal::put(format_args!("{}\n", format_args!($($what)*))) };
+}
+
+/// As [`say!`], without a new line at its end.
+#[macro_export]
+macro_rules! tell {
+    ($($what:tt)*) => { $crate::output::terminal::put(format_args!($($what)*)) };
+}
+
+/// What [`say!`] and [`tell!`] do.
+pub fn put(what: fmt::Arguments<'_>) {
+    let mut out = std::io::stdout().lock();
+    put_into(&mut out, what);
+}
+
+fn put_into(out: &mut impl Write, what: fmt::Arguments<'_>) {
+    match out.write_fmt(what).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe && !UNSAID.swap(true, Ordering::Relaxed) => {
+            eprintln!("cannot write to standard output: {error}");
+        }
+        _ => {}
+    }
+}
+
+/// Whether everything that was said could be written: a program that could not ends in failure.
+pub fn all_was_said() -> bool {
+    !UNSAID.load(Ordering::Relaxed)
+}
 
 /// A progress bar of so many steps that all take about as long; where standard error is not a terminal, a line there every
 /// few seconds until the bar is finished or dropped.
@@ -170,6 +208,24 @@ mod tests {
         assert!(seconds > 14.0 && seconds <= 15.0, "{seconds}");
         let expected = Expected { since: Instant::now(), this_s: 10.0, then_s: 5.0 };
         assert_eq!([4.0, 9.0, 20.0].map(|elapsed| expected.left(elapsed)), [11.0, 6.8, 7.0]);
+    }
+
+    /// A pipe whose reader has gone, then a disk without room.
+    #[test]
+    fn a_reader_who_has_gone_is_no_failure_and_a_full_disk_is_one() {
+        struct Failing(ErrorKind);
+        impl Write for Failing {
+            fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {
+                Err(self.0.into())
+            }
+            fn flush(&mut self) -> std::io::Result<()> {
+                Ok(())
+            }
+        }
+        put_into(&mut Failing(ErrorKind::BrokenPipe), format_args!("words"));
+        assert!(all_was_said());
+        put_into(&mut Failing(ErrorKind::StorageFull), format_args!("words"));
+        assert!(!all_was_said());
     }
 
     #[test]

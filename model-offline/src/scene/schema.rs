@@ -113,6 +113,7 @@ pub(super) fn dimension_of(text: &str) -> Option<Located<u32>> {
 #[serde(deny_unknown_fields)]
 pub struct SceneSection {
     /// Name used in reports and in the table.
+    #[serde(deserialize_with = "label")]
     pub name: String,
     /// 2 = plane strain; 3 = solid, whose scenes have another schema (`model-offline schema --dimension 3`).
     pub dimension: Located<u32>,
@@ -126,11 +127,22 @@ pub struct SceneSection {
 #[serde(deny_unknown_fields)]
 pub struct UnitsSection {
     /// Length unit, e.g. "mm".
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "label")]
     pub length: String,
     /// Stress unit, e.g. "kPa".
-    #[serde(default = "one")]
+    #[serde(default = "one", deserialize_with = "label")]
     pub stress: String,
+}
+
+/// A text that is shown as it is: without characters that a terminal obeys.
+fn label<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<String, D::Error> {
+    let text = String::deserialize(deserializer)?;
+    if text.chars().any(char::is_control) {
+        return Err(serde::de::Error::custom(
+            "a control character is in it, which a terminal would obey; leave it out",
+        ));
+    }
+    Ok(text)
 }
 
 fn one() -> String {

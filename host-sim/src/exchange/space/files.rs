@@ -1,5 +1,6 @@
 //! Files in places that everybody may write to: nothing is followed, nothing that belongs to somebody else is touched.
 
+use std::ffi::OsStr;
 use std::fs::{DirBuilder, File, Permissions};
 use std::io::{Read as _, Write as _};
 use std::os::fd::OwnedFd;
@@ -25,13 +26,30 @@ const KEY_FILE: &str = "key";
 /// File in a link's directory that everybody locks who has entered.
 const PRESENCE_FILE: &str = "present";
 
+/// What iceoryx2 makes in a link's directory.
+const TRANSPORT_DIRECTORIES: [&str; 2] = ["nodes", "services"];
+
+/// Longest path of the directory that links are in. Files of iceoryx2 have the link's name twice in their paths, three
+/// numbers of up to 39 digits and words, and no path is longer than 255.
+const LONGEST_BASE: usize = 32;
+
 /// How long somebody else may be at work in a link's directory.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(8);
 const BETWEEN_TRIALS: Duration = Duration::from_millis(2);
 
+/// Where directories of links are: that for temporary files, or `/tmp` where its path is so long that those of the files in it
+/// are longer than iceoryx2 can say. Everybody with the same environment comes to the same.
+pub(super) fn base() -> PathBuf {
+    base_for(std::env::temp_dir())
+}
+
+fn base_for(temporary: PathBuf) -> PathBuf {
+    if temporary.as_os_str().len() <= LONGEST_BASE { temporary } else { PathBuf::from("/tmp") }
+}
+
 /// Directory of a link's files.
 pub(super) fn root(name: &str) -> PathBuf {
-    std::env::temp_dir().join(format!("{ROOT_MARK}{name}"))
+    base().join(format!("{ROOT_MARK}{name}"))
 }
 
 /// Name of the link that a directory is of, if it is one's.
@@ -174,18 +192,29 @@ pub(super) fn lock_root_within(root: &Path, patience: Duration) -> Result<Locked
 /// The key in a locked directory: `wanted` if there is none, else a new one that nobody can guess.
 ///
 /// # Errors
-/// [`LinkError::Directory`].
+/// [`LinkError::Directory`]; [`LinkError::Occupied`] where there is no key but something that is no link's: it would be
+/// removed with the link.
 pub(super) fn key(root: &Path, _locked: &Locked, wanted: Option<&str>) -> Result<String, LinkError> {
     let path = root.join(KEY_FILE);
     let failed = |source| LinkError::Directory { path: path.clone(), source };
     if let Some(found) = known_key(root) {
         return Ok(found);
     }
+    let entries = std::fs::read_dir(root).map_err(failed)?.filter_map(Result::ok);
+    if entries.map(|entry| entry.file_name()).any(|name| !is_of_a_link(&name)) {
+        return Err(LinkError::Occupied { path: root.to_owned() });
+    }
     let key = wanted.map_or_else(random_key, |key| Ok(key.to_owned())).map_err(failed)?;
     let flags = OFlags::WRONLY | OFlags::CREATE | OFlags::TRUNC | OFlags::NOFOLLOW | OFlags::CLOEXEC;
     let opened: OwnedFd = rustix::fs::open(&path, flags, Mode::from_raw_mode(0o600)).map_err(|e| failed(e.into()))?;
     File::from(opened).write_all(key.as_bytes()).map_err(failed)?;
     Ok(key)
+}
+
+/// Whether a link's directory has something of this name.
+fn is_of_a_link(name: &OsStr) -> bool {
+    let known = [KEY_FILE, PRESENCE_FILE].into_iter().chain(TRANSPORT_DIRECTORIES);
+    known.into_iter().any(|known| name == known)
 }
 
 /// The key in a directory, if there is one: its name alone does not make it a link's.
@@ -244,7 +273,14 @@ pub(super) fn remove_half_made(name: &str, _locked: &Locked) {
 /// Removes a link's directory and its files in shared memory. Whether there were any of the latter.
 pub(super) fn remove(name: &str, _locked: &Locked) -> bool {
     let files = in_shared_memory(name);
-    let _ = std::fs::remove_dir_all(root(name));
+    let root = root(name);
+    // The key last: by it a sweep knows what somebody did not finish removing.
+    for entry in std::fs::read_dir(&root).into_iter().flatten().flatten().filter(|entry| entry.file_name() != KEY_FILE)
+    {
+        let path = entry.path();
+        let _ = if path.is_dir() { std::fs::remove_dir_all(path) } else { std::fs::remove_file(path) };
+    }
+    let _ = std::fs::remove_dir_all(root);
     for file in &files {
         let _ = std::fs::remove_file(file);
     }
@@ -270,5 +306,19 @@ impl OwnerOnly {
 impl Drop for OwnerOnly {
     fn drop(&mut self) {
         rustix::process::umask(self.before);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The paths of both sides' files, with the longest name, are within what iceoryx2 can say; past it, it panics.
+    #[test]
+    fn a_long_directory_for_temporary_files_is_left_for_a_short_one() {
+        let long = PathBuf::from(format!("/{}", "q".repeat(LONGEST_BASE)));
+        assert_eq!(base_for(long), PathBuf::from("/tmp"));
+        let fits = PathBuf::from(format!("/{}", "q".repeat(LONGEST_BASE - 1)));
+        assert_eq!(base_for(fits.clone()), fits);
     }
 }

@@ -58,7 +58,7 @@ impl Space {
     /// The space of this name, the same in every process of this user; makes its directory, owner-only.
     ///
     /// # Errors
-    /// [`LinkError::Name`], [`LinkError::Directory`], [`LinkError::Foreign`].
+    /// [`LinkError::Name`], [`LinkError::Directory`], [`LinkError::Foreign`], [`LinkError::Occupied`].
     pub fn new(name: &str) -> Result<Self, LinkError> {
         let invalid = || LinkError::Name { name: name.to_owned(), longest: LONGEST_NAME };
         let admitted = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
@@ -83,6 +83,11 @@ impl Space {
         Ok(Self { name: name.to_owned(), key, root, config })
     }
 
+    /// The directory of the link of this name, whether it is there or not.
+    pub fn directory_of(name: &str) -> PathBuf {
+        files::root(name)
+    }
+
     /// Its entries: names in shared memory, and its directory.
     pub fn traces(&self) -> Vec<PathBuf> {
         let root = self.root.exists().then(|| self.root.clone());
@@ -94,7 +99,7 @@ impl Space {
     /// # Errors
     /// As [`Space::new`].
     pub fn unique() -> Result<Self, LinkError> {
-        let failed = |source| LinkError::Directory { path: std::env::temp_dir(), source };
+        let failed = |source| LinkError::Directory { path: files::base(), source };
         let random = files::random_key().map_err(failed)?;
         Self::new(&format!("{RUN}{}-{random}", std::process::id()))
     }

@@ -11,7 +11,7 @@ use super::{RUN, Space, files};
 /// Removes the links of this user in which nobody is alive; returns their names. What is not certain stays.
 pub fn sweep() -> Vec<String> {
     let entries = |directory: &std::path::Path| std::fs::read_dir(directory).into_iter().flatten().flatten();
-    let roots = entries(&std::env::temp_dir())
+    let roots = entries(&files::base())
         .filter_map(|entry| Some(files::name_of_root(entry.file_name().to_str()?)?.to_owned()))
         .collect::<Vec<_>>();
     let in_memory = entries(files::SHARED_MEMORY.as_ref())

@@ -77,6 +77,22 @@ fn a_squatted_directory_is_refused_and_a_link_to_one_is() {
 }
 
 #[test]
+fn a_directory_with_other_things_in_it_is_no_link_s_and_keeps_them() {
+    let name = format!("test-occupied-{}", std::process::id());
+    let place = files::root(&name);
+    files::make_root(&place).unwrap();
+    std::fs::write(place.join("report.html"), "hours of work").unwrap();
+    assert!(matches!(Space::new(&name), Err(LinkError::Occupied { .. })));
+    assert_eq!(std::fs::read_dir(&place).unwrap().count(), 1);
+    std::fs::remove_dir_all(&place).unwrap();
+    // What somebody did not finish removing is taken over.
+    files::make_root(&place).unwrap();
+    std::fs::create_dir(place.join("nodes")).unwrap();
+    Space::new(&name).unwrap().leave::<ipc::Service>(Departure::First);
+    assert!(!place.exists());
+}
+
+#[test]
 fn names_of_runs_and_of_files_cannot_be_guessed() {
     let [a, b] = [(); 2].map(|()| Space::unique().unwrap());
     assert_ne!(a.name, b.name);

@@ -12,6 +12,8 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use rtrb::{Consumer, Producer, RingBuffer};
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
 
 use super::{Chain, Record, RecordingHeader};
 use crate::record::error::FileError;
@@ -35,16 +37,18 @@ pub struct StreamRecorder {
 }
 
 impl StreamRecorder {
-    /// Creates the file and starts its writer.
+    /// Opens the file and starts its writer. What was in the file is replaced when the first tick is written: a controller
+    /// that no plant comes to takes nobody's recording away.
     ///
     /// # Errors
-    /// [`FileError::Write`] when there can be no such file.
+    /// [`FileError::Write`] when there can be no such file, or another process is recording into it.
     pub fn create(path: &Path, header: &RecordingHeader) -> Result<Self, FileError> {
-        let file = File::create(path).map_err(FileError::write(path))?;
+        let file = open_alone(path).map_err(FileError::write(path))?;
         let (producer, consumer) = RingBuffer::new(RING);
         let stop = Arc::new(AtomicBool::new(false));
         let (chain, start) = Chain::start(header);
-        let writer = FileWriter { file, chain, consumer, stop: Arc::clone(&stop), account: RecordAccount::default() };
+        let account = RecordAccount::default();
+        let writer = FileWriter { file, chain, started: false, consumer, stop: Arc::clone(&stop), account };
         let writer = std::thread::Builder::new()
             .name("recorder".to_owned())
             .spawn(move || writer.run(&start))
@@ -68,9 +72,23 @@ impl TickRecorder for StreamRecorder {
     }
 }
 
+/// Opens a file as it is; a regular one locked, so that nobody else records into it.
+fn open_alone(path: &Path) -> std::io::Result<File> {
+    let file = File::options().write(true).create(true).truncate(false).open(path)?;
+    if file.metadata()?.is_file() {
+        match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+            Err(Errno::WOULDBLOCK) => return Err(std::io::Error::other("another process is recording into it")),
+            outcome => outcome?,
+        }
+    }
+    Ok(file)
+}
+
 struct FileWriter {
     file: File,
     chain: Chain,
+    /// Whether the file has this recording's start.
+    started: bool,
     consumer: Consumer<ControllerTick>,
     stop: Arc<AtomicBool>,
     account: RecordAccount,
@@ -78,7 +96,6 @@ struct FileWriter {
 
 impl FileWriter {
     fn run(mut self, start: &[u8]) -> RecordAccount {
-        self.write(start);
         loop {
             // Read before draining: what was handed over before the stop is drained after it.
             let last = self.stop.load(Ordering::Acquire);
@@ -88,6 +105,9 @@ impl FileWriter {
                 self.chain.record(&Record { tick, truth: None }, &mut bytes);
                 records += 1;
             }
+            if records > 0 || last && self.is_empty() {
+                self.begin(start);
+            }
             if self.account.error.is_some() || !self.write(&bytes) {
                 self.account.lost_on_disk += records;
             } else {
@@ -96,13 +116,32 @@ impl FileWriter {
             if last {
                 let mut end = Vec::new();
                 self.chain.end(self.account.written, &mut end);
-                if self.account.error.is_none() {
+                if self.started && self.account.error.is_none() {
                     self.write(&end);
                     self.keep(|file| file.sync_all());
                 }
                 return self.account;
             }
             std::thread::sleep(NAP);
+        }
+    }
+
+    /// Whether the file has nothing yet: a recording without ticks is one, but replaces none.
+    fn is_empty(&self) -> bool {
+        self.file.metadata().is_ok_and(|metadata| metadata.len() == 0)
+    }
+
+    /// Replaces what is in the file by the start of this recording, once.
+    fn begin(&mut self, start: &[u8]) {
+        if self.started {
+            return;
+        }
+        self.started = true;
+        // Devices and pipes have no length.
+        let is_file = self.file.metadata().is_ok_and(|metadata| metadata.is_file());
+        self.keep(|file| if is_file { file.set_len(0) } else { Ok(()) });
+        if self.account.error.is_none() {
+            self.write(start);
         }
     }
 
@@ -155,6 +194,26 @@ mod tests {
         let salvaged = Recording::whole_records(cut).unwrap();
         assert!(matches!(salvaged.damage, Some(RecordingError::Unfinished { records }) if records > 490));
         assert!(salvaged.recording.records.len() > 490);
+    }
+
+    #[test]
+    fn a_recording_is_replaced_by_ticks_alone_and_by_one_process_at_a_time() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stream.rec");
+        std::fs::write(&path, b"an hour on the bench").unwrap();
+        let idle = StreamRecorder::create(&path, &header()).unwrap();
+        let refused = StreamRecorder::create(&path, &header()).unwrap_err();
+        assert!(std::error::Error::source(&refused).unwrap().to_string().contains("another process"), "{refused}");
+        Box::new(idle).finish();
+        assert_eq!(std::fs::read(&path).unwrap(), b"an hour on the bench");
+        let mut recorder = StreamRecorder::create(&path, &header()).unwrap();
+        recorder.record(&ControllerTick::default());
+        Box::new(recorder).finish();
+        let replaced = Recording::decode(&std::fs::read(&path).unwrap()).unwrap();
+        assert_eq!(replaced.records.len(), 1);
+        let (fresh, empty) = (folder.path().join("fresh.rec"), Recording { header: header(), records: Vec::new() });
+        Box::new(StreamRecorder::create(&fresh, &header()).unwrap()).finish();
+        assert_eq!(std::fs::read(&fresh).unwrap(), empty.encode(), "no tick is a recording as well");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use firmware::Mode;
-use model_offline::number::{decimals, smallest_told};
+use model_offline::number::{decimals, in_unit, smallest_told};
 use model_offline::output::chart::number::plain;
 use model_offline::scene::{PlantModel, TissueVariant};
 
@@ -58,7 +58,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
         settings.sensor,
         settings.target_rate_hz,
         settings.target_latency_ms,
-        noise(settings.noise, &run.units[0]),
+        in_unit(settings.noise, &run.units[0]),
         settings.feedback,
     )?;
     if !settings.world.is_empty() {
@@ -103,14 +103,6 @@ fn programme(settings: &SimulationSettings) -> String {
 }
 
 /// The sensor's noise with its unit, where it has one.
-fn noise(noise: f64, unit: &str) -> String {
-    let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-    if (0.01..1e4).contains(&noise) { format!("{}{unit}", rounded(noise)) } else { format!("{noise:.1e}{unit}") }
-}
-
-fn rounded(value: f64) -> f64 {
-    (value * 1e4).round() * 1e-4
-}
 
 /// The controller's state at the end; where it was not RUN throughout, how long it was, and why not.
 fn state(dynamic: &StrategyResult) -> String {

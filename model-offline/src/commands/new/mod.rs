@@ -7,6 +7,7 @@ use model_offline::output;
 use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
 use model_offline::scene::space::{self, AnyScene};
 use model_offline::scene::starter::{self, StarterNames, starter};
+use model_offline::{say, tell};
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
 
@@ -85,12 +86,12 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
     AnyScene::parse(&text, "<new scene>")?;
     match &args.output {
         None => {
-            print!("{text}");
+            tell!("{text}");
             eprint!("{summary}");
         }
         Some(path) => {
             output::write_whole(path, text.as_bytes())?;
-            println!("{summary}{}\nnext: model-offline place {0}", path.display());
+            say!("{summary}{}\nnext: model-offline place {0}", path.display());
         }
     }
     Ok(())

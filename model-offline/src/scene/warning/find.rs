@@ -21,6 +21,8 @@ const SAME: f64 = 1e-9;
 const NO_AREA: f64 = 1e-6;
 /// Share of the smaller inclusion that overlaps where only the rounding of a shared edge does.
 const SHARED_EDGE: f64 = 1e-3;
+/// Overlaps of inclusions that are told: who has more has drawn all of them over each other, and their number grows with its square.
+const MOST_OVERLAPS: usize = 100;
 /// Part of a paddle's length below which an overlap with another is hardly meant: two places that share more are alternatives.
 const SHORT_OVERLAP: f64 = 0.02;
 
@@ -89,7 +91,7 @@ impl Rules<'_> {
     }
 
     fn inclusions(&self) -> Vec<SceneWarning> {
-        let mut found = Vec::new();
+        let (mut found, mut overlaps) = (Vec::new(), Vec::new());
         for (i, region) in self.scene.inclusions.iter().map(|inclusion| &inclusion.outline).enumerate() {
             let (inclusion, area) = (i + 1, region.area());
             let outside = 1.0 - shared_area(&[&self.scene.outline], region.vertices()) / area;
@@ -100,8 +102,10 @@ impl Rules<'_> {
             if let Some(spacing) = self.longer_spacing(width) {
                 found.push(SceneWarning::InclusionNarrow { inclusion, width, spacing });
             }
-            found.extend((0..i).filter_map(|first| self.overlap(first, i)));
+            let more = MOST_OVERLAPS - overlaps.len();
+            overlaps.extend((0..i).filter_map(|first| self.overlap(first, i)).take(more));
         }
+        found.extend(overlaps);
         found
     }
 

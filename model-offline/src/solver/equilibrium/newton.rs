@@ -226,7 +226,7 @@ impl<const D: usize> Equilibrium<D> {
         let start = self.at.coefficients.clone();
         let energy = self.at.energy;
         // Differences of energies below this are rounding.
-        let noise = 1e-12 * (energy.abs() + self.smallest_force * self.spacing);
+        let noise = 1e-12 * (energy.abs() + self.smallest_force * self.spacing) + self.energy_rounding;
         let mut length = 1.0;
         let shortest = if self.settings.line_search && slope.is_some() { 1.0 / 256.0 } else { 1.0 };
         loop {

@@ -4,6 +4,7 @@ use super::super::looks::look;
 use super::plan::{Entry, Parameter, Safeguards, base};
 use super::{ExperimentResult, Stability};
 use crate::discretization::Integration;
+use crate::number::median;
 use crate::output::chart::number::plain;
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};
 use strum::VariantArray as _;
@@ -53,10 +54,7 @@ fn by_integration(study: &Stability, place: Abscissa<'_>, height: fn(&Experiment
             }
         }
         groups.sort_by(|a, b| a.0.total_cmp(&b.0));
-        for (x, mut values) in groups {
-            values.sort_by(f64::total_cmp);
-            series.points.push((x, values[values.len() / 2]));
-        }
+        series.points.extend(groups.into_iter().filter_map(|(x, values)| Some((x, median(values)?))));
         series
     };
     study.setting.rules().iter().map(of_rule).collect()

@@ -4,6 +4,7 @@ use super::plan::{Experiment, Parameter, Safeguards, Value};
 use super::zero_energy::Unmeasured;
 use super::{ExperimentResult, Stability};
 use crate::discretization::{Integration, Method};
+use crate::number::median;
 use std::fmt::Write as _;
 
 /// Depths within this share of the larger one count as the same.
@@ -41,10 +42,7 @@ impl Pairs {
                 ratios.push(meshfree / elements);
             }
         }
-        ratios.sort_by(f64::total_cmp);
-        if !ratios.is_empty() {
-            pairs.median_ratio = ratios[ratios.len() / 2];
-        }
+        pairs.median_ratio = median(ratios).unwrap_or(pairs.median_ratio);
         pairs
     }
 

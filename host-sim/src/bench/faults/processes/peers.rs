@@ -160,7 +160,7 @@ pub(crate) fn other_user<const D: usize, const N: usize, const P: usize>(
         }
         // The place prepared by somebody else before we come.
         let squatted = stage.link();
-        let place = std::env::temp_dir().join(format!("stillpoint-{squatted}"));
+        let place = Space::directory_of(&squatted);
         let mut squatter = as_nobody("mkdir".as_ref(), &["-m", "777", &place.to_string_lossy()])?;
         evidence.injected += 1;
         let _ = squatter.code();

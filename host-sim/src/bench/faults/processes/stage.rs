@@ -165,7 +165,7 @@ impl<'t, const D: usize, const N: usize, const P: usize> Stage<'t, D, N, P> {
 
 /// Names in shared memory and directories that a link has left behind; tidies up after looking.
 pub(super) fn left_behind(link: &str) -> Result<Vec<PathBuf>, LinkError> {
-    let root = std::env::temp_dir().join(format!("stillpoint-{link}"));
+    let root = Space::directory_of(link);
     let existed = root.exists();
     let space = Space::new(link)?;
     let traces = space.traces().into_iter().filter(|path| existed || *path != root).collect();

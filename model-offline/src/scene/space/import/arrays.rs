@@ -8,8 +8,10 @@ use roxmltree::Node;
 use std::io::Read as _;
 
 pub(super) const FORMAT: &str = "VTU";
-/// Bytes of an array at most, unpacked.
-const MOST_BYTES: usize = 1 << 29;
+/// Bytes of an array at most, unpacked: corners of four million tetrahedra, and not all of the memory.
+const MOST_BYTES: usize = 1 << 27;
+/// Numbers of an array at most: those of one byte are eight times as large here.
+const MOST_NUMBERS: usize = 1 << 25;
 
 /// What is wrong with the file, at no place in particular: XML has no lines in what is read here.
 pub(super) fn wrong(what: impl Into<String>) -> ReadError {
@@ -92,6 +94,10 @@ impl<'a> Arrays<'a> {
         };
         if data.len() % kind.size() != 0 {
             return Err(wrong(format!("array {name:?} ends within a number")));
+        }
+        if data.len() / kind.size() > MOST_NUMBERS {
+            let what = format!("{} numbers of an array", data.len() / kind.size());
+            return Err(ReadError::TooLarge { format: FORMAT, what, most: MOST_NUMBERS as u64 });
         }
         Ok(data.chunks_exact(kind.size()).map(|bytes| kind.number(bytes, self.big)).collect())
     }
