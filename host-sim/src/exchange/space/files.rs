@@ -29,27 +29,27 @@ const PRESENCE_FILE: &str = "present";
 /// What iceoryx2 makes in a link's directory.
 const TRANSPORT_DIRECTORIES: [&str; 2] = ["nodes", "services"];
 
-/// Longest path of the directory that links are in. Files of iceoryx2 have the link's name twice in their paths, three
-/// numbers of up to 39 digits and words, and no path is longer than 255.
-const LONGEST_BASE: usize = 32;
+/// What a path of iceoryx2's may be long, 255, without what its longest has besides the directory that links are in and twice
+/// the link's name: marks, a key, a hash of 40 digits, two numbers of 32, words. Past it, it panics.
+pub(super) const ROOM: usize = 94;
+/// Where links are whose directory for temporary files has too long a path.
+const SHORT_BASE: &str = "/tmp";
 
 /// How long somebody else may be at work in a link's directory.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(8);
 const BETWEEN_TRIALS: Duration = Duration::from_millis(2);
 
-/// Where directories of links are: that for temporary files, or `/tmp` where its path is so long that those of the files in it
-/// are longer than iceoryx2 can say. Everybody with the same environment comes to the same.
-pub(super) fn base() -> PathBuf {
-    base_for(std::env::temp_dir())
+/// Where directories of links may be.
+pub(super) fn bases() -> [PathBuf; 2] {
+    [std::env::temp_dir(), PathBuf::from(SHORT_BASE)]
 }
 
-fn base_for(temporary: PathBuf) -> PathBuf {
-    if temporary.as_os_str().len() <= LONGEST_BASE { temporary } else { PathBuf::from("/tmp") }
-}
-
-/// Directory of a link's files.
+/// Directory of a link's files: in that for temporary files, or in `/tmp` where paths of the files in it would be longer than
+/// iceoryx2 can say. Everybody with the same environment comes to the same.
 pub(super) fn root(name: &str) -> PathBuf {
-    base().join(format!("{ROOT_MARK}{name}"))
+    let [temporary, short] = bases();
+    let fits = temporary.as_os_str().len() + 2 * name.len() <= ROOM;
+    (if fits { temporary } else { short }).join(format!("{ROOT_MARK}{name}"))
 }
 
 /// Name of the link that a directory is of, if it is one's.
@@ -224,6 +224,14 @@ pub(super) fn known_key(root: &Path) -> Option<String> {
     (found.len() == 16 && found.bytes().all(|byte| byte.is_ascii_hexdigit())).then_some(found)
 }
 
+/// Whether a directory has what iceoryx2 makes, nothing else, and no key: somebody went in while somebody else removed it.
+pub(super) fn is_half_removed(root: &Path) -> bool {
+    let names: Vec<_> =
+        std::fs::read_dir(root).into_iter().flatten().flatten().map(|entry| entry.file_name()).collect();
+    let has_transport = TRANSPORT_DIRECTORIES.iter().any(|known| names.iter().any(|name| name == known));
+    has_transport && known_key(root).is_none() && names.iter().all(|name| is_of_a_link(name))
+}
+
 /// 64 bits from the operating system, as hexadecimal digits.
 ///
 /// # Errors
@@ -306,19 +314,5 @@ impl OwnerOnly {
 impl Drop for OwnerOnly {
     fn drop(&mut self) {
         rustix::process::umask(self.before);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The paths of both sides' files, with the longest name, are within what iceoryx2 can say; past it, it panics.
-    #[test]
-    fn a_long_directory_for_temporary_files_is_left_for_a_short_one() {
-        let long = PathBuf::from(format!("/{}", "q".repeat(LONGEST_BASE)));
-        assert_eq!(base_for(long), PathBuf::from("/tmp"));
-        let fits = PathBuf::from(format!("/{}", "q".repeat(LONGEST_BASE - 1)));
-        assert_eq!(base_for(fits.clone()), fits);
     }
 }

@@ -99,7 +99,7 @@ impl Space {
     /// # Errors
     /// As [`Space::new`].
     pub fn unique() -> Result<Self, LinkError> {
-        let failed = |source| LinkError::Directory { path: files::base(), source };
+        let failed = |source| LinkError::Directory { path: std::env::temp_dir(), source };
         let random = files::random_key().map_err(failed)?;
         Self::new(&format!("{RUN}{}-{random}", std::process::id()))
     }

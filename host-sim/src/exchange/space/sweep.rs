@@ -11,7 +11,9 @@ use super::{RUN, Space, files};
 /// Removes the links of this user in which nobody is alive; returns their names. What is not certain stays.
 pub fn sweep() -> Vec<String> {
     let entries = |directory: &std::path::Path| std::fs::read_dir(directory).into_iter().flatten().flatten();
-    let roots = entries(&files::base())
+    let roots = files::bases()
+        .iter()
+        .flat_map(|base| entries(base))
         .filter_map(|entry| Some(files::name_of_root(entry.file_name().to_str()?)?.to_owned()))
         .collect::<Vec<_>>();
     let in_memory = entries(files::SHARED_MEMORY.as_ref())
@@ -32,8 +34,10 @@ fn may_have_owner(name: &str) -> bool {
 fn is_left(name: &str) -> bool {
     let root = files::root(name);
     let key = files::known_key(&root);
-    // Without files in shared memory, or a directory of a link's, there is nothing to sweep: only names that look alike.
-    if files::in_shared_memory(name).is_empty() && key.is_none() {
+    // Without files in shared memory, or a directory of a link's, there is nothing to sweep: only names that look alike. A
+    // directory without a key is one's where it is named after a process that is gone, and has what links have.
+    let is_half_removed = || name.starts_with(RUN) && files::is_half_removed(&root);
+    if files::in_shared_memory(name).is_empty() && key.is_none() && !is_half_removed() {
         return false;
     }
     let Ok(locked) = files::lock_root_within(&root, Duration::ZERO) else { return false };

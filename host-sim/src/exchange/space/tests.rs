@@ -92,6 +92,40 @@ fn a_directory_with_other_things_in_it_is_no_link_s_and_keeps_them() {
     assert!(!place.exists());
 }
 
+/// A process of a link whose owner was killed may come back to a directory that a sweep has just removed.
+#[test]
+fn what_is_made_in_a_directory_without_a_key_is_swept_when_its_owner_is_gone() {
+    let mut gone = std::process::Command::new("true").spawn().unwrap();
+    gone.wait().unwrap();
+    let of = |what: &str| files::root(&format!("{RUN}{}-{what}", gone.id()));
+    for (what, entry) in [("nodes", "nodes"), ("other", "pictures")] {
+        files::make_root(&of(what)).unwrap();
+        std::fs::create_dir(of(what).join(entry)).unwrap();
+    }
+    sweep();
+    assert!(!of("nodes").exists() && of("other").exists());
+    std::fs::remove_dir_all(of("other")).unwrap();
+}
+
+/// Past 255 characters iceoryx2 panics. Its longest path has a mark, the link's name and key, a hash, two numbers and a word.
+#[test]
+fn no_path_in_a_link_s_directory_is_too_long() {
+    let key = "0".repeat(16);
+    for length in [1, 28, LONGEST_NAME] {
+        let name = "n".repeat(length);
+        let longest = format!(
+            "{}{}_{}_{}.connection",
+            files::prefix(&name, &key),
+            "h".repeat(40),
+            "1".repeat(32),
+            "2".repeat(32)
+        );
+        let fits = "q".repeat(files::ROOM - 2 * length);
+        let root = Path::new(&fits).join(format!("stillpoint-{name}"));
+        assert!(root.join(longest).as_os_str().len() <= 255, "{length}");
+    }
+}
+
 #[test]
 fn names_of_runs_and_of_files_cannot_be_guessed() {
     let [a, b] = [(); 2].map(|()| Space::unique().unwrap());
