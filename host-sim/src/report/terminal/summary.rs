@@ -102,8 +102,6 @@ fn programme(settings: &SimulationSettings) -> String {
     }
 }
 
-/// The sensor's noise with its unit, where it has one.
-
 /// The controller's state at the end; where it was not RUN throughout, how long it was, and why not.
 fn state(dynamic: &StrategyResult) -> String {
     let end = names::mode::name(dynamic.final_state);
