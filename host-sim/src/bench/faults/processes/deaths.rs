@@ -91,8 +91,10 @@ fn kill_plant<const D: usize, const N: usize, const P: usize>(
     evidence.injected += u64::from(killed);
     let code = controller.code();
     evidence.require(code == Some(1), || format!("{}: the controller ended with {code:?}", what()));
-    // Without accounts the plant had not been there yet: nothing was to be made safe.
-    if let Some(result) = read_json::<ControllerResult>(&json) {
+    let result = read_json::<ControllerResult>(&json);
+    evidence.require(result.is_some(), || format!("{}: the controller has no accounts", what()));
+    // Without a state the plant had not been there yet: nothing was to be made safe.
+    if let Some(result) = result.filter(|result| result.accounts.final_state.is_some()) {
         let unaccounted = unaccounted(&result, None);
         evidence.unaccounted += unaccounted;
         evidence.require(unaccounted == 0, || format!("{}: {unaccounted} unaccounted", what()));
