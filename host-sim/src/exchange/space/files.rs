@@ -35,6 +35,8 @@ pub(super) const ROOM: usize = 94;
 /// Where links are whose directory for temporary files has too long a path.
 const SHORT_BASE: &str = "/tmp";
 
+/// How long somebody who has a link's key may take to enter.
+const ON_THE_WAY: Duration = Duration::from_secs(10);
 /// How long somebody else may be at work in a link's directory.
 const LOCK_TIMEOUT: Duration = Duration::from_secs(8);
 const BETWEEN_TRIALS: Duration = Duration::from_millis(2);
@@ -265,6 +267,15 @@ pub(super) fn enter(root: &Path) -> Result<Presence, LinkError> {
 /// Whether it is certain that nobody has entered. What cannot be found out is not certain.
 pub(super) fn is_empty(root: &Path, _locked: &Locked) -> bool {
     presence_file(root).is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_ok())
+}
+
+/// Whether somebody has made the key who may be about to enter: it is new, and nobody ever has entered. Were the directory removed
+/// now, the peer would make another key.
+#[expect(clippy::disallowed_methods, reason = "files have the wall clock's time")]
+pub(super) fn is_awaited(root: &Path, _locked: &Locked) -> bool {
+    let made = root.join(KEY_FILE).symlink_metadata().and_then(|metadata| metadata.modified());
+    // A key of a time to come may be new: clocks are set.
+    made.is_ok_and(|made| made.elapsed().map_or(true, |age| age < ON_THE_WAY)) && !root.join(PRESENCE_FILE).exists()
 }
 
 /// Removes the link's files in shared memory that have no bytes yet. Whoever makes one holds the lock from before it is

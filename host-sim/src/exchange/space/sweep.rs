@@ -41,6 +41,10 @@ fn is_left(name: &str) -> bool {
         return false;
     }
     let Ok(locked) = files::lock_root_within(&root, Duration::ZERO) else { return false };
+    // Of a link that is named after a process nobody comes any more: its owner is gone.
+    if !name.starts_with(RUN) && files::is_awaited(&root, &locked) {
+        return false;
+    }
     // Who works with the transport alone has not entered, but has a node.
     let space = key.and_then(|key| Space::of(name, key).ok());
     let has_nodes =

@@ -173,6 +173,30 @@ fn nobody_removes_a_space_that_somebody_is_in() {
     assert!(space.traces().is_empty());
 }
 
+/// Two processes that are started together each sweep first: one between the other's key and its entering would have it meet
+/// another key than its peer.
+#[test]
+fn a_link_that_somebody_is_about_to_enter_is_not_swept() {
+    let name = format!("test-awaited-{}", std::process::id());
+    let [first, second] = [(); 2].map(|()| {
+        let space = Space::new(&name).unwrap();
+        assert!(!sweep().contains(&name), "swept before anybody could enter");
+        space
+    });
+    assert_eq!(first.key, second.key);
+    // Whoever has entered and gone without removing it, is dead.
+    drop(files::enter(&first.root).unwrap());
+    sweep();
+    assert!(!first.root.exists());
+    // An old key is nobody's either.
+    let old = Space::new(&name).unwrap();
+    let key = files::open_own(&old.root.join("key")).unwrap();
+    let made = key.metadata().unwrap().modified().unwrap();
+    key.set_modified(made - Duration::from_secs(60)).unwrap();
+    sweep();
+    assert!(!old.root.exists());
+}
+
 #[test]
 fn what_the_dead_have_left_is_swept_and_what_the_living_have_is_not() {
     // No process has this number: it is above what any kernel gives.
