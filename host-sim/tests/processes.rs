@@ -113,7 +113,12 @@ fn a_damaged_recording_is_salvaged_up_to_the_damage() {
     }
     // Without a single whole record there is nothing to salvage.
     std::fs::write(&recording, &whole[..whole.len() - (ticks + 1) * RECORD_BYTES]).unwrap();
-    assert_eq!(salvaged(&["replay", "--salvage"]).status.code(), Some(2));
+    for command in [&["replay"][..], &["replay", "--salvage"]] {
+        let refused = salvaged(command);
+        let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(said.contains("record again") && !said.contains("--salvage"), "{said}");
+    }
     // Salvage of a whole one is a replay like any other.
     std::fs::write(&recording, &whole).unwrap();
     let replayed = salvaged(&["replay", "--salvage"]);

@@ -49,6 +49,7 @@ mod choice;
 pub mod number;
 pub mod parallel;
 mod random;
+pub mod reading;
 
 pub mod geometry;
 pub mod material;

@@ -13,6 +13,7 @@ use host_sim::record::recording::Recording;
 use host_sim::report::board_chart;
 
 use model_offline::output::check_outputs;
+use model_offline::reading;
 use model_offline::tell;
 
 /// Options of `board`.
@@ -79,7 +80,8 @@ const HEAD: &str = "\
 ";
 
 fn read_budget(path: &Path) -> Result<Budget, SimError> {
-    let text = std::fs::read_to_string(path).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
+    let text =
+        reading::read_text(path, reading::TEXT).map_err(|source| FileError::Read { path: path.to_owned(), source })?;
     toml::from_str(&text)
         .map_err(|source| UsageError::Budget { path: path.to_owned(), source: Box::new(source) }.into())
 }

@@ -83,6 +83,8 @@ pub(crate) fn bridge(args: &BridgeArgs) -> Result<(), SimError> {
     let met = |told: &Introduction| {
         let Introduction { dimension, units: [unit, _], paddles, .. } = told;
         let paddles: Vec<_> = paddles.iter().map(u32::to_string).collect();
+        // Its table may be anybody's.
+        let unit = unit.escape_debug();
         say!("Controller in {dimension} dimensions, unit of length {unit}, paddle {}", paddles.join(" + "));
     };
     // Its accounts say as well that no controller came.

@@ -87,7 +87,9 @@ impl RecordingError {
         match self {
             Self::NotARecording => "name a .rec file that `run` or `controller --record` has written",
             Self::Version { .. } => "use it with the program that has written it, or record again",
-            Self::Header => "nothing of it can be used: record again",
+            Self::Header | Self::Chain { record: 0 } | Self::Unfinished { records: 0 } | Self::Value { record: 0 } => {
+                "nothing of it can be used: record again"
+            }
             Self::Chain { .. } | Self::Unfinished { .. } | Self::Trailing { .. } | Self::Value { .. } => {
                 "replay or export the ticks before the damage with --salvage"
             }

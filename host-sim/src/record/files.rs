@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use model_offline::output::{OutputError, write_whole};
+use model_offline::reading;
 use serde::Serialize;
 
 use super::error::FileError;
@@ -16,12 +17,20 @@ pub struct Artifact {
     pub bytes: Vec<u8>,
 }
 
-/// Reads a file.
+/// Reads a table or a result.
 ///
 /// # Errors
 /// [`FileError::Read`].
 pub fn read_bytes(path: &Path) -> Result<Vec<u8>, FileError> {
-    std::fs::read(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
+    reading::read(path, reading::TEXT).map_err(|source| FileError::Read { path: path.to_owned(), source })
+}
+
+/// Reads a recording, which is as long as its run was.
+///
+/// # Errors
+/// [`FileError::Read`].
+pub fn read_recording(path: &Path) -> Result<Vec<u8>, FileError> {
+    reading::read_of_any_length(path).map_err(|source| FileError::Read { path: path.to_owned(), source })
 }
 
 /// Writes a file.

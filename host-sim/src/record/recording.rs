@@ -89,7 +89,7 @@ impl Recording {
     /// # Errors
     /// [`RecordError::File`], [`RecordError::Recording`].
     pub fn read(path: &Path) -> Result<Self, RecordError> {
-        let bytes = files::read_bytes(path)?;
+        let bytes = files::read_recording(path)?;
         Self::decode(&bytes).map_err(|source| RecordError::Recording { path: path.to_owned(), source })
     }
 
@@ -108,7 +108,7 @@ impl Recording {
     /// # Errors
     /// [`RecordError::File`]; [`RecordError::Recording`] where not a single record is whole.
     pub fn salvage(path: &Path) -> Result<Salvaged, RecordError> {
-        let bytes = files::read_bytes(path)?;
+        let bytes = files::read_recording(path)?;
         let salvaged = Self::whole_records(&bytes).and_then(|salvaged| match salvaged.damage {
             Some(damage) if salvaged.recording.records.is_empty() => Err(damage),
             _ => Ok(salvaged),

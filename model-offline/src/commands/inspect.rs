@@ -5,6 +5,7 @@ use super::json::write_json;
 use firmware::contract::{Header, TableError};
 use model_offline::output::check_outputs;
 use model_offline::output::{space_table_text, table_text};
+use model_offline::reading;
 use model_offline::say;
 use model_offline::table::space::SpaceTable;
 use std::path::PathBuf;
@@ -21,7 +22,7 @@ pub(super) struct InspectArgs {
 
 pub(super) fn run(args: &InspectArgs) -> Result<(), CliError> {
     check_outputs(&[&args.table], &[("--json", args.json.as_deref())])?;
-    let bytes = std::fs::read(&args.table)
+    let bytes = reading::read(&args.table, reading::TEXT)
         .map_err(|error| CliError::BadTable { path: args.table.clone(), reason: error.into() })?;
     let refused = |error: TableError| CliError::BadTable { path: args.table.clone(), reason: error.to_string().into() };
     let (json, summary) = match Header::read(&bytes).map_err(refused)?.dimension {

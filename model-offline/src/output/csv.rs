@@ -1,5 +1,6 @@
 //! Tables as CSV (RFC 4180), for all that writes or reads one.
 
+use crate::reading;
 pub use csv::Error as CsvError;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -32,8 +33,9 @@ pub fn table<T, H: AsRef<[u8]>, L: IntoIterator<Item = String>>(
 /// # Errors
 /// [`CsvError`] says in which line what cannot be read.
 pub fn rows<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, CsvError> {
+    let bytes = reading::read(path, reading::TEXT)?;
     let mut builder = csv::ReaderBuilder::new();
-    let mut reader = builder.has_headers(false).comment(Some(b'#')).trim(csv::Trim::All).from_path(path)?;
+    let mut reader = builder.has_headers(false).comment(Some(b'#')).trim(csv::Trim::All).from_reader(&bytes[..]);
     let rows: Vec<Result<T, CsvError>> = reader.deserialize().collect();
     // Names are no row.
     let named = matches!(rows.first(), Some(Err(error)) if matches!(error.kind(), csv::ErrorKind::Deserialize { .. }));

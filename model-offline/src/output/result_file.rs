@@ -2,6 +2,7 @@
 
 use super::geometry::Geometry;
 use super::surface::triangles;
+use crate::reading;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -124,7 +125,8 @@ struct Frame {
 /// # Errors
 /// [`ResultError`].
 pub(super) fn read_value(path: &Path) -> Result<serde_json::Value, ResultError> {
-    let text = std::fs::read_to_string(path).map_err(|source| ResultError::Read { path: path.to_owned(), source })?;
+    let text = reading::read_text(path, reading::TEXT)
+        .map_err(|source| ResultError::Read { path: path.to_owned(), source })?;
     serde_json::from_str(&text)
         .map_err(|error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() })
 }

@@ -31,6 +31,7 @@ pub use warning::SceneWarning;
 use crate::discretization::{Discretization, Features};
 use crate::geometry::{Point2, Polygon};
 use crate::material::Law;
+use crate::reading;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::path::Path;
@@ -232,7 +233,7 @@ impl Scene {
             return Ok((*text).to_owned());
         }
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| {
+        let bytes = reading::read(path, reading::TEXT).map_err(|error| {
             let known: Vec<&str> = all_bundled().map(|b| b.0).collect();
             let meant = Self::nearly_bundled(path).map_or_else(String::new, |name| format!("did you mean `{name}`? "));
             error::Source { file: &file, text: "" }.error(

@@ -4,6 +4,7 @@ mod interactive;
 
 use super::error::CliError;
 use model_offline::output;
+use model_offline::reading;
 use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
 use model_offline::scene::space::{self, AnyScene};
 use model_offline::scene::starter::{self, StarterNames, starter};
@@ -112,7 +113,7 @@ fn asked_for(names: &StarterNames) -> Result<String, CliError> {
 
 /// The scene of a file, and what became of everything in it.
 fn import(file: &Path, args: &NewArgs, names: &StarterNames) -> Result<(String, String), CliError> {
-    let bytes = std::fs::read(file).map_err(|error| {
+    let bytes = reading::read(file, reading::DATA).map_err(|error| {
         CliError::usage(format!("cannot read {}: {error}", file.display()), "give a drawing or a mesh")
     })?;
     let options = ImportOptions { size: args.size, length: &names.length, stress: &names.stress };

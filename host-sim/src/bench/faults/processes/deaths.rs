@@ -12,7 +12,7 @@ use crate::bench::error::SimError;
 use crate::bench::faults::evidence::Evidence;
 use crate::bench::faults::fault::below;
 use crate::record::error::RecordError;
-use crate::record::files::read_bytes;
+use crate::record::files::read_recording;
 use crate::record::recording::{Record, Recording};
 use crate::record::replay::replay;
 use crate::runtime::controller::process::ControllerResult;
@@ -31,7 +31,7 @@ fn whole_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
 
 /// The whole records of a file that may have been cut off; they must replay bit by bit.
 fn cut_off_and_replayed(path: &Path) -> Result<Vec<Record>, RecordError> {
-    let recording = Recording::growing(&read_bytes(path)?)
+    let recording = Recording::growing(&read_recording(path)?)
         .map_err(|source| RecordError::Recording { path: path.to_owned(), source })?;
     replay(&recording, path)?;
     Ok(recording.records)

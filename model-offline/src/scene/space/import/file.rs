@@ -5,6 +5,7 @@ use super::tetrahedra::Tetrahedra;
 use super::{msh, nifti, nrrd, obj, ply, stl, vtu};
 use crate::geometry::labels::Labels;
 use crate::geometry::surface::TriangleSurface;
+use crate::reading;
 use std::path::Path;
 
 /// Files that bundled scenes name.
@@ -17,7 +18,7 @@ const BUNDLED: [(&str, &[u8]); 1] = [("scan.nii.gz", include_bytes!("../../../..
 pub fn bytes(path: &Path) -> Result<Vec<u8>, FileError> {
     let found = BUNDLED.iter().find(|(name, _)| Path::new(name) == path && !path.exists());
     found.map_or_else(
-        || std::fs::read(path).map_err(|source| FileError::Io { path: path.into(), source }),
+        || reading::read(path, reading::DATA).map_err(|source| FileError::Io { path: path.into(), source }),
         |(_, bytes)| Ok(bytes.to_vec()),
     )
 }
