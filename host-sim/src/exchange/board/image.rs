@@ -11,8 +11,6 @@ use crate::process::dies_with_parent;
 
 /// Rust target of the board.
 pub const TARGET: &str = "thumbv7em-none-eabihf";
-/// Profile of the image in the workspace's Cargo.toml.
-const PROFILE: &str = "image";
 /// Where SRAM begins on every Cortex-M.
 const RAM_START: u32 = 0x2000_0000;
 
@@ -64,6 +62,14 @@ impl Control {
         match self {
             Self::Plane => "",
             Self::SpacePair => "-space",
+        }
+    }
+
+    /// The profile of its images in the workspace's Cargo.toml.
+    const fn profile(self) -> &'static str {
+        match self {
+            Self::Plane => "image",
+            Self::SpacePair => "image-space",
         }
     }
 
@@ -153,7 +159,7 @@ impl Image {
         cargo
             .current_dir(&workspace)
             .args(["build", "--quiet", "--locked", "-p", "firmware", "--features", "image", "--bin", &name])
-            .args(["--profile", PROFILE, "--target", TARGET, "--target-dir"])
+            .args(["--profile", control.profile(), "--target", TARGET, "--target-dir"])
             .arg(&directory)
             .env_remove("RUSTFLAGS")
             .env_remove("CARGO_ENCODED_RUSTFLAGS")
@@ -165,7 +171,7 @@ impl Image {
         if !output.status.success() {
             return Err(BoardError::Build { log: String::from_utf8_lossy(&output.stderr).into_owned() });
         }
-        Ok(Self { control, scalar, processor, elf: directory.join(TARGET).join(PROFILE).join(name) })
+        Ok(Self { control, scalar, processor, elf: directory.join(TARGET).join(control.profile()).join(name) })
     }
 
     /// What it takes of the board's memory.
