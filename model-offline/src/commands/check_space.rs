@@ -61,6 +61,14 @@ pub(super) fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
         )
     };
     all.extend(survey.overlapping.iter().map(overlap));
+    let empty = survey.inclusions.iter().filter(|inclusion| inclusion.elements == 0);
+    all.extend(empty.map(|inclusion| {
+        format!(
+            "inclusion {} has no element of its own: others cover it, or it is smaller than an element; leave it out, or \
+             change their order",
+            inclusion.number
+        )
+    }));
     let flat = survey.mesh.worst.first().filter(|worst| worst.dihedral < FLAT);
     all.extend(flat.map(|worst| {
         let (angle, at) = (worst.dihedral, told.point(worst.at));

@@ -127,14 +127,28 @@ fn summary(study: &SpaceStudy) -> String {
             words(&best.fixture),
             words(&best.dynamic)
         );
+        let fixture = all.iter().find(|(paddles, _)| *paddles == best.fixture);
+        out.extend(fixture.and_then(|(_, answer)| harms(what, answer, &placement.no_paddle.static_study)));
     }
     if let Some(line) = second_pays(study) {
         let _ = writeln!(out, "{line}");
     }
     if placement.profile_nodes != study.model.nodes() {
-        let _ = writeln!(out, "the insertion was followed on {} nodes", placement.profile_nodes);
+        let _ = writeln!(
+            out,
+            "the insertion was followed on {} nodes: the static column is theirs, and its error is not estimated",
+            placement.profile_nodes
+        );
     }
     out
+}
+
+/// Says so where even the best fixture moves the target more than no paddle does.
+fn harms(what: &str, best: &SpaceAnswer, no_paddle: &SpaceStatic) -> Option<String> {
+    let factor = best.static_study.max_orthogonal / no_paddle.max_orthogonal;
+    (factor > 1.0 && factor.is_finite()).then(|| {
+        format!("no static {what} helps: the best moves the target {factor:.2} times as far as no paddle does\n")
+    })
 }
 
 /// Whether the second paddle buys anything at rest.

@@ -53,6 +53,22 @@ impl<'a> Input<'a> {
         None
     }
 
+    /// The end of a section whose contents were read: what is left over was not counted.
+    pub(super) fn closes(&mut self, section: &str) -> Result<(), ImportError> {
+        while let Some(line) = self.line() {
+            let line = line.trim_ascii();
+            if line.strip_prefix(b"$End") == Some(section.as_bytes()) {
+                return Ok(());
+            }
+            if !line.is_empty() {
+                let what =
+                    format!("${section} has more in it than it counts: the count is wrong, or the file is damaged");
+                return Err(self.wrong(what));
+            }
+        }
+        Err(self.ends())
+    }
+
     /// The next word of an ASCII section.
     pub(super) fn word(&mut self) -> Result<&'a str, ImportError> {
         let rest = self.bytes.get(self.at..).unwrap_or_default();

@@ -3,7 +3,7 @@
 use super::super::ImportError;
 use super::input::Input;
 use crate::geometry::Point;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 /// Numbers of nodes of element types 1 to 31, as Gmsh's manual lists them.
 const NODES: [u8; 31] =
@@ -49,6 +49,8 @@ pub(super) struct Mesh {
     pub(super) curved: usize,
     /// Lowest and highest z.
     pub(super) z: Option<[f64; 2]>,
+    /// Dimensions and numbers of what is listed as an entity.
+    entities: BTreeSet<(i64, i64)>,
     /// Names of physical groups, by dimension and number.
     pub(super) names: BTreeMap<(i64, i64), String>,
     /// Physical groups of entities, by dimension and number.
@@ -76,8 +78,9 @@ impl Mesh {
                     return Err(ImportError::Unsupported("the mesh is partitioned: save it without partitions".into()));
                 }
                 // Ends of sections, and sections that tell nothing of a scene.
-                _ => {}
+                _ => continue,
             }
+            input.closes(&section)?;
         }
         Ok(mesh)
     }
@@ -124,6 +127,7 @@ impl Mesh {
         for (dimension, count) in (0_i64..).zip(counts) {
             for _ in 0..count {
                 let tag = input.int()?;
+                self.entities.insert((dimension, tag));
                 for _ in 0..if dimension == 0 { 3 } else { 6 } {
                     input.number()?;
                 }
@@ -213,7 +217,11 @@ impl Mesh {
     fn elements_4(&mut self, input: &mut Input<'_>) -> Result<(), ImportError> {
         let [blocks, ..] = [input.size()?, input.size()?, input.size()?, input.size()?];
         for _ in 0..blocks {
-            let (_, entity, kind) = (input.int()?, input.int()?, input.int()?);
+            let (dimension, entity, kind) = (input.int()?, input.int()?, input.int()?);
+            // The list may be left out; an entity that is not in it would be in no group.
+            if dimension == 3 && !self.entities.is_empty() && !self.entities.contains(&(3, entity)) {
+                return Err(input.wrong(format!("elements of volume {entity}, which $Entities does not list")));
+            }
             let count = input.size()?;
             for _ in 0..count {
                 input.size()?;

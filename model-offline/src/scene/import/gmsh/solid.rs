@@ -3,7 +3,7 @@
 use super::super::ImportError;
 use super::mesh::Mesh;
 use crate::geometry::Point;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Tetrahedra of a file.
 #[derive(Debug, Default)]
@@ -32,6 +32,7 @@ pub(in crate::scene) fn read(bytes: &[u8]) -> Result<SolidMesh, ImportError> {
     let has_groups = is_2 || mesh.physical.keys().any(|(dimension, _)| *dimension == 3);
     let mut number: HashMap<u64, u32> = HashMap::new();
     let mut known: HashMap<[u32; 4], u32> = HashMap::new();
+    let mut told = HashSet::new();
     for (corners, part) in &mesh.tetrahedra {
         let mut nodes = [0; 4];
         for (node, tag) in nodes.iter_mut().zip(corners) {
@@ -50,6 +51,11 @@ pub(in crate::scene) fn read(bytes: &[u8]) -> Result<SolidMesh, ImportError> {
         if t == next {
             solid.tetrahedra.push(nodes);
         }
+        if !told.insert((t, *part)) || (!is_2 && t != next) {
+            let [a, b, c, d] = corners;
+            let what = format!("the tetrahedron of nodes {a}, {b}, {c} and {d} is in it twice");
+            return Err(ImportError::Syntax { line: 0, what });
+        }
         let groups: &[i64] = match mesh.physical.get(&(3, *part)) {
             Some(groups) if !is_2 => groups.as_slice(),
             None if !is_2 && has_groups => &[],
@@ -58,9 +64,7 @@ pub(in crate::scene) fn read(bytes: &[u8]) -> Result<SolidMesh, ImportError> {
         for group in groups.iter().filter(|group| **group != 0) {
             let name = || (mesh.names.get(&(3, *group)).cloned(), Vec::new());
             let members = &mut solid.groups.entry(*group).or_insert_with(name).1;
-            if members.last() != Some(&t) {
-                members.push(t);
-            }
+            members.push(t);
         }
     }
     Ok(solid)

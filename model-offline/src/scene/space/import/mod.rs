@@ -14,6 +14,7 @@ pub mod nifti;
 pub mod nrrd;
 pub mod obj;
 pub mod ply;
+mod polygons;
 pub mod stl;
 pub mod tetrahedra;
 mod voxels;

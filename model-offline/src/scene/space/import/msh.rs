@@ -27,12 +27,13 @@ pub fn read(bytes: &[u8]) -> Result<Noted<Tetrahedra>, ReadError> {
     }
     let told = |count: usize| format!("{count} tetrahedra have nodes between their corners, which are left out");
     let group = |(label, (name, members))| Group { label, name, members };
+    let mesh = Tetrahedra {
+        nodes: solid.nodes,
+        tetrahedra: solid.tetrahedra,
+        groups: solid.groups.into_iter().map(group).collect(),
+    };
     Ok(Noted {
-        value: Tetrahedra {
-            nodes: solid.nodes,
-            tetrahedra: solid.tetrahedra,
-            groups: solid.groups.into_iter().map(group).collect(),
-        },
+        value: mesh.distinct(FORMAT)?,
         notes: Some(solid.curved).filter(|count| *count > 0).map(told).into_iter().collect(),
     })
 }

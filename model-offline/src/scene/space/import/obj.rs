@@ -1,18 +1,20 @@
 //! Wavefront OBJ: vertices and polygons. Groups, materials, texture and normals are not geometry of a body.
 
 use super::error::{Noted, Place, ReadError};
+use super::polygons::cut;
 use super::words::{Words, parsed, quoted};
 use crate::geometry::Point;
 use crate::geometry::surface::TriangleSurface;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 const FORMAT: &str = "OBJ";
 /// Statements that say nothing of where a surface is.
 const SILENT: [&str; 12] =
     ["vt", "vn", "g", "o", "s", "usemtl", "mtllib", "usemap", "maplib", "shadow_obj", "trace_obj", "lod"];
 
-/// Reads a surface. Polygons are cut into triangles as fans around their first corner; negative numbers of vertices
-/// count back from the last one.
+/// Reads a surface. Polygons are cut into triangles, as fans around their first corner where these cover them; negative numbers of
+/// vertices count back from the last one.
 ///
 /// # Errors
 /// [`ReadError`] names the line.
@@ -42,7 +44,8 @@ pub fn read(bytes: &[u8]) -> Result<Noted<TriangleSurface>, ReadError> {
 struct Obj {
     vertices: Vec<Point<3>>,
     triangles: Vec<[u32; 3]>,
-    polygons: usize,
+    /// Where the polygons stand among the triangles.
+    fans: Vec<Range<usize>>,
     /// The largest number of a vertex, and its line: vertices may follow the faces.
     largest: (u64, usize),
     left: BTreeMap<String, (usize, usize)>,
@@ -88,12 +91,15 @@ impl Obj {
         if corners.len() < 3 {
             return Err(words.wrong(format!("a face has at least 3 corners, and this one {}", corners.len())));
         }
-        self.polygons += usize::from(corners.len() > 3);
+        let begin = self.triangles.len();
         self.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+        if corners.len() > 3 {
+            self.fans.push(begin..self.triangles.len());
+        }
         Ok(())
     }
 
-    fn done(self, bytes: &[u8]) -> Result<Noted<TriangleSurface>, ReadError> {
+    fn done(mut self, bytes: &[u8]) -> Result<Noted<TriangleSurface>, ReadError> {
         if self.triangles.is_empty() {
             return Err(ReadError::broken(FORMAT, Place::Whole, "no faces are in it: export the body as a mesh"));
         }
@@ -102,10 +108,7 @@ impl Obj {
             let what = format!("vertex {} is used, and there are {}", largest + 1, self.vertices.len());
             return Err(ReadError::broken(FORMAT, Place::Line(line), what));
         }
-        let mut notes = Vec::new();
-        if self.polygons > 0 {
-            notes.push(format!("{} polygons were cut into triangles around their first corners", self.polygons));
-        }
+        let mut notes: Vec<String> = cut(&self.vertices, &mut self.triangles, &self.fans).into_iter().collect();
         for (keyword, (count, line)) in self.left {
             notes.push(format!("{count} statements `{keyword}` are left out, the first in line {line}"));
         }

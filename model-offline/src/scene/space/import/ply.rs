@@ -2,9 +2,11 @@
 
 use super::bytes::{Bytes, Kind};
 use super::error::{Noted, Place, ReadError};
+use super::polygons::cut;
 use super::words::{Words, parsed, quoted};
 use crate::geometry::Point;
 use crate::geometry::surface::TriangleSurface;
+use std::ops::Range;
 
 const FORMAT: &str = "PLY";
 
@@ -74,8 +76,8 @@ impl Source<'_> {
     }
 }
 
-/// Reads a surface. Polygons are cut into triangles as fans around their first corner; colours, normals and whatever
-/// else vertices have are not used.
+/// Reads a surface. Polygons are cut into triangles, as fans around their first corner where these cover them; colours, normals and
+/// whatever else vertices have are not used.
 ///
 /// # Errors
 /// [`ReadError`] names the line or the byte.
@@ -87,12 +89,12 @@ pub fn read(bytes: &[u8]) -> Result<Noted<TriangleSurface>, ReadError> {
         None => Source::Text(words),
         Some(big) => Source::Binary(Bytes::new(FORMAT, bytes, start, big)),
     };
-    let (mut vertices, mut triangles, mut polygons) = (Vec::new(), Vec::new(), 0);
+    let (mut vertices, mut triangles, mut fans) = (Vec::new(), Vec::new(), Vec::new());
     let mut notes = Vec::new();
     for element in &header.elements {
         match element.name.as_str() {
             "vertex" => read_vertices(element, &mut source, &mut vertices)?,
-            "face" => polygons += read_faces(element, &mut source, &mut triangles)?,
+            "face" => read_faces(element, &mut source, &mut triangles, &mut fans)?,
             "tristrips" => {
                 let help = "save the mesh with faces instead of triangle strips";
                 return Err(ReadError::unsupported(FORMAT, "triangle strips", help));
@@ -110,9 +112,7 @@ pub fn read(bytes: &[u8]) -> Result<Noted<TriangleSurface>, ReadError> {
         let what = format!("triangle {number} has vertex {corner}, and there are {}", vertices.len());
         return Err(ReadError::broken(FORMAT, Place::Whole, what));
     }
-    if polygons > 0 {
-        notes.push(format!("{polygons} polygons were cut into triangles around their first corners"));
-    }
+    notes.extend(cut(&vertices, &mut triangles, &fans));
     if !source.is_done() {
         notes.push("what follows the last element is left out".to_owned());
     }
@@ -173,14 +173,18 @@ fn read_vertices(element: &Element, source: &mut Source<'_>, to: &mut Vec<Point<
     })
 }
 
-/// Reads faces, and says how many of them were no triangles.
-fn read_faces(element: &Element, source: &mut Source<'_>, to: &mut Vec<[u32; 3]>) -> Result<usize, ReadError> {
+/// Reads faces; those that are no triangles as fans, where these are.
+fn read_faces(
+    element: &Element,
+    source: &mut Source<'_>,
+    to: &mut Vec<[u32; 3]>,
+    fans: &mut Vec<Range<usize>>,
+) -> Result<(), ReadError> {
     let is_corners = |name: &str| matches!(name, "vertex_indices" | "vertex_index");
     let corners = element.properties.iter().position(|(name, _)| is_corners(name));
     let Some(corners) = corners else {
         return Err(source.wrong("faces have a list of vertex_indices".to_owned()));
     };
-    let mut polygons = 0;
     each(element, source, |number, i, property, source| {
         let Property::List(count, kind) = property else { return skip(property, source) };
         if i != corners {
@@ -190,7 +194,7 @@ fn read_faces(element: &Element, source: &mut Source<'_>, to: &mut Vec<[u32; 3]>
         if count < 3 {
             return Err(source.wrong(format!("face {number} has {count} corners: at least 3 are needed")));
         }
-        polygons += usize::from(count > 3);
+        let begin = to.len();
         let first = source.count(kind, "a corner of a face")?;
         let mut before = source.count(kind, "a corner of a face")?;
         for _ in 2..count {
@@ -198,9 +202,11 @@ fn read_faces(element: &Element, source: &mut Source<'_>, to: &mut Vec<[u32; 3]>
             to.push([first, before, next]);
             before = next;
         }
+        if count > 3 {
+            fans.push(begin..to.len());
+        }
         Ok(())
-    })?;
-    Ok(polygons)
+    })
 }
 
 fn header(words: &mut Words<'_>) -> Result<Header, ReadError> {

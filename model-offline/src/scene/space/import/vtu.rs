@@ -68,6 +68,16 @@ fn child<'a, 'b>(node: &Node<'a, 'b>, name: &str) -> Result<Node<'a, 'b>, ReadEr
     node.children().find(|child| child.has_tag_name(name)).ok_or_else(|| wrong(format!("a piece has no {name}")))
 }
 
+/// Compares what a piece says that it has with what is there.
+fn counted(piece: &Node<'_, '_>, what: &str, found: usize) -> Result<(), ReadError> {
+    match piece.attribute(what) {
+        Some(told) if told.trim().parse() != Ok(found) => {
+            Err(wrong(format!("{what} is {told:?}, and {found} are there: the file is damaged")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The array of this name in an element.
 fn named<'a, 'b>(node: &Node<'a, 'b>, name: &str) -> Option<Node<'a, 'b>> {
     node.children().find(|child| child.attribute("Name") == Some(name))
@@ -98,6 +108,7 @@ impl Found {
         if coordinates.len() % 3 != 0 {
             return Err(wrong(format!("{} coordinates of points are no multiple of 3", coordinates.len())));
         }
+        counted(piece, "NumberOfPoints", coordinates.len() / 3)?;
         let first = self.mesh.nodes.len();
         self.mesh.nodes.extend(coordinates.chunks_exact(3).map(|x| Point::<3>::new(x[0], x[1], x[2])));
         let cells = child(piece, "Cells")?;
@@ -109,6 +120,7 @@ impl Found {
         if offsets.len() != types.len() {
             return Err(wrong(format!("{} offsets of cells, and {} types", offsets.len(), types.len())));
         }
+        counted(piece, "NumberOfCells", types.len())?;
         let regions = self.regions(arrays, piece, types.len())?;
         let mut begin = 0;
         for (cell, (end, kind)) in offsets.iter().zip(&types).enumerate() {
@@ -169,6 +181,6 @@ impl Found {
         }
         let group = |(label, members)| Group { label, name: None, members };
         self.mesh.groups = self.regions.into_iter().map(group).collect();
-        Ok(Noted { value: self.mesh, notes })
+        Ok(Noted { value: self.mesh.distinct(FORMAT)?, notes })
     }
 }

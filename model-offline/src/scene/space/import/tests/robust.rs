@@ -164,7 +164,7 @@ fn headers_that_promise_billions_are_refused_at_once() {
     let started = std::time::Instant::now();
     assert!(msh::read(msh.replace("\n46\n", "\n18446744073709551615\n").as_bytes()).is_err());
     assert!(msh::read(msh.replace("$Elements\n", "$Elements\n9").as_bytes()).is_err());
-    assert!(vtu::read(vtu.replace("=\"156\"", "=\"4000000000000\"").as_bytes()).is_ok(), "only what is there counts");
+    assert!(vtu::read(vtu.replace("=\"156\"", "=\"4000000000000\"").as_bytes()).is_err());
     // Two thousand million blocks, and blocks of nothing but zeros that unpack to more than is read.
     let array = |header: &[u32], data: &[u8]| {
         let mut bytes: Vec<u8> = header.iter().flat_map(|n| n.to_le_bytes()).collect();

@@ -68,6 +68,14 @@ fn what_is_wrong_with_a_mesh_is_said() {
     has(vtu, "\"offsets\"", "\"offset\"", &["VTU", "offsets"]);
     has(vtu, "Int32", "Complex", &["VTU", "type"]);
     has(vtu, "<Points>", "<Pints>", &["VTU", "XML"]);
+    // Damaged, and yet every number of it can be read.
+    has(msh, "$Elements\n156", "$Elements\n155", &["Gmsh, line", "$Elements has more in it than it counts"]);
+    has(msh, "$Nodes\n46", "$Nodes\n45", &["Gmsh, line", "$Nodes has more in it than it counts"]);
+    has(msh, "\n1 4 2 7 2 3 7 30 28", "\n1 4 2 7 2 3 7 30 30", &["Gmsh", "tetrahedron 0", "node twice"]);
+    has(msh, "\n2 4 2 7 2 3 1 25 30", "\n2 4 2 7 2 30 7 3 28", &["Gmsh", "tetrahedron of nodes", "twice"]);
+    has("tets_gmsh_41.msh", "\n3 2 4 24\n", "\n3 9 4 24\n", &["Gmsh, line", "volume 9", "$Entities"]);
+    has(vtu, "NumberOfPoints=\"46\"", "NumberOfPoints=\"47\"", &["VTU", "NumberOfPoints", "46 are there"]);
+    has(vtu, "NumberOfCells=\"156\"", "NumberOfCells=\"155\"", &["VTU", "NumberOfCells", "156 are there"]);
     // Only lines and points, and a hexahedron.
     let hex = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n1\n1 0 0 0\n$EndNodes\n\
                $Elements\n1\n1 5 2 1 1 1 1 1 1 1 1 1 1\n$EndElements\n";
