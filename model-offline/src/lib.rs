@@ -23,9 +23,8 @@
 //! 8. [`output`]: JSON, VTU, SVG, tables; every file whole or not at all. [`study`]: which method is fast, which is
 //!    accurate, and where each stops working.
 //!
-//! Beside them stand small things that all may use: [`parallel`] (threads), [`number`] (lengths for people), `random` (seeded
-//! numbers), `choice` (enums that
-//! files and command lines call by the same names).
+//! Beside them stand small things that all may use: [`parallel`] (threads), [`number`] (lengths for people), [`reading`] (of no more
+//! than a file may have), `random` (seeded numbers), `choice` (enums that files and command lines call by the same names).
 //!
 //! Where to begin: [precompute tables](guide::precompute), [how it works](guide::how_it_works), a
 //! [worked example](guide::change_a_material).
