@@ -1,7 +1,8 @@
 //! Sparse Cholesky factorisation by faer: symbolic analysis once per pattern, numbers per iteration.
 
 use super::dense::{NotPositiveDefinite, shared_by};
-use super::ordering::nested_dissection;
+use super::memory::{self, NotEnoughMemory};
+use super::ordering::nested_dissections;
 use super::pattern::Pattern;
 use crate::geometry::Point;
 use crate::parallel;
@@ -14,16 +15,15 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Mat, MatMut, Par, Side};
 use std::sync::Arc;
 
 /// From this many nodes on, nodes are ordered and not unknowns: the same fill for a quarter of the time.
 const NODES_ORDERED: usize = 500;
-/// From this many nodes on, nested dissection is tried beside minimum degree, and the ordering with less fill is kept.
-/// Straight cuts win on evenly spaced nodes (SCNI, support 2, 5,741 nodes: 6.3 against 6.5 million entries; a tenth less
-/// time at 25,000 nodes), minimum degree wins by far on graded ones, where every straight cut runs through crowded nodes.
-const DISSECTION_TRIED: usize = 3000;
+/// Operations of a factorisation from which on nested dissection is tried beside minimum degree, and the order with the fewest
+/// is kept: a tenth of a second and more, of which trying takes a part.
+const DISSECTION_TRIED: f64 = 2e9;
 /// Operations of a factorisation from which on several threads share it: below, they wait for each other longer than they work.
 const SHARED_FLOPS: f64 = 1e9;
 
@@ -31,62 +31,59 @@ const SHARED_FLOPS: f64 = 1e9;
 /// pattern. Cheap to clone.
 #[derive(Debug, Clone)]
 pub struct SymbolicFactor {
-    symbolic: Arc<SymbolicCholesky<u32>>,
+    /// An error where a factor has more entries than can be numbered.
+    symbolic: Result<Arc<SymbolicCholesky<u32>>, NotEnoughMemory>,
 }
 
 impl SymbolicFactor {
     /// Orders and analyses a pattern of nodes at `positions`.
-    ///
-    /// # Panics
-    /// When memory for the analysis cannot be had.
     pub fn new<const D: usize>(pattern: &Pattern, positions: &[Point<D>]) -> Self {
         let symbolic = if pattern.blocks() < NODES_ORDERED {
-            analyse(pattern.symbolic(), SymmetricOrdering::Amd)
+            analyse(pattern.symbolic(), SymmetricOrdering::Amd, CholeskySymbolicParams::default())
         } else {
-            let d = pattern.dimension() as u32;
-            let forward: Vec<u32> =
-                order_nodes(pattern, positions).iter().flat_map(|i| (0..d).map(move |k| i * d + k)).collect();
-            analyse_ordered(pattern.symbolic(), &forward)
+            order_nodes(pattern, positions, pattern.dimension())
+                .and_then(|nodes| analyse_ordered(pattern.symbolic(), &unknowns_of(pattern, &nodes)))
         };
-        Self { symbolic: Arc::new(symbolic) }
+        Self::of(pattern, symbolic)
     }
 
     /// The same with the nodes `retained` (ascending) eliminated last, in their order, so that the factor's last columns are
     /// the factor of what is left when all others are condensed.
-    ///
-    /// # Panics
-    /// When memory for the analysis cannot be had.
     pub fn retaining<const D: usize>(pattern: &Pattern, positions: &[Point<D>], retained: &[u32]) -> Self {
-        let nodes = order_retaining(pattern, positions, retained);
-        let forward: Vec<u32> = nodes.iter().flat_map(|i| (0..D as u32).map(move |k| i * D as u32 + k)).collect();
-        Self { symbolic: Arc::new(analyse_with(pattern.symbolic(), &forward, supernodal())) }
+        let symbolic = order_retaining(pattern, positions, retained)
+            .and_then(|nodes| analyse_ordered(pattern.symbolic(), &unknowns_of(pattern, &nodes)));
+        Self::of(pattern, symbolic)
     }
 
-    /// Entries of a factor.
-    pub fn entries(&self) -> usize {
-        self.symbolic.len_val()
+    fn of(pattern: &Pattern, symbolic: Result<SymbolicCholesky<u32>, FaerError>) -> Self {
+        let too_many = |_| NotEnoughMemory { unknowns: pattern.unknowns(), needed: None };
+        Self { symbolic: symbolic.map(Arc::new).map_err(too_many) }
     }
 
-    /// Floating-point operations that a factorisation takes.
+    /// Entries of a factor; infinitely many where they cannot be numbered.
+    pub fn entries(&self) -> f64 {
+        self.symbolic.as_ref().map_or(f64::INFINITY, |symbolic| symbolic.len_val() as f64)
+    }
+
+    /// Floating-point operations that a factorisation takes; the same.
     pub fn flops(&self) -> f64 {
-        match self.symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(columns) => {
-                columns.col_ptr().windows(2).map(|column| f64::from(column[1] - column[0]).powi(2)).sum()
-            }
-            SymbolicCholeskyRaw::Supernodal(nodes) => (0..nodes.n_supernodes())
-                .map(|s| {
-                    let own = f64::from(nodes.supernode_end()[s] - nodes.supernode_begin()[s]);
-                    let below = nodes.supernode(s).pattern().len() as f64;
-                    own * (own * own / 3.0 + own * below + below * below)
-                })
-                .sum(),
-        }
+        self.symbolic.as_ref().map_or(f64::INFINITY, |symbolic| flops(symbolic))
     }
 }
 
-fn analyse(matrix: SymbolicSparseColMatRef<'_, u32>, ordering: SymmetricOrdering<'_, u32>) -> SymbolicCholesky<u32> {
-    factorize_symbolic_cholesky(matrix, Side::Lower, ordering, CholeskySymbolicParams::default())
-        .expect("memory for the symbolic factorisation")
+fn flops(symbolic: &SymbolicCholesky<u32>) -> f64 {
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Simplicial(columns) => {
+            columns.col_ptr().windows(2).map(|column| f64::from(column[1] - column[0]).powi(2)).sum()
+        }
+        SymbolicCholeskyRaw::Supernodal(nodes) => (0..nodes.n_supernodes())
+            .map(|s| {
+                let own = f64::from(nodes.supernode_end()[s] - nodes.supernode_begin()[s]);
+                let below = nodes.supernode(s).pattern().len() as f64;
+                own * (own * own / 3.0 + own * below + below * below)
+            })
+            .sum(),
+    }
 }
 
 /// Columns of equal sparsity are always factorised together. faer's own choice, column by column where there are few
@@ -98,43 +95,64 @@ fn supernodal() -> CholeskySymbolicParams<'static> {
     }
 }
 
-/// `forward[k]` is eliminated k-th.
-fn analyse_ordered(matrix: SymbolicSparseColMatRef<'_, u32>, forward: &[u32]) -> SymbolicCholesky<u32> {
-    analyse_with(matrix, forward, supernodal())
+fn analyse(
+    matrix: SymbolicSparseColMatRef<'_, u32>,
+    ordering: SymmetricOrdering<'_, u32>,
+    params: CholeskySymbolicParams<'_>,
+) -> Result<SymbolicCholesky<u32>, FaerError> {
+    factorize_symbolic_cholesky(matrix, Side::Lower, ordering, params)
 }
 
-fn analyse_with(
+/// `forward[k]` is eliminated k-th.
+fn analyse_ordered(
     matrix: SymbolicSparseColMatRef<'_, u32>,
     forward: &[u32],
-    params: CholeskySymbolicParams<'_>,
-) -> SymbolicCholesky<u32> {
+) -> Result<SymbolicCholesky<u32>, FaerError> {
     let mut inverse = vec![0_u32; forward.len()];
     for (place, &u) in forward.iter().enumerate() {
         inverse[u as usize] = place as u32;
     }
     let order = SymmetricOrdering::Custom(PermRef::new_checked(forward, &inverse, forward.len()));
-    factorize_symbolic_cholesky(matrix, Side::Lower, order, params).expect("memory for the symbolic factorisation")
+    analyse(matrix, order, supernodal())
 }
 
-/// An elimination order with the `retained` nodes last: the others by whichever order of theirs alone fills less.
-fn order_retaining<const D: usize>(pattern: &Pattern, positions: &[Point<D>], retained: &[u32]) -> Vec<u32> {
+/// The unknowns of nodes, in their order.
+fn unknowns_of(pattern: &Pattern, nodes: &[u32]) -> Vec<u32> {
+    let d = pattern.dimension() as u32;
+    nodes.iter().flat_map(|i| (0..d).map(move |k| i * d + k)).collect()
+}
+
+/// An elimination order with the `retained` nodes last: the others by the best order of theirs alone.
+fn order_retaining<const D: usize>(
+    pattern: &Pattern,
+    positions: &[Point<D>],
+    retained: &[u32],
+) -> Result<Vec<u32>, FaerError> {
     let condensed: Vec<u32> = (0..pattern.blocks() as u32).filter(|i| retained.binary_search(i).is_err()).collect();
-    let inner = pattern.restricted(&condensed);
     let places: Vec<Point<D>> = condensed.iter().map(|&i| positions[i as usize]).collect();
-    let order = order_nodes(&inner, &places);
-    order.into_iter().map(|i| condensed[i as usize]).chain(retained.iter().copied()).collect()
+    let order = order_nodes(&pattern.restricted(&condensed), &places, pattern.dimension())?;
+    Ok(order.into_iter().map(|i| condensed[i as usize]).chain(retained.iter().copied()).collect())
 }
 
-/// The elimination order of the nodes that fills less.
-fn order_nodes<const D: usize>(pattern: &Pattern, positions: &[Point<D>]) -> Vec<u32> {
-    let by_degree = analyse(pattern.symbolic_of_nodes(), SymmetricOrdering::Amd);
-    if pattern.blocks() >= DISSECTION_TRIED {
-        let cuts = nested_dissection(&pattern.graph(), positions);
-        if analyse_ordered(pattern.symbolic_of_nodes(), &cuts).len_val() < by_degree.len_val() {
-            return cuts;
+/// The elimination order of the nodes that takes the fewest operations. Each has so many unknowns.
+fn order_nodes<const D: usize>(
+    pattern: &Pattern,
+    positions: &[Point<D>],
+    unknowns: usize,
+) -> Result<Vec<u32>, FaerError> {
+    let nodes = pattern.symbolic_of_nodes();
+    let by_degree = analyse(nodes, SymmetricOrdering::Amd, CholeskySymbolicParams::default())?;
+    let (mut fewest, mut best) = (flops(&by_degree), None);
+    if fewest * (unknowns as f64).powi(3) >= DISSECTION_TRIED {
+        for order in nested_dissections(&pattern.graph(), positions) {
+            let operations = flops(&analyse_ordered(nodes, &order)?);
+            if operations < fewest {
+                (fewest, best) = (operations, Some(order));
+            }
         }
     }
-    by_degree.perm().map_or_else(|| (0..pattern.blocks() as u32).collect(), |order| order.arrays().0.to_vec())
+    let natural = || (0..pattern.blocks() as u32).collect();
+    Ok(best.unwrap_or_else(|| by_degree.perm().map_or_else(natural, |order| order.arrays().0.to_vec())))
 }
 
 /// Cholesky factor of a matrix with a fixed pattern, with all workspace it needs.
@@ -168,11 +186,16 @@ impl Clone for SparseCholesky {
 
 impl SparseCholesky {
     /// Room for a factor of a pattern that was analysed.
-    pub fn new(analysed: &SymbolicFactor) -> Self {
-        let mut room = Self::empty(&analysed.symbolic);
-        room.factor = vec![0.0; analysed.entries()];
+    ///
+    /// # Errors
+    /// [`NotEnoughMemory`] when the machine has none for it, before any is taken.
+    pub fn new(analysed: &SymbolicFactor) -> Result<Self, NotEnoughMemory> {
+        let symbolic = analysed.symbolic.as_ref().map_err(Clone::clone)?;
+        memory::room_for(symbolic.nrows(), symbolic.len_val())?;
+        let mut room = Self::empty(symbolic);
+        room.factor = vec![0.0; symbolic.len_val()];
         room.shareable = analysed.flops() >= SHARED_FLOPS;
-        room
+        Ok(room)
     }
 
     fn empty(symbolic: &Arc<SymbolicCholesky<u32>>) -> Self {
@@ -311,12 +334,33 @@ mod tests {
     }
 
     #[test]
+    fn the_order_with_the_fewest_operations_is_taken_however_many_nodes_are_kept_for_last() {
+        let (pattern, positions, values) = cube(16);
+        let by_degree = analyse(pattern.symbolic_of_nodes(), SymmetricOrdering::Amd, supernodal()).unwrap();
+        let [alone, cut] = [flops(&by_degree), SymbolicFactor::new(&pattern, &positions).flops() / 27.0];
+        assert!(alone * 27.0 > DISSECTION_TRIED && cut < 0.9 * alone, "{cut:e} for {alone:e}");
+        let retained = [7, 100, 2000];
+        let analysed = SymbolicFactor::retaining(&pattern, &positions, &retained);
+        assert!(analysed.flops() < 0.9 * 27.0 * alone, "{:e} for {alone:e}", analysed.flops());
+        // Eliminated last are the nodes that were to be, and the factor is one of the matrix.
+        let mut cholesky = SparseCholesky::new(&analysed).unwrap();
+        cholesky.factorise(&pattern, &values).unwrap();
+        let kept: Vec<u32> = retained.iter().flat_map(|i| (0..3).map(move |k| 3 * i + k)).collect();
+        assert_eq!(cholesky.last(9).1, kept);
+        let mut x = vec![1.0; pattern.unknowns()];
+        cholesky.solve(&mut x, 1);
+        let mut back = vec![0.0; x.len()];
+        pattern.multiply::<3>(&values, &x, &mut back);
+        assert!(back.iter().all(|b| (b - 1.0).abs() < 1e-9), "does not solve");
+    }
+
+    #[test]
     fn a_factor_shared_by_threads_has_the_same_bits() {
         let (pattern, positions, values) = cube(14);
         let analysed = SymbolicFactor::new(&pattern, &positions);
         assert!(analysed.flops() > SHARED_FLOPS, "{:e}", analysed.flops());
         let factor = || {
-            let mut cholesky = SparseCholesky::new(&analysed);
+            let mut cholesky = SparseCholesky::new(&analysed).unwrap();
             cholesky.factorise(&pattern, &values).unwrap();
             cholesky
         };

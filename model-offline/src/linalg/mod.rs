@@ -3,10 +3,14 @@
 pub mod cholesky;
 pub mod condensation;
 pub mod dense;
+pub mod memory;
 mod ordering;
 pub mod pattern;
+pub mod singular;
 
 pub use cholesky::{SparseCholesky, SymbolicFactor};
 pub use condensation::CondensedFactor;
 pub use dense::{DenseCholesky, NotPositiveDefinite};
+pub use memory::NotEnoughMemory;
 pub use pattern::Pattern;
+pub use singular::SingularValues;

@@ -149,9 +149,9 @@ impl Pattern {
     pub(super) fn graph(&self) -> Graph {
         let nodes = self.block_starts.len() - 1;
         let column = |j: usize| &self.block_rows[self.block_starts[j] as usize + 1..self.block_starts[j + 1] as usize];
-        let mut starts = vec![0_u32; nodes + 1];
+        let mut starts = vec![0_i32; nodes + 1];
         for j in 0..nodes {
-            starts[j + 1] += column(j).len() as u32;
+            starts[j + 1] += column(j).len() as i32;
             for &i in column(j) {
                 starts[i as usize + 1] += 1;
             }
@@ -160,11 +160,12 @@ impl Pattern {
             starts[i + 1] += starts[i];
         }
         let mut fill = starts.clone();
-        let mut neighbours = vec![0_u32; starts[nodes] as usize];
+        let mut neighbours = vec![0_i32; starts[nodes] as usize];
         let mut join = |a: usize, b: usize| {
-            neighbours[fill[a] as usize] = b as u32;
+            neighbours[fill[a] as usize] = b as i32;
             fill[a] += 1;
         };
+        // Column by column, so that the neighbours of every node come in ascending order.
         for j in 0..nodes {
             for &i in column(j) {
                 join(i as usize, j);

@@ -56,7 +56,7 @@ impl<const D: usize> CondensedBody<D> {
     /// the last node of a row that is joined by a spring.
     ///
     /// # Errors
-    /// [`ModelError`] when the tangent at rest is singular with these rows held.
+    /// [`ModelError`] when the tangent at rest is singular with these rows held, or too large.
     pub(super) fn new(
         (rule, tissue): (&Quadrature<D>, &Tissue),
         analysis: &Analysis,
@@ -71,7 +71,7 @@ impl<const D: usize> CondensedBody<D> {
             ports.add_springs::<D>(pattern, stiffness, &mut values);
             1.0 / stiffness
         });
-        let mut solver = ConstrainedSolver::<D>::new(analysis, held).held_tight();
+        let mut solver = ConstrainedSolver::<D>::new(analysis, held).map_err(Failure::from)?.held_tight();
         solver.load(&values);
         solver.factorise().map_err(|error| singular(&error.to_string()))?;
         let condensed = solver.condensed(retained);

@@ -8,7 +8,7 @@ use super::fields::{Fields, Loads, RATES};
 use crate::mechanics::ConstrainedRows;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::{ConstrainedSolver, Unknowns};
-use crate::solver::equilibrium::NewtonSettings;
+use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::{Matrix2, Vector2};
 
 /// How the target answers to one paddle and to the needle, at rest.
@@ -79,7 +79,8 @@ fn for_each_paddle_by_itself(
         .collect::<Option<_>>()
         .ok_or(ModelError::ImposedWeakly)?;
     let at_rest = tangent_at_rest(model.rule(), model.tissue(), model.analysis())?;
-    let mut solver = ConstrainedSolver::<2>::new(model.analysis(), ConstrainedRows::default());
+    let mut solver =
+        ConstrainedSolver::<2>::new(model.analysis(), ConstrainedRows::default()).map_err(Failure::from)?;
     let mut forces = vec![0.0; RATES * model.dofs()];
     forces.extend(loads.forces(model));
     let mut fields = Fields::new(model, loads);

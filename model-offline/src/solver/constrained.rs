@@ -16,7 +16,7 @@
 
 use super::analysis::Analysis;
 use super::conjugate_gradients::{Breakdown, Stop, conjugate_gradients, dot};
-use crate::linalg::{CondensedFactor, NotPositiveDefinite, Pattern, SparseCholesky};
+use crate::linalg::{CondensedFactor, NotEnoughMemory, NotPositiveDefinite, Pattern, SparseCholesky};
 use crate::mechanics::ConstrainedRows;
 use std::sync::Arc;
 
@@ -73,13 +73,16 @@ struct Work {
 impl<const D: usize> ConstrainedSolver<D> {
     /// Solves systems of an analysed pattern, which must cover the stencils of the constrained rows.
     ///
+    /// # Errors
+    /// [`NotEnoughMemory`] when the machine has none for the factor.
+    ///
     /// # Panics
     /// When the pattern misses a pair of a constrained stencil.
-    pub fn new(analysis: &Analysis, rows: ConstrainedRows) -> Self {
+    pub fn new(analysis: &Analysis, rows: ConstrainedRows) -> Result<Self, NotEnoughMemory> {
         let mut solver = Self {
+            cholesky: SparseCholesky::new(&analysis.symbolic)?,
             matrix: vec![0.0; analysis.pattern.entries()],
             pattern: Arc::clone(&analysis.pattern),
-            cholesky: SparseCholesky::new(&analysis.symbolic),
             constrained: ConstrainedRows::default(),
             penalty: 0.0,
             stiffness_ratio: PENALTY,
@@ -87,7 +90,7 @@ impl<const D: usize> ConstrainedSolver<D> {
             work: Work::default(),
         };
         solver.constrain(rows);
-        solver
+        Ok(solver)
     }
 
     /// The same with a penalty that holds the constrained rows to rounding without rounds of multipliers, for what is asked of

@@ -2,6 +2,7 @@
 
 use super::{Described, TableBuildError, TableOptions, to_bytes};
 use crate::geometry::Implicit as _;
+use crate::linalg::SingularValues;
 use crate::model::space::SpaceBody;
 use crate::model::{ModelError, control_derivatives};
 use crate::placement::space::holding::{Hold, hold};
@@ -178,8 +179,8 @@ fn mistaken<const P: usize>(
     let mut body = other.body(attached, NewtonSettings::default())?;
     let other = across(&control_derivatives::<3, _>(&mut body)?.slope.columns(1, 3 * P).into_owned());
     let largest = |of: &Matrix2xX<f64>, taken_for: &Matrix2xX<f64>| {
-        let inverse = taken_for.clone().pseudo_inverse(f64::EPSILON).ok()?;
-        let eigenvalues = (of * inverse).complex_eigenvalues();
+        let gain = of * SingularValues::of(taken_for)?.pseudo_inverse(f64::EPSILON);
+        let eigenvalues = gain.fixed_resize::<2, 2>(0.0).complex_eigenvalues();
         eigenvalues.iter().map(|l| l.norm()).reduce(f64::max)
     };
     let both = [largest(&own, &other), largest(&other, &own)];

@@ -5,6 +5,7 @@
 //! `1/σ_min(NᵀJ)` for |β| = 1. With no axial motion allowed it takes `J⁺Nβ`, at worst `‖J⁺N‖₂`, which is never less.
 
 use super::super::controllability::{MAX_CONTROLLABILITY_MEASURE, MAX_JACOBIAN_CONDITION};
+use crate::linalg::SingularValues;
 use nalgebra::{DMatrix, Matrix3x2, Vector3};
 
 /// What a Jacobian controls.
@@ -23,28 +24,30 @@ pub struct Controllability {
 }
 
 impl Controllability {
+    /// That of what controls nothing.
+    const NONE: Self = Self {
+        measure: f64::INFINITY,
+        full: f64::INFINITY,
+        easiest: f64::INFINITY,
+        worst_direction: Vector3::new(0.0, 0.0, 0.0),
+        condition: f64::INFINITY,
+    };
+
     /// That of a Jacobian with three rows and three columns per paddle.
     pub fn of(jacobian: &DMatrix<f64>, orthogonal: &Matrix3x2<f64>) -> Self {
-        let reduced = orthogonal.transpose() * jacobian;
-        let svd = reduced.svd(true, false);
-        let (least, most) = (svd.singular_values.imin(), svd.singular_values.imax());
-        let values = (svd.singular_values[least], svd.singular_values[most]);
-        let worst = svd.u.as_ref().map_or_else(Vector3::zeros, |u| orthogonal * u.column(least));
-        let full = jacobian.clone().svd(true, true);
-        let cut = full.singular_values.max() / MAX_JACOBIAN_CONDITION;
-        let full = match full.singular_values.min() > cut {
-            true => {
-                full.pseudo_inverse(cut).map_or(f64::INFINITY, |inverse| (inverse * orthogonal).singular_values().max())
-            }
-            false => f64::INFINITY,
-        };
+        let whole = SingularValues::of(&(orthogonal.transpose() * jacobian)).zip(SingularValues::of(jacobian));
+        let Some((across, whole)) = whole else { return Self::NONE };
+        let (least, most) = (across.least(), across.most());
+        let cut = whole.most() / MAX_JACOBIAN_CONDITION;
+        let axially_held = (whole.least() > cut).then(|| whole.pseudo_inverse(cut) * orthogonal);
+        let full = axially_held.and_then(|way| Some(SingularValues::of(&way)?.most())).unwrap_or(f64::INFINITY);
         let usable = |measure: f64| if measure <= MAX_CONTROLLABILITY_MEASURE { measure } else { f64::INFINITY };
         Self {
-            measure: usable(1.0 / values.0),
+            measure: usable(1.0 / least),
             full: usable(full),
-            easiest: 1.0 / values.1,
-            worst_direction: worst,
-            condition: values.1 / values.0,
+            easiest: 1.0 / most,
+            worst_direction: orthogonal * across.left.column(1),
+            condition: most / least,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Where paddles hold the target: Newton's method on their displacements, so that nothing is left of the target's way
 //! orthogonal to the needle.
 
+use crate::linalg::SingularValues;
 use crate::model::ModelError;
 use crate::model::space::SpaceBody;
 use crate::solver::equilibrium::{Failure, FailureReason};
@@ -34,10 +35,11 @@ impl Hold {
         let jacobian = body.actuation_jacobian()?;
         let jacobian = DMatrix::from_column_slice(3, jacobian.ncols(), jacobian.as_slice());
         let across = orthogonal.transpose() * &jacobian;
-        let inverse = across.pseudo_inverse(f64::EPSILON).map_err(|_| ModelError::NoPaddleControls)?;
+        let inverse = SingularValues::of(&across).ok_or(ModelError::NoPaddleControls)?.pseudo_inverse(f64::EPSILON);
         if !inverse.iter().all(|x| x.is_finite()) || inverse.norm() == 0.0 {
             return Err(ModelError::NoPaddleControls);
         }
+        let inverse = inverse.fixed_columns::<2>(0).into_owned();
         Ok(Self { jacobian, inverse, per_depth: body.depth_sensitivity()? })
     }
 

@@ -149,7 +149,7 @@ impl<const D: usize> Equilibrium<D> {
             rule,
             tissue,
             blocks: Arc::clone(&analysis.blocks),
-            solver: ConstrainedSolver::new(analysis, rows),
+            solver: ConstrainedSolver::new(analysis, rows)?,
             weak,
             settings,
             spacing,

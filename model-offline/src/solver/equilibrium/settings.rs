@@ -1,5 +1,6 @@
 //! How an equilibrium is looked for, why there may be none, and what it cost.
 
+use crate::linalg::NotEnoughMemory;
 use serde::Serialize;
 
 /// How the linear systems of Newton's method are solved.
@@ -86,6 +87,9 @@ pub enum FailureReason {
     /// Newton's method did not converge.
     #[error("not-converged")]
     NotConverged,
+    /// The machine has no memory for the factor of the tangent.
+    #[error("too-large")]
+    TooLarge,
 }
 
 /// A failed solve; the equilibrium is left at the last converged state.
@@ -100,6 +104,12 @@ pub struct Failure {
     pub detail: String,
 }
 
+impl From<NotEnoughMemory> for Failure {
+    fn from(error: NotEnoughMemory) -> Self {
+        Self { reason: FailureReason::TooLarge, reached: 0.0, detail: error.to_string() }
+    }
+}
+
 /// What a successful solve cost.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Effort {
@@ -111,4 +121,17 @@ pub struct Effort {
     pub conjugate_gradients: u32,
     /// Times the increment was halved.
     pub cutbacks: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_model_that_is_too_large_says_so() {
+        let failure =
+            Failure::from(NotEnoughMemory { unknowns: 300_000, needed: Some((30_000_000_000, 4_000_000_000)) });
+        let told = failure.to_string();
+        assert!(told.starts_with("too-large: the factor of 300000 unknowns would take 30.0 GB, and 4.0 GB"), "{told}");
+    }
 }

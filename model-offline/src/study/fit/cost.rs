@@ -24,7 +24,7 @@ pub(super) fn cost(model: &TissueModel) -> f64 {
     let factor = model.analysis().symbolic();
     // Paddles on nodes of their own are attached to one factor, others have one each.
     let factors = if model.attaches_to_one_factor() { 1.0 } else { model.scene().paddles.len() as f64 };
-    let entries = factor.entries() as f64;
+    let entries = factor.entries();
     shape_functions(model) + PER_ENTRY_ORDERED * entries + factors * (PER_FLOP * factor.flops() + PER_ENTRY * entries)
 }
 
@@ -56,7 +56,7 @@ const BASIS_IN_SPACE: f64 = 2.0;
 pub(super) fn cost_in_space(model: &SpaceModel) -> f64 {
     let condensing = model.condensing_analysis();
     let factor = condensing.analysis.symbolic();
-    let entries = factor.entries() as f64;
+    let entries = factor.entries();
     let method = model.spatial().method();
     let nodes = model.nodes() as f64;
     let shapes = match method.integration.is_element() {

@@ -1,5 +1,6 @@
 //! One paddle or two: how far they go, against how far they can.
 
+use crate::linalg::SingularValues;
 use crate::model::ModelError;
 use crate::placement::space::SpaceStudy;
 use crate::placement::space::rest::CondensedRest;
@@ -62,10 +63,8 @@ fn of(study: &SpaceStudy, paddles: Vec<u32>, answer: &SpaceAnswer, believed: Opt
     let orthogonal = needle.orthogonal();
     let across = |jacobian: &DMatrix<f64>| orthogonal.transpose() * jacobian;
     let inverse = |of: &DMatrix<f64>| {
-        let across = across(of);
-        let across = DMatrix::from_column_slice(2, across.ncols(), across.as_slice());
-        let cut = SINGULAR * across.singular_values().max();
-        across.pseudo_inverse(cut).unwrap_or_else(|_| DMatrix::zeros(of.ncols(), 2))
+        let found = SingularValues::of(&across(of));
+        found.map_or_else(|| DMatrix::zeros(of.ncols(), 2), |found| found.pseudo_inverse(SINGULAR * found.most()))
     };
     let jacobian = DMatrix::from_fn(3, answer.jacobian[0].len(), |r, c| answer.jacobian[r][c]);
     let correction = inverse(&jacobian);
