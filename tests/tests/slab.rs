@@ -120,7 +120,7 @@ fn a_tolerance_is_kept_or_refused_with_the_error_that_was_reached() {
                 println!("{integration:?}: {} nodes, {found:.4}", model.nodes());
                 assert!(found <= TOLERANCE, "{integration:?}: {found}");
             }
-            Err(ModelError::ToleranceNotReached { tolerance, reached }) => {
+            Err(ModelError::ToleranceNotReached { tolerance, reached, .. }) => {
                 println!("{integration:?}: refused, {reached:.4} reached");
                 // Nodal integration without stabilisation need not get there; the default has to.
                 let may_refuse = [Integration::Dni, Integration::Scni].contains(&integration);

@@ -22,8 +22,12 @@ use std::sync::Arc;
 /// From this many nodes on, nodes are ordered and not unknowns: the same fill for a quarter of the time.
 const NODES_ORDERED: usize = 500;
 /// Operations of a factorisation from which on nested dissection is tried beside minimum degree, and the order with the fewest
-/// is kept: a tenth of a second and more, of which trying takes a part.
-const DISSECTION_TRIED: f64 = 2e9;
+/// is kept. In the plane it seldom wins, so that a factorisation itself must take a tenth of a second, of which trying takes a
+/// part. In space it wins by the more the larger a body is, and one analysis serves hundreds of factorisations where an
+/// insertion is followed.
+const fn dissection_tried(unknowns: usize) -> f64 {
+    if unknowns == 3 { 1e7 } else { 2e9 }
+}
 /// Operations of a factorisation from which on several threads share it: below, they wait for each other longer than they work.
 const SHARED_FLOPS: f64 = 1e9;
 
@@ -143,7 +147,7 @@ fn order_nodes<const D: usize>(
     let nodes = pattern.symbolic_of_nodes();
     let by_degree = analyse(nodes, SymmetricOrdering::Amd, CholeskySymbolicParams::default())?;
     let (mut fewest, mut best) = (flops(&by_degree), None);
-    if fewest * (unknowns as f64).powi(3) >= DISSECTION_TRIED {
+    if fewest * (unknowns as f64).powi(3) >= dissection_tried(unknowns) {
         for order in nested_dissections(&pattern.graph(), positions) {
             let operations = flops(&analyse_ordered(nodes, &order)?);
             if operations < fewest {
@@ -338,7 +342,7 @@ mod tests {
         let (pattern, positions, values) = cube(16);
         let by_degree = analyse(pattern.symbolic_of_nodes(), SymmetricOrdering::Amd, supernodal()).unwrap();
         let [alone, cut] = [flops(&by_degree), SymbolicFactor::new(&pattern, &positions).flops() / 27.0];
-        assert!(alone * 27.0 > DISSECTION_TRIED && cut < 0.9 * alone, "{cut:e} for {alone:e}");
+        assert!(alone * 27.0 > dissection_tried(3) && cut < 0.9 * alone, "{cut:e} for {alone:e}");
         let retained = [7, 100, 2000];
         let analysed = SymbolicFactor::retaining(&pattern, &positions, &retained);
         assert!(analysed.flops() < 0.9 * 27.0 * alone, "{:e} for {alone:e}", analysed.flops());

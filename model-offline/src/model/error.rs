@@ -6,6 +6,59 @@ use crate::material::MaterialError;
 use crate::number::{length, short};
 use crate::scene::NoSuchPaddle;
 use crate::solver::equilibrium::{Failure, FailureReason};
+use std::fmt;
+
+/// What the worst error estimate of a model is of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DecidedBy {
+    /// The whole, or nobody knows.
+    Whole,
+    /// What the target does per depth of the needle.
+    Displacement,
+    /// The controllability measure of a paddle or pair.
+    Measure {
+        /// Indices of its paddles.
+        paddles: Vec<u32>,
+        /// Worst estimate of all else; none where there is nothing else.
+        others: Option<f64>,
+    },
+}
+
+impl DecidedBy {
+    /// What decides among the estimated errors of sets of paddles, with what is known beside them.
+    pub(crate) fn measures(sets: impl IntoIterator<Item = (Vec<u32>, f64)>, beside: Option<f64>) -> Self {
+        let mut sets: Vec<_> = sets.into_iter().collect();
+        sets.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut sets = sets.into_iter();
+        let Some((paddles, worst)) = sets.next() else { return Self::Whole };
+        if beside.is_some_and(|beside| beside >= worst) {
+            return Self::Displacement;
+        }
+        let others = sets.next().map(|(_, error)| error).into_iter().chain(beside).reduce(f64::max);
+        Self::Measure { paddles, others }
+    }
+
+    /// The same where estimates are told as multiples of what they were.
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::Measure { paddles, others } => Self::Measure { paddles, others: others.map(|error| factor * error) },
+            other => other,
+        }
+    }
+}
+
+impl fmt::Display for DecidedBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self::Measure { paddles, others } = self else {
+            let displacement = "of the target's displacement by the needle";
+            return if *self == Self::Displacement { write!(f, " ({displacement})") } else { Ok(()) };
+        };
+        let named: Vec<_> = paddles.iter().map(u32::to_string).collect();
+        write!(f, " (of the measure of paddle{} {}", if named.len() > 1 { "s" } else { "" }, named.join(" + "))?;
+        others.map_or(Ok(()), |others| write!(f, "; {} of all else", short(others)))?;
+        f.write_str(")")
+    }
+}
 
 /// Why a scene cannot be modelled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -95,7 +148,7 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}; take a larger tolerance, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
+        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}; take a larger tolerance, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
         short(*reached)
     )]
     ToleranceNotReached {
@@ -103,6 +156,8 @@ pub enum ModelError {
         tolerance: f64,
         /// Best estimate.
         reached: f64,
+        /// Whose it is.
+        decided_by: DecidedBy,
     },
     /// A tolerance in space, where no two meshes could be compared.
     #[error(

@@ -12,7 +12,7 @@ use super::reference::Reference;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Integration, Resolution};
-use crate::model::{ModelError, TissueModel, graded_model, sized_model};
+use crate::model::{DecidedBy, ModelError, TissueModel, graded_model, sized_model};
 use crate::scene::Scene;
 use serde::Serialize;
 
@@ -62,6 +62,12 @@ impl ErrorEstimate {
 
     fn worst(&self) -> f64 {
         self.controllability.max(self.target_displacement)
+    }
+
+    /// Whose error is the worst.
+    fn decided_by(&self, scene: &Scene, responses: &[RestResponse], reference: &Reference) -> DecidedBy {
+        let paddles = scene.paddles.iter().map(|paddle| vec![paddle.index]);
+        DecidedBy::measures(paddles.zip(reference.errors(responses)), Some(self.target_displacement))
     }
 }
 
@@ -123,6 +129,7 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut refinement = Refinement::new(scene)?;
     let mut reference = Reference::sharpened(&mut refinement, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
+    let mut decided_by = DecidedBy::Whole;
     let mut level = first_level(tolerance);
     let (mut aim, mut aimed) = (tolerance, f64::INFINITY);
     while level <= MAX_LEVEL {
@@ -170,10 +177,11 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
         }
         if best.is_none_or(|b| estimate.worst() < b.worst()) {
             best = Some(estimate);
+            decided_by = estimate.decided_by(scene, &responses, &reference);
         }
     }
     let reached = best.map_or(f64::INFINITY, |b| b.worst());
-    Err(ModelError::ToleranceNotReached { tolerance, reached })
+    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by })
 }
 
 fn first_level(tolerance: f64) -> i32 {
@@ -184,16 +192,19 @@ fn first_level(tolerance: f64) -> i32 {
 fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut level = MIN_LEVEL - 1;
     let mut estimate = None;
+    let mut decided_by = DecidedBy::Whole;
     let mut refinement = Refinement::new(scene)?;
     let (certified, reached) = refinement.until(|certified| {
         level += 1;
-        let found = ErrorEstimate::of(&certified.responses, &Reference::from_certified(certified), level);
+        let reference = Reference::from_certified(certified);
+        let found = ErrorEstimate::of(&certified.responses, &reference, level);
+        decided_by = found.decided_by(scene, &certified.responses, &reference);
         estimate = Some(found);
         found.worst() <= tolerance
     })?;
     if !reached {
         let reached = estimate.map_or(f64::INFINITY, |e| e.worst());
-        return Err(ModelError::ToleranceNotReached { tolerance, reached });
+        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by });
     }
     let reference = Some(Reference::from_certified(certified));
     let model = TissueModel::on(scene, certified.model.planar().clone(), certified.model.spacing())?;

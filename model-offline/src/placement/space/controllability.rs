@@ -25,7 +25,7 @@ pub struct Controllability {
 
 impl Controllability {
     /// That of what controls nothing.
-    const NONE: Self = Self {
+    pub(super) const NONE: Self = Self {
         measure: f64::INFINITY,
         full: f64::INFINITY,
         easiest: f64::INFINITY,

@@ -160,14 +160,7 @@ pub fn place_in_space(
 }
 
 fn answer(rest: &SpaceResponse, static_study: SpaceStatic) -> SpaceAnswer {
-    let none = Controllability {
-        measure: f64::INFINITY,
-        full: f64::INFINITY,
-        easiest: f64::INFINITY,
-        worst_direction: Vector3::zeros(),
-        condition: f64::INFINITY,
-    };
-    let controls = rest.controllability.unwrap_or(none);
+    let controls = rest.controllability.unwrap_or(Controllability::NONE);
     SpaceAnswer {
         jacobian: rows(&rest.jacobian),
         condition: controls.condition,

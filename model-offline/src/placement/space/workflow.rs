@@ -9,9 +9,9 @@ use super::insertion::InsertionModel;
 use super::rest::{SpaceResponse, rest_responses};
 use super::study::{SpacePlacement, place_in_space, steps};
 use crate::discretization::{Integration, Method, Resolution, TetMesh};
-use crate::model::ModelError;
 use crate::model::space::SpaceModel;
 use crate::model::space::meshing::{MeshSize, even_mesh, mesh};
+use crate::model::{DecidedBy, ModelError};
 use crate::parallel;
 use crate::scene::space::SpaceScene;
 use serde::Serialize;
@@ -188,6 +188,13 @@ fn estimates(mut distances: Vec<f64>) -> Vec<f64> {
     distances
 }
 
+/// Indices of the paddles of every set that has a measure: of singles, then of pairs.
+fn sets(scene: &SpaceScene) -> impl Iterator<Item = Vec<u32>> {
+    let index = |at: usize| scene.paddles[at].index;
+    let singles = (0..scene.paddles.len()).map(move |paddle| vec![index(paddle)]);
+    singles.chain(scene.pairs.iter().map(move |pair| pair.map(index).to_vec()))
+}
+
 fn worst(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(0.0, f64::max)
 }
@@ -203,7 +210,7 @@ struct Reference {
 impl Reference {
     fn within(scene: &SpaceScene, open: f64) -> Result<Self, ModelError> {
         let scene = scene.with_method(Method::new(Integration::FemT10));
-        let mut reached = f64::INFINITY;
+        let (mut reached, mut decided_by) = (f64::INFINITY, DecidedBy::Whole);
         let mut coarser: Option<(Vec<usize>, Vec<SpaceResponse>)> = None;
         let mut failed = None;
         for level in *LEVELS.start() - 1..=*LEVELS.end() {
@@ -231,12 +238,14 @@ impl Reference {
                 if estimate <= open {
                     return Ok(Self { model, rest, errors, level });
                 }
-                reached = reached.min(estimate);
+                if estimate < reached {
+                    (reached, decided_by) = (estimate, DecidedBy::measures(sets(&scene).zip(errors), None));
+                }
             }
             coarser = Some((on_patches, rest));
         }
         match failed {
-            _ if reached.is_finite() => Err(ModelError::ToleranceNotReached { tolerance: open, reached }),
+            _ if reached.is_finite() => Err(ModelError::ToleranceNotReached { tolerance: open, reached, decided_by }),
             Some(error) => Err(error),
             // No two meshes that could be afforded differ on every patch.
             None => Err(ModelError::NothingToCompare),
@@ -247,8 +256,13 @@ impl Reference {
 /// What a reference that fails its share of a tolerance says of the whole: what was asked for, and what could have been kept.
 fn of_the_whole(error: ModelError, tolerance: f64) -> ModelError {
     match error {
-        ModelError::ToleranceNotReached { reached, .. } => {
-            ModelError::ToleranceNotReached { tolerance, reached: reached / REFERENCE_SHARE }
+        ModelError::ToleranceNotReached { reached, decided_by, .. } => {
+            let whole = 1.0 / REFERENCE_SHARE;
+            ModelError::ToleranceNotReached {
+                tolerance,
+                reached: whole * reached,
+                decided_by: decided_by.scaled(whole),
+            }
         }
         other => other,
     }
@@ -270,7 +284,7 @@ fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError>
     }
     let reference =
         Reference::within(scene, REFERENCE_SHARE * tolerance).map_err(|error| of_the_whole(error, tolerance))?;
-    let mut reached = f64::INFINITY;
+    let (mut reached, mut decided_by) = (f64::INFINITY, DecidedBy::Whole);
     let mut level = *LEVELS.start();
     while level <= *LEVELS.end() {
         let (model, rest) = match at_level(scene, level) {
@@ -291,12 +305,14 @@ fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError>
             };
             return Ok(Discretised { model, rest, estimate: Some(estimate) });
         }
-        reached = reached.min(controllability);
+        if controllability < reached {
+            (reached, decided_by) = (controllability, DecidedBy::measures(sets(scene).zip(errors), None));
+        }
         // The error falls with the size at the rims, which a level halves: levels that cannot do are not tried.
         let left = worst(&apart) / (tolerance - worst(&reference.errors));
         level += (left.log2().floor() as i32).clamp(1, 2);
     }
-    Err(ModelError::ToleranceNotReached { tolerance, reached })
+    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by })
 }
 
 /// The model of a scene's insertions. At rest it answers as the scene's own discretization does; where that is given by a tolerance
@@ -337,9 +353,12 @@ mod tests {
 
     #[test]
     fn a_reference_that_fails_its_half_is_told_as_the_tolerance_that_was_asked_for() {
-        let of_half = ModelError::ToleranceNotReached { tolerance: 0.002, reached: 0.0057 };
+        let decided_by = DecidedBy::Measure { paddles: vec![2, 5], others: Some(0.001) };
+        let of_half = ModelError::ToleranceNotReached { tolerance: 0.002, reached: 0.0057, decided_by };
         let told = of_the_whole(of_half, 0.004);
-        let ModelError::ToleranceNotReached { tolerance, reached } = told else { panic!("{told}") };
-        assert!(tolerance == 0.004 && (reached - 0.0114).abs() < 1e-12, "{tolerance} {reached}");
+        let ModelError::ToleranceNotReached { tolerance, reached, .. } = &told else { panic!("{told}") };
+        assert!(*tolerance == 0.004 && (reached - 0.0114).abs() < 1e-12, "{tolerance} {reached}");
+        let text = told.to_string();
+        assert!(text.contains("0.0114 (of the measure of paddles 2 + 5; 0.002 of all else); take"), "{text}");
     }
 }

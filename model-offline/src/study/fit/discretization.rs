@@ -4,7 +4,7 @@ use super::cost::cost;
 use super::rejection::{Alternative, Rejected, RejectionReason};
 use super::search::{Search, Trials, Unfit, cheapest};
 use crate::discretization::Discretization;
-use crate::model::{ModelError, TissueModel};
+use crate::model::{DecidedBy, ModelError, TissueModel};
 use crate::placement::reference::{Reference, distance};
 use crate::placement::rest::rest_responses;
 use crate::scene::Scene;
@@ -54,7 +54,7 @@ pub fn discretization(
     let rejected: Vec<Rejected> = reasons.collect();
     let Some(best) = best else {
         let reached = rejected.iter().filter_map(|r| r.reason.error()).fold(f64::INFINITY, f64::min);
-        return Err(ModelError::ToleranceNotReached { tolerance, reached });
+        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by: DecidedBy::Whole });
     };
     Ok(ChosenDiscretization {
         discretization: best.candidate,
