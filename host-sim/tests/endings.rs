@@ -16,7 +16,13 @@ fn host_sim() -> Command {
 }
 
 fn start(arguments: &[&str]) -> Child {
-    host_sim().args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+    start_in(&std::env::temp_dir(), arguments)
+}
+
+/// The same with another directory for temporary files, where links are.
+fn start_in(place: &Path, arguments: &[&str]) -> Child {
+    let mut command = host_sim();
+    command.env("TMPDIR", place).args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
 fn signal(process: u32, name: &str) {
@@ -51,7 +57,11 @@ fn message(output: &Output) -> String {
 
 /// Names in shared memory and directories that contain `part`.
 fn traces(part: &str) -> Vec<PathBuf> {
-    let entries = ["/dev/shm".into(), std::env::temp_dir()].map(|directory: PathBuf| std::fs::read_dir(directory));
+    traces_in(&std::env::temp_dir(), part)
+}
+
+fn traces_in(place: &Path, part: &str) -> Vec<PathBuf> {
+    let entries = [Path::new("/dev/shm"), place].map(std::fs::read_dir);
     let paths = entries.into_iter().flatten().flatten().flatten().map(|entry| entry.path());
     paths
         .filter(|path| path.to_string_lossy().contains(part) && path.to_string_lossy().contains("stillpoint"))
@@ -176,26 +186,32 @@ fn an_emulator_dies_with_its_run() {
 fn what_killed_processes_leave_is_swept_by_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("report");
-    let mut run = start(&[
-        "run",
-        "--tissue",
-        "homogeneous",
-        "--mode",
-        "free-run",
-        "--rate",
-        "200",
-        "--insertion-time",
-        "60",
-        "--threads",
-        "1",
-        "--quiet",
-        "--out",
-        out.to_str().unwrap(),
-    ]);
+    // Its own, where no other test's processes sweep; short, since sockets have short names.
+    let place = tempfile::Builder::new().prefix("sw").tempdir_in("/tmp").unwrap();
+    let place = place.path();
+    let mut run = start_in(
+        place,
+        &[
+            "run",
+            "--tissue",
+            "homogeneous",
+            "--mode",
+            "free-run",
+            "--rate",
+            "200",
+            "--insertion-time",
+            "60",
+            "--threads",
+            "1",
+            "--quiet",
+            "--out",
+            out.to_str().unwrap(),
+        ],
+    );
     let mark = format!("run-{}-", run.id());
     let controller = wait_for("no controller has started", || {
         let child = children(run.id()).first().copied();
-        child.filter(|_| traces(&mark).len() > 5)
+        child.filter(|_| traces_in(place, &mark).len() > 5)
     });
     // Neither can tidy up after the other.
     signal(controller, "STOP");
@@ -203,10 +219,10 @@ fn what_killed_processes_leave_is_swept_by_the_next_start() {
     signal(controller, "KILL");
     run.wait().unwrap();
     wait_for("the controller lives", || (!is_alive(controller)).then_some(()));
-    assert!(!traces(&mark).is_empty());
+    assert!(!traces_in(place, &mark).is_empty());
     let link = format!("test-sweep-{}", std::process::id());
-    let next = start(&["plant", "--link", &link, "--patience", "0.1"]).wait_with_output().unwrap();
-    assert_eq!(traces(&mark), Vec::<PathBuf>::new());
+    let next = start_in(place, &["plant", "--link", &link, "--patience", "0.1"]).wait_with_output().unwrap();
+    assert_eq!(traces_in(place, &mark), Vec::<PathBuf>::new());
     assert!(message(&next).contains(&mark), "{}", message(&next));
 }
 
