@@ -3,6 +3,7 @@
 pub mod body;
 pub mod chart;
 pub mod csv;
+mod destination;
 pub mod field_picture;
 mod geometry;
 mod picture_file;
@@ -23,6 +24,7 @@ pub use picture_file::{PictureError, PictureFormat, write_picture};
 pub use preflight::{OutputRefused, RefusalReason, check_outputs};
 pub use state::{NodalFields, State, has_stress};
 
+use destination::Destination;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -36,30 +38,35 @@ pub struct OutputError {
     pub source: std::io::Error,
 }
 
-/// Writes a file whole or not at all: into a temporary file in the same folder, synced, then renamed over the target.
+/// Writes a file whole or not at all: into a temporary file in the same folder, synced, then renamed over the target. What
+/// is behind a symbolic link is written, and the link stays; devices, pipes and `/dev/stdout` are written to as they are.
 ///
 /// # Errors
 /// [`OutputError`] names the file; whatever was there before is untouched.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     let fail = |source| OutputError { path: path.to_owned(), source };
-    // Renaming over a device or a pipe would replace it: those are written to directly.
-    if path.exists() && !path.is_file() && !path.is_dir() {
-        return std::fs::write(path, bytes).map_err(fail);
+    match Destination::of(path).map_err(fail)? {
+        Destination::Stream(stream) => destination::write_stream(&stream, bytes),
+        Destination::File(file) => replace(&file, bytes),
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    .map_err(fail)
+}
+
+/// Puts a file with these bytes in place of what is there.
+fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".stillpoint-");
     // Temporary files are private; a result is for whom the umask lets read it.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut file = builder.tempfile_in(folder).map_err(fail)?;
-    file.write_all(bytes).map_err(fail)?;
+    let mut file = builder.tempfile_in(destination::folder_of(path))?;
+    file.write_all(bytes)?;
     // Who has closed a file to others finds it closed afterwards.
     if let Ok(before) = path.metadata() {
-        file.as_file().set_permissions(before.permissions()).map_err(fail)?;
+        file.as_file().set_permissions(before.permissions())?;
     }
-    file.as_file().sync_all().map_err(fail)?;
-    file.persist(path).map_err(|e| fail(e.error))?;
+    file.as_file().sync_all()?;
+    file.persist(path).map_err(|refused| refused.error)?;
     Ok(())
 }
 
@@ -69,4 +76,38 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 /// [`OutputError`] names the folder.
 pub fn make_folder(path: &Path) -> Result<(), OutputError> {
     std::fs::create_dir_all(path).map_err(|source| OutputError { path: path.to_owned(), source })
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::write_whole;
+    use std::fs;
+    use std::os::unix::fs::{PermissionsExt as _, symlink};
+
+    #[test]
+    fn a_link_stays_and_what_is_behind_it_is_replaced_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        fs::create_dir(at("sub")).unwrap();
+        fs::write(at("sub/file"), b"older and longer").unwrap();
+        fs::set_permissions(at("sub/file"), fs::Permissions::from_mode(0o600)).unwrap();
+        symlink("sub/file", at("link")).unwrap();
+        symlink("sub/none", at("dangling")).unwrap();
+        for (name, behind) in [("link", "sub/file"), ("dangling", "sub/none")] {
+            write_whole(&at(name), b"new").unwrap();
+            assert!(at(name).is_symlink(), "{name}");
+            assert_eq!(fs::read(at(behind)).unwrap(), b"new");
+        }
+        assert_eq!(at("sub/file").metadata().unwrap().permissions().mode() & 0o777, 0o600);
+        symlink("round", at("round")).unwrap();
+        let refused = write_whole(&at("round"), b"new").unwrap_err();
+        assert_eq!(refused.path, at("round"));
+        assert!(at("round").is_symlink());
+        symlink("no/such/folder", at("nowhere")).unwrap();
+        write_whole(&at("nowhere"), b"new").unwrap_err();
+        write_whole(&at("sub"), b"new").unwrap_err();
+        // No temporary file is left: what was made, and nothing else.
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 5);
+        assert_eq!(fs::read_dir(at("sub")).unwrap().count(), 2);
+    }
 }

@@ -1,6 +1,7 @@
 //! Outputs, checked before the work begins: a result that cannot be kept is known in the first second, and no output
 //! overwrites an input or another output.
 
+use super::destination::{Destination, folder_of};
 use std::path::{Path, PathBuf};
 
 /// An output that is refused before anything is computed.
@@ -27,13 +28,21 @@ pub enum RefusalReason {
     /// A folder is in its place.
     #[error("a directory is in its place; name a file")]
     IsDirectory,
+    /// Symbolic links that never end.
+    #[error("the symbolic links lead round in a circle: {0}")]
+    Link(std::io::Error),
     /// Nothing can be written in its folder.
-    #[error("nothing can be written in its directory: {0}")]
-    Folder(std::io::Error),
+    #[error("nothing can be written in its directory ({}): {source}", folder.display())]
+    Folder {
+        /// The folder, behind symbolic links.
+        folder: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
 }
 
 /// Refuses outputs that cannot be written, that name one file twice, or that name an input. An output is the option that
-/// names it and its path. Inputs that do not exist (names of bundled scenes) are passed over; devices and pipes, such
+/// names it and its path; symbolic links are followed. Inputs that do not exist (names of bundled scenes) are passed over; devices and pipes, such
 /// as `/dev/stdout`, are written to as they are and may be named twice.
 ///
 /// # Errors
@@ -46,24 +55,27 @@ pub fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, Option<&Path>)]
         if path.is_dir() || path.as_os_str().as_encoded_bytes().ends_with(b"/") {
             return Err(refused(RefusalReason::IsDirectory));
         }
-        if path.exists() && !path.is_file() {
-            continue;
-        }
-        let identity = Identity::of(path);
+        let file = match Destination::of(path).map_err(|error| refused(RefusalReason::Link(error)))? {
+            // A descriptor may be of a file.
+            Destination::Stream(stream) if inputs.contains(&Identity::of(&stream)) => {
+                return Err(refused(RefusalReason::IsInput));
+            }
+            Destination::Stream(_) => continue,
+            Destination::File(file) => file,
+        };
+        let identity = Identity::of(&file);
         if inputs.contains(&identity) {
             return Err(refused(RefusalReason::IsInput));
         }
         if let Some((other, _)) = seen.iter().find(|(_, other)| *other == identity) {
             return Err(refused(RefusalReason::Twice(other)));
         }
-        tempfile::tempfile_in(folder_of(path)).map_err(|error| refused(RefusalReason::Folder(error)))?;
+        let folder = folder_of(&file);
+        tempfile::tempfile_in(folder)
+            .map_err(|source| refused(RefusalReason::Folder { folder: folder.to_owned(), source }))?;
         seen.push((option, identity));
     }
     Ok(())
-}
-
-fn folder_of(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// What makes two paths the same file, whether it exists or not, through links of either kind.
@@ -126,8 +138,23 @@ mod tests {
         let refused = check_outputs(&[], &[("--json", Some(&at("sub")))]).unwrap_err();
         assert!(matches!(refused.reason, RefusalReason::IsDirectory), "{refused}");
         let refused = check_outputs(&[], &[("--json", Some(&at("none/x")))]).unwrap_err();
-        assert!(matches!(refused.reason, RefusalReason::Folder(_)), "{refused}");
+        assert!(matches!(refused.reason, RefusalReason::Folder { .. }), "{refused}");
         check_outputs(&[&input, &at("paper")], &[("--csv", Some(&at("a"))), ("--json", Some(&at("b")))]).unwrap();
+        #[cfg(unix)]
+        {
+            let link = |to: &str, name: &str| std::os::unix::fs::symlink(to, at(name)).unwrap();
+            link("new", "sub/../to-new");
+            link("to-new", "sub/../round");
+            let both = [("--csv", Some(at("new"))), ("--mcap", Some(at("to-new")))];
+            let refused = check_outputs(&[], &both.each_ref().map(|(o, p)| (*o, p.as_deref()))).unwrap_err();
+            assert!(matches!(refused.reason, RefusalReason::Twice("--csv")), "{refused}");
+            fs::remove_file(at("to-new")).unwrap();
+            link("round", "to-new");
+            let refused = check_outputs(&[], &[("--csv", Some(&at("round")))]).unwrap_err();
+            assert!(matches!(refused.reason, RefusalReason::Link(_)), "{refused}");
+            fs::remove_file(at("to-new")).unwrap();
+            fs::remove_file(at("round")).unwrap();
+        }
         assert_eq!(
             fs::read_dir(folder.path()).unwrap().count(),
             if cfg!(unix) { 4 } else { 3 },
