@@ -120,6 +120,23 @@ fn signals_are_obeyed_at_once_everywhere() {
 }
 
 #[test]
+fn a_plant_to_which_no_controller_comes_leaves_no_older_account() {
+    let folder = tempfile::tempdir().unwrap();
+    let json = folder.path().join("plant.json");
+    std::fs::write(&json, r#"{"ticks": 7}"#).unwrap();
+    let link = format!("test-unserved-{}", std::process::id());
+    let plant = start(&["plant", "--link", &link, "--patience", "0.1", "--json", json.to_str().unwrap()]);
+    let output = plant.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", message(&output));
+    let account: serde_json::Value = serde_json::from_slice(&std::fs::read(&json).unwrap()).unwrap();
+    assert_eq!(account["ticks"], 0);
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let ended = words(account["ended"].as_str().unwrap());
+    assert!(ended.contains("no answer from the controller"), "{ended}");
+    assert!(words(&message(&output)).contains(&ended), "{ended}: {}", message(&output));
+}
+
+#[test]
 fn a_polling_peer_dies_with_a_killed_parent() {
     let mut timing = start(&["timing", "--seconds", "30"]);
     let peer = wait_for("no peer has started", || children(timing.id()).first().copied());

@@ -209,9 +209,14 @@ fn attempt(program: &Program, command: &str, words: &[String], out: &Path) -> Re
         None if told && !program.answers_signals => {}
         _ => return wrong("neither 0, 1 nor 2"),
     }
-    // What a controller records while it runs is whole up to where it ended.
-    let left: Vec<_> =
-        files(out).into_iter().filter(|path| !(command == "controller" && path.ends_with("a.rec"))).collect();
+    // What a controller records while it runs is whole up to where it ended; a plant says why nothing came about.
+    let tells = |path: &PathBuf| std::fs::read_to_string(path).is_ok_and(|text| text.contains("\"ended\""));
+    let is_kept = |path: &PathBuf| match command {
+        "controller" => path.ends_with("a.rec"),
+        "plant" => tells(path),
+        _ => false,
+    };
+    let left: Vec<_> = files(out).into_iter().filter(|path| !is_kept(path)).collect();
     // `solve` reports how far it came, whole, also when that was not far enough; `timing` what it measured, when nothing of it
     // can be compared; controller and bridge have accounts however they end.
     let excused = ["bridge", "controller", "faults", "solve", "timing"].contains(&command);

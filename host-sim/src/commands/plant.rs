@@ -8,6 +8,7 @@ use firmware::contract::frames::MAX_PADDLES;
 use host_sim::SimError;
 use host_sim::exchange::Space;
 use host_sim::record::files::write_json;
+use host_sim::runtime::error::RuntimeError;
 use host_sim::runtime::peer::introduction::Expected;
 use host_sim::runtime::plant::PlantLoop;
 use host_sim::runtime::plant::process::{OnDeath, PlantResult, Visit, serve_in_plane, serve_in_space};
@@ -58,7 +59,7 @@ pub(crate) struct PlantArgs {
     /// Go on when the controller dies, with the paddle where it is, and let the next one in; free-run only
     #[arg(long)]
     pub(crate) keep: bool,
-    /// Write what happened here, as JSON
+    /// Write what happened here, as JSON; also when no controller comes
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
 }
@@ -100,8 +101,8 @@ pub(crate) fn plant(args: &PlantArgs) -> Result<(), SimError> {
         paddles: None,
     };
     let visit = visit(args, &simulation, expected);
-    let result = serve_in_plane(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
-    end(args, &result, &format!("paddle {paddle}"))
+    let result = serve_in_plane(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal());
+    end(args, result, plant.truths().len(), &format!("paddle {paddle}"))
 }
 
 /// The same of a body in space.
@@ -141,9 +142,9 @@ fn in_space(args: &PlantArgs, scene: &SpaceScene) -> Result<(), SimError> {
         paddles: Some(paddles.clone()),
     };
     let visit = visit(args, &simulation, expected);
-    let result = serve_in_space(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal())?;
+    let result = serve_in_space(&mut plant, &Space::new(&args.link)?, &visit, &scene.needle.orthogonal());
     let names: Vec<String> = paddles.iter().map(u32::to_string).collect();
-    end(args, &result, &format!("paddle {}", names.join(" + ")))
+    end(args, result, plant.truths().len(), &format!("paddle {}", names.join(" + ")))
 }
 
 /// Refuses a result that would replace what is read.
@@ -163,11 +164,29 @@ fn visit(args: &PlantArgs, simulation: &Simulation, expected: Expected) -> Visit
     }
 }
 
-/// Writes and says what happened.
-fn end(args: &PlantArgs, result: &PlantResult, with: &str) -> Result<(), SimError> {
-    if let Some(path) = &args.json {
-        write_json(path, result)?;
-    }
+/// What `--json` holds of an insertion that came to no result: no controller, or one that was lost.
+#[derive(serde::Serialize)]
+struct Unserved {
+    /// Ticks simulated until then.
+    ticks: usize,
+    /// Why it ended.
+    ended: String,
+}
+
+/// Writes and says what happened in so many ticks.
+fn end(args: &PlantArgs, result: Result<PlantResult, RuntimeError>, ticks: usize, with: &str) -> Result<(), SimError> {
+    let result = result.map_err(|error| match error {
+        // It is told.
+        RuntimeError::Interrupted { signal } => RuntimeError::PlantStopped { signal },
+        other => other,
+    });
+    let written = args.json.as_ref().map_or(Ok(()), |path| match &result {
+        Ok(result) => write_json(path, result),
+        Err(error) => write_json(path, &Unserved { ticks, ended: error.to_string() }),
+    });
+    // Why it ended is more than that it could not be written.
+    let result = result?;
+    written?;
     say!("{} ticks with {with}; largest orthogonal target displacement {:.6}", result.ticks, result.largest_error);
     Ok(())
 }

@@ -122,6 +122,12 @@ pub enum RuntimeError {
         /// Name of the signal.
         signal: &'static str,
     },
+    /// The same of a plant that waits for a controller, or serves one.
+    #[error("stopped by {signal} while it served a controller, or waited for one")]
+    PlantStopped {
+        /// Name of the signal.
+        signal: &'static str,
+    },
     /// The same of a bridge, whose end is told.
     #[error("stopped by {signal}; the actuators were told to keep their positions")]
     BridgeStopped {
