@@ -17,6 +17,7 @@ use faer::sparse::linalg::cholesky::{
 };
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, Mat, MatMut, Par, Side};
+use std::mem::MaybeUninit;
 use std::sync::Arc;
 
 /// From this many nodes on, nodes are ordered and not unknowns: the same fill for a quarter of the time.
@@ -37,7 +38,12 @@ const SHARED_FLOPS: f64 = 1e9;
 pub struct SymbolicFactor {
     /// An error where a factor has more entries than can be numbered.
     symbolic: Result<Arc<SymbolicCholesky<u32>>, NotEnoughMemory>,
+    /// Entries that are taken beside the factor and its workspace: of the matrix, and of dense matrices on what is retained.
+    beside: usize,
 }
+
+/// Dense matrices of the size of what is retained: its factor, right-hand sides, and their products.
+const CONDENSED: usize = 3;
 
 impl SymbolicFactor {
     /// Orders and analyses a pattern of nodes at `positions`.
@@ -48,7 +54,7 @@ impl SymbolicFactor {
             order_nodes(pattern, positions, pattern.dimension())
                 .and_then(|nodes| analyse_ordered(pattern.symbolic(), &unknowns_of(pattern, &nodes)))
         };
-        Self::of(pattern, symbolic)
+        Self::of(pattern, symbolic, 0)
     }
 
     /// The same with the nodes `retained` (ascending) eliminated last, in their order, so that the factor's last columns are
@@ -56,12 +62,12 @@ impl SymbolicFactor {
     pub fn retaining<const D: usize>(pattern: &Pattern, positions: &[Point<D>], retained: &[u32]) -> Self {
         let symbolic = order_retaining(pattern, positions, retained)
             .and_then(|nodes| analyse_ordered(pattern.symbolic(), &unknowns_of(pattern, &nodes)));
-        Self::of(pattern, symbolic)
+        Self::of(pattern, symbolic, CONDENSED * (retained.len() * pattern.dimension()).pow(2))
     }
 
-    fn of(pattern: &Pattern, symbolic: Result<SymbolicCholesky<u32>, FaerError>) -> Self {
+    fn of(pattern: &Pattern, symbolic: Result<SymbolicCholesky<u32>, FaerError>, condensed: usize) -> Self {
         let too_many = |_| NotEnoughMemory { unknowns: pattern.unknowns(), needed: None };
-        Self { symbolic: symbolic.map(Arc::new).map_err(too_many) }
+        Self { symbolic: symbolic.map(Arc::new).map_err(too_many), beside: pattern.entries() + condensed }
     }
 
     /// Entries of a factor; infinitely many where they cannot be numbered.
@@ -149,7 +155,8 @@ fn order_nodes<const D: usize>(
     let (mut fewest, mut best) = (flops(&by_degree), None);
     if fewest * (unknowns as f64).powi(3) >= dissection_tried(unknowns) {
         for order in nested_dissections(&pattern.graph(), positions) {
-            let operations = flops(&analyse_ordered(nodes, &order)?);
+            // An order whose factor cannot be numbered is none of the best.
+            let operations = analyse_ordered(nodes, &order).map_or(f64::INFINITY, |analysed| flops(&analysed));
             if operations < fewest {
                 (fewest, best) = (operations, Some(order));
             }
@@ -157,6 +164,11 @@ fn order_nodes<const D: usize>(
     }
     let natural = || (0..pattern.blocks() as u32).collect();
     Ok(best.unwrap_or_else(|| by_degree.perm().map_or_else(natural, |order| order.arrays().0.to_vec())))
+}
+
+/// Workspace of a factorisation.
+fn scratch(symbolic: &SymbolicCholesky<u32>, threads: usize) -> StackReq {
+    symbolic.factorize_numeric_llt_scratch::<f64>(shared_by(threads), Default::default())
 }
 
 /// Cholesky factor of a matrix with a fixed pattern, with all workspace it needs.
@@ -192,14 +204,23 @@ impl SparseCholesky {
     /// Room for a factor of a pattern that was analysed.
     ///
     /// # Errors
-    /// [`NotEnoughMemory`] when the machine has none for it, before any is taken.
+    /// [`NotEnoughMemory`] when there is none for it and what is computed with it, before any is taken.
     pub fn new(analysed: &SymbolicFactor) -> Result<Self, NotEnoughMemory> {
         let symbolic = analysed.symbolic.as_ref().map_err(Clone::clone)?;
-        memory::room_for(symbolic.nrows(), symbolic.len_val())?;
-        let mut room = Self::empty(symbolic);
-        room.factor = vec![0.0; symbolic.len_val()];
-        room.shareable = analysed.flops() >= SHARED_FLOPS;
-        Ok(room)
+        let shareable = analysed.flops() >= SHARED_FLOPS;
+        let threads = if shareable { parallel::here() } else { 1 };
+        let entries = (symbolic.len_val() as u64).saturating_add(analysed.beside as u64);
+        let workspace = scratch(symbolic, threads).size_bytes() as u64;
+        let bytes = entries.saturating_mul(size_of::<f64>() as u64).saturating_add(workspace);
+        memory::take(symbolic.nrows(), bytes, || {
+            let mut room = Self::empty(symbolic);
+            // Written to, here and in the workspace, and no zeros: those take no memory until something else is in their place.
+            room.factor.resize(symbolic.len_val(), f64::NAN);
+            room.shareable = shareable;
+            room.reserve_threads(threads);
+            room.workspace.fill(MaybeUninit::new(1));
+            room
+        })
     }
 
     fn empty(symbolic: &Arc<SymbolicCholesky<u32>>) -> Self {
@@ -219,8 +240,7 @@ impl SparseCholesky {
 
     fn reserve_threads(&mut self, threads: usize) {
         if threads > self.workspace_threads {
-            let scratch = self.symbolic.factorize_numeric_llt_scratch::<f64>(shared_by(threads), Default::default());
-            self.workspace = MemBuffer::new(scratch);
+            self.workspace = MemBuffer::new(scratch(&self.symbolic, threads));
             self.workspace_threads = threads;
         }
     }

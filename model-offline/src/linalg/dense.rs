@@ -114,10 +114,12 @@ mod tests {
 
     /// A matrix with columns that are far from parallel, and no pattern that a block could repeat.
     fn columns(rows: usize, count: usize) -> Mat<f64> {
-        Mat::from_fn(rows, count, |r, c| {
-            let off_diagonal = ((r * 37 + c * 91 + r * c) % 113) as f64 / 113.0 - 0.5;
-            if r == c { 20.0 } else { off_diagonal }
-        })
+        Mat::from_fn(rows, count, entry)
+    }
+
+    fn entry(row: usize, column: usize) -> f64 {
+        let off_diagonal = ((row * 37 + column * 91 + row * column) % 113) as f64 / 113.0 - 0.5;
+        if row == column { 20.0 } else { off_diagonal }
     }
 
     #[test]
@@ -146,6 +148,32 @@ mod tests {
         }
         for threads in [2, 3, 4] {
             assert!(within(threads, products) == alone, "{threads}: not the same bits");
+            assert!(within(threads, solve) == x, "{threads}: not the same bits");
+        }
+    }
+
+    /// More columns than a panel has, each with its own first row: what is above stays zero, and L times the answer is the side.
+    #[test]
+    fn forward_substitution_begins_where_each_column_does() {
+        let (rows, count) = (400, 3 * PANEL + 5);
+        let first: Vec<usize> = (0..count).map(|c| c / 4 * 5).collect();
+        let triangle = Mat::from_fn(rows, rows, |r, c| if r < c { f64::NAN } else { entry(r, c) });
+        let mut sides = Mat::from_fn(rows, count, |r, c| entry(c, r));
+        first.iter().enumerate().for_each(|(c, &from)| sides.col_mut(c).subrows_mut(0, from).fill(0.0));
+        let solve = || {
+            let mut x = sides.clone();
+            solve_lower(triangle.as_ref(), x.as_mut(), &first);
+            x
+        };
+        let x = solve();
+        for c in [0, 1, PANEL - 1, PANEL, 2 * PANEL + 3, count - 1] {
+            assert!((0..first[c]).all(|r| x[(r, c)] == 0.0), "{c}");
+            for r in first[c]..rows {
+                let back: f64 = (first[c]..=r).map(|k| triangle[(r, k)] * x[(k, c)]).sum();
+                assert!((back - sides[(r, c)]).abs() < 1e-12, "{r} {c}: {back}");
+            }
+        }
+        for threads in [2, 3] {
             assert!(within(threads, solve) == x, "{threads}: not the same bits");
         }
     }

@@ -1,25 +1,33 @@
-//! Whether a factor fits into the memory of the machine. A process that takes more than there is gets killed without a word.
+//! Whether a factor fits into the memory that the process may have: of the machine, of the control groups that it runs in
+//! (containers, batch jobs), and of its own limits (`ulimit`). A process that takes more gets killed without a word.
 
-/// A factor that the machine has no memory for.
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
+
+/// A factor that there is no memory for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub struct NotEnoughMemory {
     /// Unknowns of the matrix.
     pub unknowns: usize,
-    /// Bytes that the factor takes, and that are free; none where it has more entries than can be numbered.
+    /// Bytes that it takes to factorise, and that are free; none where the factor has more entries than can be numbered.
     pub needed: Option<(u64, u64)>,
 }
 
 impl std::fmt::Display for NotEnoughMemory {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let gigabytes = |bytes: u64| bytes as f64 / 1e9;
-        write!(f, "the factor of {} unknowns would take ", self.unknowns)?;
+        write!(f, "to factorise {} unknowns would take ", self.unknowns)?;
         match self.needed {
-            Some((needed, free)) => {
-                write!(f, "{:.1} GB, and {:.1} GB of memory are free", gigabytes(needed), gigabytes(free))?
-            }
-            None => write!(f, "more than {:.0} GB, which is not tried", gigabytes(MOST_ENTRIES * BYTES))?,
+            Some((needed, free)) => write!(f, "{}, and {} of memory are free", in_words(needed), in_words(free))?,
+            None => write!(f, "more than {}, which is not tried", in_words(MOST_ENTRIES * BYTES))?,
         }
-        f.write_str(": take a coarser mesh, or elements, whose factors are smaller (fem-t6, in space fem-t10)")
+        f.write_str(": take a coarser mesh, or elements (fem-t6, in space fem-t10) where it is a meshfree one")
+    }
+}
+
+fn in_words(bytes: u64) -> String {
+    match bytes {
+        0..1_000_000_000 => format!("{:.0} MB", bytes as f64 / 1e6),
+        _ => format!("{:.1} GB", bytes as f64 / 1e9),
     }
 }
 
@@ -28,41 +36,178 @@ const BYTES: u64 = size_of::<f64>() as u64;
 /// Entries that signed numbers of 32 bits count.
 const MOST_ENTRIES: u64 = i32::MAX as u64;
 
-/// Bytes of memory that can be taken without pushing anything out, as Linux tells it; none elsewhere.
-fn available() -> Option<u64> {
-    let told = std::fs::read_to_string("/proc/meminfo").ok()?;
-    let line = told.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|kilobytes| kilobytes * 1024)
+/// What takes less is not asked for: a few pages are there, or nothing is.
+const LITTLE: u64 = 1 << 24;
+
+/// Whoever asks for memory takes it before the next one asks: the system counts pages once they are written to.
+static TAKING: Mutex<()> = Mutex::new(());
+
+/// Takes memory to factorise so many unknowns, which `allocate` must write to, or refuses where there are not so many bytes.
+pub(super) fn take<T>(unknowns: usize, bytes: u64, allocate: impl FnOnce() -> T) -> Result<T, NotEnoughMemory> {
+    if bytes < LITTLE {
+        return Ok(allocate());
+    }
+    // It guards nothing that a panic could leave half done.
+    let _others_wait = TAKING.lock().unwrap_or_else(PoisonError::into_inner);
+    room_for(unknowns, bytes, available())?;
+    Ok(allocate())
 }
 
-/// Refuses a factor of so many entries that there is no memory for.
-pub(super) fn room_for(unknowns: usize, entries: usize) -> Result<(), NotEnoughMemory> {
-    let needed = entries as u64 * BYTES;
-    match available() {
-        Some(free) if needed > free => Err(NotEnoughMemory { unknowns, needed: Some((needed, free)) }),
+fn room_for(unknowns: usize, bytes: u64, free: Option<u64>) -> Result<(), NotEnoughMemory> {
+    match free {
+        Some(free) if bytes > free => Err(NotEnoughMemory { unknowns, needed: Some((bytes, free)) }),
         _ => Ok(()),
+    }
+}
+
+/// Bytes of memory that this process can take without pushing anything out, as Linux tells it; none elsewhere.
+fn available() -> Option<u64> {
+    let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
+    let machine = kilobytes(&read("/proc/meminfo"), "MemAvailable:");
+    let groups = of_control_groups(&read("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"));
+    let own = of_limits(&read("/proc/self/limits"), &read("/proc/self/status"));
+    [machine, groups, own].into_iter().flatten().min()
+}
+
+/// The value in a line such as `VmSize:  123 kB`, in bytes.
+fn kilobytes(told: &str, name: &str) -> Option<u64> {
+    let line = told.lines().find_map(|line| line.strip_prefix(name))?;
+    line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok().map(|count| count.saturating_mul(1024))
+}
+
+/// What is left of the process's limits on its address space and its data.
+fn of_limits(limits: &str, status: &str) -> Option<u64> {
+    let left = |limit: &str, used: &str| {
+        let line = limits.lines().find_map(|line| line.strip_prefix(limit))?;
+        let soft = line.split_whitespace().next()?.parse::<u64>().ok()?;
+        Some(soft.saturating_sub(kilobytes(status, used)?))
+    };
+    [left("Max address space", "VmSize:"), left("Max data size", "VmData:")].into_iter().flatten().min()
+}
+
+/// What is left of the limits of the control groups that a process belongs to, of either version. What a container sees of
+/// them may begin at its own, whatever their full path.
+fn of_control_groups(own: &str, root: &Path) -> Option<u64> {
+    let mut least = None;
+    for line in own.lines() {
+        let Some((controllers, group)) = line.split_once(':').and_then(|(_, rest)| rest.split_once(':')) else {
+            continue;
+        };
+        let (root, version) = match controllers {
+            "" => (root.to_owned(), &VERSION_2),
+            _ if controllers.split(',').any(|name| name == "memory") => (root.join("memory"), &VERSION_1),
+            _ => continue,
+        };
+        for ancestor in Path::new(group.trim_start_matches('/')).ancestors() {
+            least = least.into_iter().chain(version.left(&root.join(ancestor))).min();
+        }
+    }
+    least
+}
+
+/// What the files of a control group are called.
+struct ControlGroup {
+    limits: &'static [&'static str],
+    usage: &'static str,
+    /// In its statistics: what can be let go, of files that were read.
+    released: &'static [&'static str],
+}
+
+const VERSION_1: ControlGroup = ControlGroup {
+    limits: &["memory.limit_in_bytes"],
+    usage: "memory.usage_in_bytes",
+    released: &["total_inactive_file ", "total_active_file "],
+};
+const VERSION_2: ControlGroup = ControlGroup {
+    // The second is none that kills: what goes beyond crawls.
+    limits: &["memory.max", "memory.high"],
+    usage: "memory.current",
+    released: &["inactive_file ", "active_file ", "slab_reclaimable "],
+};
+
+impl ControlGroup {
+    fn left(&self, folder: &Path) -> Option<u64> {
+        let read = |file: &str| std::fs::read_to_string(folder.join(file)).ok();
+        let number = |file: &str| read(file)?.trim().parse::<u64>().ok();
+        let limit = self.limits.iter().filter_map(|file| number(file)).min()?;
+        let statistics = read("memory.stat").unwrap_or_default();
+        let count =
+            |name: &str| statistics.lines().find_map(|line| line.strip_prefix(name)?.trim().parse::<u64>().ok());
+        let released = self.released.iter().filter_map(|name| count(name)).fold(0, u64::saturating_add);
+        let used = number(self.usage)?.saturating_sub(released);
+        Some(limit.saturating_sub(used))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     #[test]
-    fn a_factor_larger_than_the_machine_is_refused_in_words() {
-        assert_eq!(room_for(30, 465), Ok(()));
+    fn what_is_larger_than_the_machine_is_refused_in_words_and_not_allocated() {
+        assert_eq!(take(30, 3720, || 7), Ok(7));
         // Ten million gigabytes.
-        let refused = room_for(9_000_000, 1 << 53);
-        let Some(free) = available() else { return assert_eq!(refused, Ok(())) };
+        let refused = take(9_000_000, 1 << 56, || unreachable!("it was refused"));
+        let Some(free) = available() else { return };
         assert!((1 << 20..1 << 50).contains(&free), "{free}");
         let told = refused.unwrap_err().to_string();
-        assert!(told.starts_with("the factor of 9000000 unknowns would take 72057594.0 GB, and "), "{told}");
-        assert!(told.contains(" GB of memory are free: take a coarser mesh"), "{told}");
+        assert!(told.starts_with("to factorise 9000000 unknowns would take 72057594.0 GB, and "), "{told}");
+        assert!(told.contains("B of memory are free: take a coarser mesh"), "{told}");
+        let told = |bytes: u64, free: u64| room_for(300, bytes, Some(free)).map_err(|refused| refused.to_string());
+        assert_eq!(told(41_400_000, 41_400_000), Ok(()));
+        let small = told(41_400_000, 2_000_000).unwrap_err();
+        assert!(small.contains("41 MB, and 2 MB of memory are free"), "{small}");
+        assert_eq!(room_for(300, u64::MAX, None), Ok(()));
         let uncounted = NotEnoughMemory { unknowns: 1, needed: None };
         assert!(
             uncounted
                 .to_string()
-                .starts_with("the factor of 1 unknowns would take more than 17 GB, which is not tried: take")
+                .starts_with("to factorise 1 unknowns would take more than 17.2 GB, which is not tried:")
         );
+    }
+
+    #[test]
+    fn limits_of_the_process_count_with_what_it_has_taken() {
+        let limits = "Limit Soft Limit Hard Limit Units\n\
+            Max data size             unlimited            unlimited            bytes     \n\
+            Max address space         512000000            unlimited            bytes     \n";
+        let status = "Name:\tx\nVmPeak:\t  900000 kB\nVmSize:\t  100000 kB\nVmData:\t   50000 kB\n";
+        assert_eq!(of_limits(limits, status), Some(512_000_000 - 102_400_000));
+        assert_eq!(of_limits(&limits.replace("512000000", "unlimited"), status), None);
+        assert_eq!(of_limits(&limits.replace("512000000", "1000"), status), Some(0));
+        let both = limits.replacen("unlimited ", "52000000 ", 1);
+        assert_eq!(of_limits(&both, status), Some(52_000_000 - 51_200_000));
+        assert_eq!(of_limits("", ""), None);
+    }
+
+    #[test]
+    fn the_tightest_control_group_counts_with_what_can_be_let_go() {
+        let root = tempfile::tempdir().unwrap();
+        let write = |file: &str, text: &str| {
+            let file = root.path().join(file);
+            fs::create_dir_all(file.parent().unwrap()).unwrap();
+            fs::write(file, text).unwrap();
+        };
+        let left = |own: &str| of_control_groups(own, root.path());
+        assert_eq!(left("0::/job/step\n"), None);
+        write("job/memory.max", "1000\n");
+        write("job/memory.current", "700\n");
+        write("job/memory.stat", "anon 400\nfile 300\ninactive_file 150\nactive_file 40\nslab_reclaimable 10\n");
+        assert_eq!(left("0::/job/step\n"), Some(500));
+        write("job/step/memory.max", "max\n");
+        write("job/step/memory.current", "100\n");
+        assert_eq!(left("0::/job/step\n"), Some(500));
+        write("job/step/memory.high", "450\n");
+        assert_eq!(left("0::/job/step\n"), Some(350));
+        // What a container sees: its own group as the root, under a path that is not there.
+        write("memory/memory.limit_in_bytes", "9000\n");
+        write("memory/memory.usage_in_bytes", "8900\n");
+        write("memory/memory.stat", "inactive_file 1\ntotal_inactive_file 30\ntotal_active_file 20\n");
+        let both = "4:cpu,cpuacct:/docker/abc\n3:devices,memory:/docker/abc\n0::/job/step\n";
+        assert_eq!(left(both), Some(150));
+        assert_eq!(left(&both.replace("memory", "misc")), Some(350));
+        write("memory/memory.usage_in_bytes", "9900\n");
+        assert_eq!(left(both), Some(0));
     }
 }

@@ -10,9 +10,11 @@ use feral_metis::{CscPattern, MetisOptions, metis_order_full};
 
 /// Parts of at most this many nodes are not cut further: their blocks are dense anyway.
 const LEAF: usize = 40;
-/// Sizes of the coarsest graph that are tried. Elements have some fifteen neighbours, and the library's own size serves them;
-/// kernels have a hundred, of which a bisection of a hundred nodes knows nothing.
+/// Sizes of the coarsest graph that are tried. Elements have fifteen neighbours or thirty, and the library's own size serves
+/// them; kernels have a hundred, of which a bisection of a hundred nodes knows nothing.
 const COARSEST: [u32; 2] = [120, 300];
+/// Neighbours of a node, on average, up to which only the first is tried.
+const FEW_NEIGHBOURS: usize = 50;
 
 /// Undirected graph in compressed rows, neighbours ascending.
 #[derive(Debug)]
@@ -34,7 +36,8 @@ pub(super) fn nested_dissections<'g, const D: usize>(
     positions: &[Point<D>],
 ) -> impl Iterator<Item = Vec<u32>> + 'g {
     let pattern = CscPattern::new(graph.starts.len() - 1, &graph.starts, &graph.neighbours);
-    let by_graph = COARSEST.into_iter().filter_map(move |coarsen_floor| {
+    let few = graph.neighbours.len() <= FEW_NEIGHBOURS * positions.len();
+    let by_graph = COARSEST.into_iter().take(if few { 1 } else { 2 }).filter_map(move |coarsen_floor| {
         let (order, ..) = metis_order_full(&pattern?, &MetisOptions { coarsen_floor, ..Default::default() }).ok()?;
         Some(order.into_iter().map(|node| node as u32).collect())
     });
@@ -111,10 +114,20 @@ mod tests {
         }
         let positions: Vec<_> = (0..n).map(|k| Point::<2>::new((k % side) as f64, (k / side) as f64)).collect();
         let orders: Vec<Vec<u32>> = nested_dissections(&Graph { starts, neighbours }, &positions).collect();
-        assert_eq!(orders.len(), 1 + COARSEST.len());
+        assert_eq!(orders.len(), 2);
         for mut order in orders {
             order.sort_unstable();
             assert_eq!(order, (0..n as u32).collect::<Vec<_>>());
         }
+    }
+
+    /// As kernels have them: everyone is everyone's neighbour.
+    #[test]
+    fn where_there_are_many_neighbours_another_size_is_tried() {
+        let n = 120_i32;
+        let starts = (0..=n).map(|k| k * (n - 1)).collect();
+        let neighbours = (0..n).flat_map(|k| (0..n).filter(move |other| *other != k)).collect();
+        let positions: Vec<_> = (0..n).map(|k| Point::<2>::new(f64::from(k), 0.0)).collect();
+        assert_eq!(nested_dissections(&Graph { starts, neighbours }, &positions).count(), 1 + COARSEST.len());
     }
 }

@@ -51,18 +51,26 @@ pub(super) struct Attaching<'m> {
 impl<'m> Attaching<'m> {
     /// Factorises the body without paddles; none where its [rows](TissueModel::attachable_rows) are not attachable, or where it
     /// does not hold without paddles.
-    pub(super) fn new(model: &'m TissueModel, loads: Loads) -> Option<Self> {
-        let (paddles, held) = (model.attachable_rows()?, model.constrained_rows(None)?);
-        let Condensing { analysis, retained, ports } = model.condensing_analysis()?;
+    ///
+    /// # Errors
+    /// [`ModelError`] when there is no memory for the factor.
+    pub(super) fn new(model: &'m TissueModel, loads: Loads) -> Result<Option<Self>, ModelError> {
+        let rows = model.attachable_rows().zip(model.constrained_rows(None));
+        let Some(((paddles, held), condensing)) = rows.zip(model.condensing_analysis()) else { return Ok(None) };
+        let Condensing { analysis, retained, ports } = condensing;
         let sampled = (&**model.rule(), model.tissue());
-        let mut body = CondensedBody::new(sampled, analysis, (*retained, ports.as_ref()), held).ok()?;
+        let mut body = match CondensedBody::new(sampled, analysis, (*retained, ports.as_ref()), held) {
+            Ok(body) => body,
+            Err(error) if error.is_too_large() => return Err(error),
+            Err(_) => return Ok(None),
+        };
         let mut forces = vec![0.0; model.dofs()];
         forces.extend(loads.forces(model));
         let mut values = model.prescribed_values(None, 1.0, Vector2::zeros());
         values.resize(values.len() * forces.len() / model.dofs(), 0.0);
         let unattached = nodal_fields(&mut body, &forces, &values, model.dofs());
         let compliance = body.compliance(paddles.iter().flatten().chain([model.target_row()]));
-        Some(Self { model, body, paddles, compliance, unattached })
+        Ok(Some(Self { model, body, paddles, compliance, unattached }))
     }
 
     /// Rows of a paddle in the compliance.

@@ -34,7 +34,7 @@ pub fn rest_responses(model: &TissueModel) -> Result<Vec<RestResponse>, ModelErr
         return (0..count).map(|paddle| rest_response_weakly_imposed(model, paddle)).collect();
     }
     let normal = model.scene().needle.orthogonal();
-    if let Some(body) = Attaching::new(model, Loads::None) {
+    if let Some(body) = Attaching::new(model, Loads::None)? {
         let response = |paddle| {
             let [x, y, per_depth] = body.target(paddle)?;
             Ok(RestResponse::new(Matrix2::from_columns(&[x, y]), per_depth, normal))
@@ -59,7 +59,7 @@ pub(super) fn for_each_paddle(
     loads: Loads,
     mut visit: impl FnMut(usize, &Fields) -> Result<(), ModelError>,
 ) -> Result<(), ModelError> {
-    let Some(mut body) = Attaching::new(model, loads) else { return for_each_paddle_by_itself(model, loads, visit) };
+    let Some(mut body) = Attaching::new(model, loads)? else { return for_each_paddle_by_itself(model, loads, visit) };
     let mut fields = Fields::new(model, loads);
     for paddle in 0..model.scene().paddles.len() {
         body.fields(paddle, &mut fields)?;
@@ -166,7 +166,7 @@ mod tests {
                 Ok(())
             })
             .unwrap();
-            let mut body = Attaching::new(&model, Loads::OnTarget).expect("paddles apart");
+            let mut body = Attaching::new(&model, Loads::OnTarget).unwrap().expect("paddles apart");
             let mut fields = Fields::new(&model, Loads::OnTarget);
             for (paddle, own) in own.iter().enumerate() {
                 body.fields(paddle, &mut fields).unwrap();
@@ -189,8 +189,9 @@ mod tests {
 
     #[test]
     fn rules_that_ports_cost_digits_have_a_factor_for_each_paddle() {
-        let paper =
-            |rule| Attaching::new(&model(Scene::bundled("paper-hull").unwrap(), 0.1, rule), Loads::None).is_some();
+        let paper = |rule| {
+            Attaching::new(&model(Scene::bundled("paper-hull").unwrap(), 0.1, rule), Loads::None).unwrap().is_some()
+        };
         assert_eq!([Integration::Scni, Integration::Gauss, Integration::Mscni].map(paper), [false, false, true]);
     }
 
@@ -200,7 +201,7 @@ mod tests {
         let end = *scene.needle.contact.last().unwrap();
         scene.paddles[0].segment[0] = end;
         let model = quadratic(scene, 0.1);
-        assert!(Attaching::new(&model, Loads::None).is_none());
+        assert!(Attaching::new(&model, Loads::None).unwrap().is_none());
         let responses = rest_responses(&model).unwrap();
         assert!(responses.iter().all(|r| r.jacobian.iter().all(|x| x.is_finite())));
     }

@@ -87,7 +87,7 @@ pub enum FailureReason {
     /// Newton's method did not converge.
     #[error("not-converged")]
     NotConverged,
-    /// The machine has no memory for the factor of the tangent.
+    /// There is no memory to factorise the tangent.
     #[error("too-large")]
     TooLarge,
 }
@@ -132,6 +132,6 @@ mod tests {
         let failure =
             Failure::from(NotEnoughMemory { unknowns: 300_000, needed: Some((30_000_000_000, 4_000_000_000)) });
         let told = failure.to_string();
-        assert!(told.starts_with("too-large: the factor of 300000 unknowns would take 30.0 GB, and 4.0 GB"), "{told}");
+        assert!(told.starts_with("too-large: to factorise 300000 unknowns would take 30.0 GB, and 4.0 GB"), "{told}");
     }
 }
