@@ -1,7 +1,7 @@
 //! A table in space as text and JSON, for people and scripts.
 
 use super::table_text::{head, hex};
-use crate::linalg::SingularValues;
+use crate::placement::space::Controllability;
 use crate::table::space::SpaceTable;
 use firmware::contract::SpatialTable;
 use nalgebra::{DMatrix, Vector3};
@@ -27,7 +27,7 @@ pub fn json(table: &SpaceTable) -> serde_json::Value {
 fn measure<const P: usize>(table: &SpatialTable<f64, P>, knot: usize) -> f64 {
     let jacobian = &table.knots[knot].jacobian;
     let whole = DMatrix::from_fn(3, 3 * P, |r, c| jacobian[c / 3][(r, c % 3)]);
-    SingularValues::of(&(table.orthogonal.transpose() * whole)).map_or(f64::INFINITY, |across| 1.0 / across.least())
+    Controllability::of(&whole, &table.orthogonal).measure
 }
 
 fn summary_of<const P: usize>(table: &SpatialTable<f64, P>) -> String {

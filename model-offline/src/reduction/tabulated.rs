@@ -380,6 +380,7 @@ fn walk<'m>(
                 return Err(TabulationError::TooShallow { reached, asked, failure });
             }
             Err(ModelError::Solve(_)) => break,
+            Err(ModelError::NotHeld { .. }) if knots.len() >= 2 => break,
             Err(error) => return Err(error.into()),
         }
         bodies.push(body.clone());

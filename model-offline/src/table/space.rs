@@ -2,9 +2,9 @@
 
 use super::{Described, TableBuildError, TableOptions, to_bytes};
 use crate::geometry::Implicit as _;
-use crate::linalg::SingularValues;
 use crate::model::space::SpaceBody;
 use crate::model::{ModelError, control_derivatives};
+use crate::placement::space::controllability::least_displacements;
 use crate::placement::space::holding::{Hold, hold};
 use crate::placement::space::insertion::InsertionModel;
 use crate::solver::equilibrium::NewtonSettings;
@@ -172,17 +172,16 @@ fn mistaken<const P: usize>(
     if model.scene().inclusions.is_empty() {
         return Ok(1.0);
     }
-    let n = model.scene().needle.orthogonal();
+    let (n, own_depth) = (model.scene().needle.orthogonal(), own.depth);
     let across = |jacobian: &DMatrix<f64>| n.transpose() * jacobian;
     let own = across(&DMatrix::from_fn(3, 3 * P, |r, c| own.jacobian[c / 3][(r, c % 3)]));
     let other = model.without_inclusions()?;
     let mut body = other.body(attached, NewtonSettings::default())?;
     let other = across(&control_derivatives::<3, _>(&mut body)?.slope.columns(1, 3 * P).into_owned());
     let largest = |of: &Matrix2xX<f64>, taken_for: &Matrix2xX<f64>| {
-        let gain = of * SingularValues::of(taken_for)?.pseudo_inverse(f64::EPSILON);
+        let gain = of * least_displacements(taken_for).ok_or(ModelError::NotHeld { depth: own_depth })?;
         let eigenvalues = gain.fixed_resize::<2, 2>(0.0).complex_eigenvalues();
-        eigenvalues.iter().map(|l| l.norm()).reduce(f64::max)
+        Ok::<_, ModelError>(eigenvalues.iter().map(|l| l.norm()).fold(1.0, f64::max))
     };
-    let both = [largest(&own, &other), largest(&other, &own)];
-    Ok(both.into_iter().flatten().fold(1.0, f64::max))
+    Ok(largest(&own, &other)?.max(largest(&other, &own)?))
 }

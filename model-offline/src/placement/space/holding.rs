@@ -1,7 +1,7 @@
 //! Where paddles hold the target: Newton's method on their displacements, so that nothing is left of the target's way
 //! orthogonal to the needle.
 
-use crate::linalg::SingularValues;
+use super::controllability::least_displacements;
 use crate::model::ModelError;
 use crate::model::space::SpaceBody;
 use crate::solver::equilibrium::{Failure, FailureReason};
@@ -29,16 +29,13 @@ impl Hold {
     /// At the body's present state.
     ///
     /// # Errors
-    /// [`ModelError::Solve`] when it is not stable, [`ModelError::NoPaddleControls`] when its paddles do not control the target.
+    /// [`ModelError::Solve`] when it is not stable, [`ModelError::NotHeld`] when its paddles do not control the target.
     pub fn of(body: &mut SpaceBody<'_>) -> Result<Self, ModelError> {
         let orthogonal = body.model().scene().needle.orthogonal();
         let jacobian = body.actuation_jacobian()?;
         let jacobian = DMatrix::from_column_slice(3, jacobian.ncols(), jacobian.as_slice());
         let across = orthogonal.transpose() * &jacobian;
-        let inverse = SingularValues::of(&across).ok_or(ModelError::NoPaddleControls)?.pseudo_inverse(f64::EPSILON);
-        if !inverse.iter().all(|x| x.is_finite()) || inverse.norm() == 0.0 {
-            return Err(ModelError::NoPaddleControls);
-        }
+        let inverse = least_displacements(&across).ok_or(ModelError::NotHeld { depth: body.depth() })?;
         let inverse = inverse.fixed_columns::<2>(0).into_owned();
         Ok(Self { jacobian, inverse, per_depth: body.depth_sensitivity()? })
     }
@@ -62,7 +59,7 @@ fn moved(body: &SpaceBody<'_>, by: &DVector<f64>) -> Vec<Vector3<f64>> {
 /// Takes a body to a depth with its paddles where the target is back on the needle's line.
 ///
 /// # Errors
-/// [`ModelError::Solve`] where that is not possible, [`ModelError::NoPaddleControls`].
+/// [`ModelError::Solve`] where that is not possible, [`ModelError::NotHeld`].
 pub fn hold(body: &mut SpaceBody<'_>, depth: f64) -> Result<(), ModelError> {
     let ahead = Hold::of(body)?.way(body) * (depth - body.depth());
     let paddles = moved(body, &ahead);

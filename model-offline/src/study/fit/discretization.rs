@@ -54,7 +54,7 @@ pub fn discretization(
     let rejected: Vec<Rejected> = reasons.collect();
     let Some(best) = best else {
         let reached = rejected.iter().filter_map(|r| r.reason.error()).fold(f64::INFINITY, f64::min);
-        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by: DecidedBy::Whole });
+        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by: DecidedBy::Whole, memory: None });
     };
     Ok(ChosenDiscretization {
         discretization: best.candidate,

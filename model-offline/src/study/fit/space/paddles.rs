@@ -64,7 +64,7 @@ fn of(study: &SpaceStudy, paddles: Vec<u32>, answer: &SpaceAnswer, believed: Opt
     let across = |jacobian: &DMatrix<f64>| orthogonal.transpose() * jacobian;
     let inverse = |of: &DMatrix<f64>| {
         let found = SingularValues::of(&across(of));
-        found.map_or_else(|| DMatrix::zeros(of.ncols(), 2), |found| found.pseudo_inverse(SINGULAR * found.most()))
+        found.map_or_else(|| DMatrix::zeros(of.ncols(), 2), |found| found.pseudo_inverse(SINGULAR))
     };
     let jacobian = DMatrix::from_fn(3, answer.jacobian[0].len(), |r, c| answer.jacobian[r][c]);
     let correction = inverse(&jacobian);
