@@ -55,9 +55,14 @@ impl fmt::Display for DecidedBy {
         };
         let named: Vec<_> = paddles.iter().map(u32::to_string).collect();
         write!(f, " (of the measure of paddle{} {}", if named.len() > 1 { "s" } else { "" }, named.join(" + "))?;
-        others.map_or(Ok(()), |others| write!(f, "; {} of all else", short(others)))?;
+        others.map_or(Ok(()), |others| write!(f, "; {} of all else", estimate(others)))?;
         f.write_str(")")
     }
+}
+
+/// A relative error as it is told.
+fn estimate(error: f64) -> String {
+    if error.is_infinite() { "infinite".to_owned() } else { short(error) }
 }
 
 /// Why a scene cannot be modelled.
@@ -132,6 +137,16 @@ pub enum ModelError {
     /// None of the scene's paddles can move the target orthogonally to the needle.
     #[error("no paddle of this scene can control the target: move a paddle, turn the needle, or use one static")]
     NoPaddleControls,
+    /// Paddles that are attached, and cannot move the target in every direction orthogonal to the needle.
+    #[error(
+        "these paddles cannot hold the target at depth {}: no displacement of theirs moves it in every direction orthogonal to the \
+         needle; take others, or a pair",
+        length(*depth)
+    )]
+    NotHeld {
+        /// Depth, length units.
+        depth: f64,
+    },
     /// One paddle cannot be attached twice.
     #[error("paddle {index} is named twice: name another beside it, or it alone")]
     SamePaddle {
@@ -139,7 +154,10 @@ pub enum ModelError {
         index: u32,
     },
     /// A model of more nodes than are tried.
-    #[error("{nodes} nodes are needed, at most {limit} are tried")]
+    #[error(
+        "{nodes} nodes are needed, at most {limit} are tried: take a larger tolerance or spacing or a lower level, or leave out what \
+         is much finer or thinner than the rest"
+    )]
     TooManyNodes {
         /// Nodes it would take.
         nodes: usize,
@@ -148,8 +166,9 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}; take a larger tolerance, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
-        short(*reached)
+        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}{}; take a larger tolerance, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
+        estimate(*reached),
+        memory.as_ref().map_or_else(String::new, |missing| format!("; a finer model did not fit into memory ({missing})"))
     )]
     ToleranceNotReached {
         /// Asked for.
@@ -158,6 +177,8 @@ pub enum ModelError {
         reached: f64,
         /// Whose it is.
         decided_by: DecidedBy,
+        /// What a finer model had no memory for, where that was the end.
+        memory: Option<String>,
     },
     /// A tolerance in space, where no two meshes could be compared.
     #[error(
@@ -167,6 +188,18 @@ pub enum ModelError {
     /// The scene's resolution is a tolerance where nodes are needed.
     #[error("the resolution is a tolerance: refine to it with `placement::discretise`")]
     ToleranceIsNoResolution,
+    /// A study with a model that is larger than is tried, or than there is memory for.
+    #[error(
+        "the study's model at spacing {} is too large, which would look like a failure of its method: take a larger --spacing, or, \
+         where memory is short, --threads 1, so that one is in memory at a time ({detail})",
+        short(*spacing)
+    )]
+    StudyTooLarge {
+        /// Spacing of the model.
+        spacing: f64,
+        /// How much is missing.
+        detail: String,
+    },
     /// A study that varies the spacing of a scene that has none.
     #[error("the study varies a spacing: give one instead of a tolerance")]
     NoSpacing,
@@ -247,11 +280,28 @@ impl ModelError {
             Self::Discretization(DiscretizationError::Triangulation(_)) => ModelFailure::NoTriangulation,
             Self::Solve(failure) => ModelFailure::Solve(failure.reason),
             Self::NothingConstrained(_) => ModelFailure::NothingConstrained,
-            Self::Uncontrollable { .. } | Self::NoPaddleControls => ModelFailure::SingularJacobian,
+            Self::Uncontrollable { .. } | Self::NoPaddleControls | Self::NotHeld { .. } => {
+                ModelFailure::SingularJacobian
+            }
+            Self::StudyTooLarge { .. } => ModelFailure::Solve(FailureReason::TooLarge),
             Self::TooManyNodes { .. } | Self::ToleranceNotReached { .. } | Self::NothingToCompare => {
                 ModelFailure::ToleranceNotReached
             }
             _ => ModelFailure::Unsupported,
+        }
+    }
+
+    /// Whether a model is larger than is tried, or than there is memory for: a coarser one may do.
+    pub fn is_too_large(&self) -> bool {
+        let too_large = FailureReason::TooLarge;
+        matches!(self, Self::TooManyNodes { .. }) || matches!(self, Self::Solve(failure) if failure.reason == too_large)
+    }
+
+    /// What there was no memory for; none of another error.
+    pub(crate) fn missing_memory(&self) -> Option<String> {
+        match self {
+            Self::Solve(Failure { reason: FailureReason::TooLarge, detail, .. }) => Some(detail.clone()),
+            _ => None,
         }
     }
 

@@ -129,28 +129,39 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut refinement = Refinement::new(scene)?;
     let mut reference = Reference::sharpened(&mut refinement, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
-    let mut decided_by = DecidedBy::Whole;
+    let (mut decided_by, mut memory) = (DecidedBy::Whole, None);
     let mut level = first_level(tolerance);
     let (mut aim, mut aimed) = (tolerance, f64::INFINITY);
     while level <= MAX_LEVEL {
-        let built = match (best, refinement.present()) {
-            // Gradings know no better where nodes are needed; the answers do.
-            (Some(_), Some((mesh, certified))) => {
+        // Gradings know no better where nodes are needed; the answers do.
+        let present = refinement.present().filter(|_| best.is_some());
+        let is_sized = present.is_some();
+        let built = match present {
+            Some((mesh, certified)) => {
                 sized_model(scene, method, level, |slope| spacing_for(aim, mesh, certified, slope))
             }
-            _ => graded_model(scene, method, level),
+            None => graded_model(scene, method, level),
         };
         let model = match built {
             Ok(model) => model,
             // The finest that can be afforded is between this and what was tried.
-            Err(ModelError::TooManyNodes { .. }) if aim * EASE < LARGEST_STEP * aimed => {
+            Err(error) if error.is_too_large() && is_sized && aim * EASE < LARGEST_STEP * aimed => {
                 aim *= EASE;
                 continue;
             }
-            Err(ModelError::TooManyNodes { .. }) => break,
+            Err(error) if error.is_too_large() && best.is_some() => {
+                memory = error.missing_memory();
+                break;
+            }
             Err(error) => return Err(error),
         };
-        let responses = rest_responses(&model)?;
+        let responses = match rest_responses(&model) {
+            Err(error) if error.is_too_large() && best.is_some() => {
+                memory = error.missing_memory();
+                break;
+            }
+            responses => responses?,
+        };
         let mut estimate = ErrorEstimate::of(&responses, &reference, level);
         if estimate.worst() > tolerance
             && estimate.worst() - reference.open <= tolerance
@@ -181,7 +192,7 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
         }
     }
     let reached = best.map_or(f64::INFINITY, |b| b.worst());
-    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by })
+    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory })
 }
 
 fn first_level(tolerance: f64) -> i32 {
@@ -204,7 +215,7 @@ fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> 
     })?;
     if !reached {
         let reached = estimate.map_or(f64::INFINITY, |e| e.worst());
-        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by });
+        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory: None });
     }
     let reference = Some(Reference::from_certified(certified));
     let model = TissueModel::on(scene, certified.model.planar().clone(), certified.model.spacing())?;

@@ -18,15 +18,17 @@ mod claim;
 mod files;
 
 use crate::discretization::Resolution;
-use crate::model::ModelError;
+use crate::model::{ModelError, ModelFailure};
 use crate::parallel;
 use crate::scene::Scene;
 use crate::scene::space::SpaceScene;
+use crate::solver::equilibrium::FailureReason;
 use crate::study::extent::Extent;
 use law_limit::{Lateral, limit_stretch};
 use plan::{Entry, Experiment};
-use probe::ExperimentResult;
+use probe::{ExperimentResult, StopReason};
 use setting::Setting;
+use std::sync::OnceLock;
 use zero_energy::{Unmeasured, ZeroEnergy};
 
 pub use chart::figure;
@@ -76,6 +78,12 @@ impl Stability {
     }
 }
 
+/// Ends for want of memory, and for more nodes than are tried; no study asks for a tolerance.
+const TOO_LARGE: [StopReason; 2] = [
+    StopReason::Model(ModelFailure::Solve(FailureReason::TooLarge)),
+    StopReason::Model(ModelFailure::ToleranceNotReached),
+];
+
 /// A study with its runs known, to say how many there are before they start.
 #[derive(Debug)]
 pub struct Plan {
@@ -107,8 +115,8 @@ impl Plan {
     /// Runs everything with the paddle of this index attached; the result does not depend on `threads`.
     ///
     /// # Errors
-    /// [`ModelError`] when the scene's own model cannot be made, or has no paddle of this index. A run that fails is a
-    /// row of the result.
+    /// [`ModelError`] when the scene's own model cannot be made, has no paddle of this index, or when a run's model is too
+    /// large: that is a limit of the machine and none of a method. A run that fails otherwise is a row of the result.
     pub fn run(
         &self,
         scene: &Scene,
@@ -148,17 +156,32 @@ impl Plan {
         let Resolution::Spacing(spacing) = self.setting.discretization.resolution else {
             return Err(ModelError::NoSpacing);
         };
+        // The first that is too large; after it, nothing more is begun.
+        let too_large = OnceLock::new();
         let outcomes = parallel::map(self.experiments.len(), threads, |i| {
+            if too_large.get().is_some() {
+                return None;
+            }
             let outcome = probe(&self.experiments[i]);
+            if TOO_LARGE.contains(&outcome.reason) {
+                // Whoever was first.
+                let _ = too_large.set(ModelError::StudyTooLarge {
+                    spacing: self.experiments[i].spacing,
+                    detail: outcome.detail.clone(),
+                });
+            }
             progress();
-            outcome
+            Some(outcome)
         });
+        if let Some(error) = too_large.into_inner() {
+            return Err(error);
+        }
         let rows = self
             .entries
             .iter()
             .filter_map(|entry| {
                 let place = self.experiments.iter().position(|s| *s == entry.experiment)?;
-                Some((*entry, outcomes[place].clone()))
+                Some((*entry, outcomes[place].clone()?))
             })
             .collect();
         Ok(Stability {
@@ -189,4 +212,38 @@ fn limits(setting: &Setting, entries: &[Entry]) -> Vec<LawLimit> {
             Some(LawLimit { c, confined: at(Lateral::Confined), free: at(Lateral::Free) })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::solver::equilibrium::Failure;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// A model that is too large ends the study; one that fails is a row.
+    #[test]
+    fn what_does_not_fit_into_memory_is_no_failure_of_a_method() {
+        let mut scene = Scene::bundled("paper").unwrap();
+        scene.discretization.resolution = Resolution::Spacing(0.1);
+        let plan = Plan::new((&scene).into(), Extent::of_flag(true));
+        let of = |reason| ModelError::Solve(Failure { reason, reached: 0.0, detail: "3 GB missing".to_owned() });
+        let ends = |error: ModelError| {
+            let runs = AtomicUsize::new(0);
+            let probe = |_: &Experiment| {
+                runs.fetch_add(1, Ordering::Relaxed);
+                probe::stopped(100, &error)
+            };
+            (plan.with(3, 1, &|| (), &probe), runs.into_inner())
+        };
+        let (study, runs) = ends(of(FailureReason::LostStability));
+        assert_eq!((study.unwrap().distinct().len(), runs), (plan.runs(), plan.runs()));
+        let many = ModelError::TooManyNodes { nodes: 3000, limit: 2000 };
+        for (error, why) in [(of(FailureReason::TooLarge), "3 GB missing"), (many, "3000 nodes are needed")] {
+            let (refused, runs) = ends(error);
+            let refused = refused.unwrap_err();
+            let told = refused.to_string();
+            assert!(told.contains("at spacing ") && told.contains(why) && !refused.is_usage(), "{told}");
+            assert_eq!(runs, 1);
+        }
+    }
 }

@@ -33,7 +33,10 @@ pub fn read(bytes: &[u8]) -> Result<Noted<TriangleSurface>, ReadError> {
             binary(&bytes[..length as usize], vec![format!("{more} bytes after the last triangle are left out")])
         }
         Some(length) => {
-            let what = format!("{length} bytes are told of by its header, and it has {}: it is cut off", bytes.len());
+            let what = format!(
+                "{length} bytes are told of by its header, and it has {}: it is cut off, or no STL file",
+                bytes.len()
+            );
             Err(ReadError::broken(FORMAT, Place::Byte(bytes.len()), what))
         }
         None => Err(ReadError::broken(FORMAT, Place::Byte(bytes.len()), "the file is too short to be an STL file")),

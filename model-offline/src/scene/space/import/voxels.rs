@@ -79,7 +79,8 @@ impl Stored {
     }
 
     fn stopped(&self, read: usize, wrong: &std::io::Error) -> ReadError {
-        let what = format!("after {read} voxels the file ends or is damaged ({wrong})");
+        let place = if read == 0 { "within the first".to_owned() } else { format!("after {read}") };
+        let what = format!("{place} voxels the file ends or is damaged ({wrong})");
         ReadError::broken(self.format, Place::Whole, what)
     }
 }
