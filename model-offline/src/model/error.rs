@@ -155,8 +155,8 @@ pub enum ModelError {
     },
     /// A model of more nodes than are tried.
     #[error(
-        "{nodes} nodes are needed, at most {limit} are tried: take a larger tolerance or spacing or a lower level, or leave out what \
-         is much finer or thinner than the rest"
+        "{nodes} nodes are needed, at most {limit} are tried: take a larger tolerance or spacing or a lower level, quadratic elements \
+         (fem-t6, in space fem-t10) where it is another rule, or leave out what is much finer or thinner than the rest"
     )]
     TooManyNodes {
         /// Nodes it would take.

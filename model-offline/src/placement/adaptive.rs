@@ -242,4 +242,38 @@ mod tests {
         let [(loose, few), (tight, many)] = found;
         assert!(tight > loose && many > few, "{found:?}");
     }
+
+    /// A strip so long and thin that even the first nodes are too many: they are made once, and what is too many is said.
+    #[test]
+    fn what_takes_too_many_nodes_at_once_is_refused_at_once() {
+        let (middle, length) = (3000.0, 6000.0);
+        let held: Vec<String> = (0..600)
+            .map(|k| 10.0 * f64::from(k))
+            .filter(|x| (x - middle).abs() > 20.0)
+            .map(|x| format!("[[{x:?}, 0.0], [{:?}, 0.0]]", x + 1.0))
+            .collect();
+        let text = format!(
+            r#"
+            scene = {{ name = "strip", dimension = 2, units = {{ length = "mm", stress = "kPa" }} }}
+            domain.outline = [[0.0, 0.0], [{length:?}, 0.0], [{length:?}, 5.0], [0.0, 5.0]]
+            material = {{ model = "neo-hookean", lambda = 8.0, mu = 2.0 }}
+            immobile.paths = [{}]
+            needle = {{ contact = [[{:?}, 5.0], [{:?}, 5.0]], axis = [0.0, -1.0], depth = 0.5, increments = 5 }}
+            target.position = [{:?}, 2.5]
+            paddle = [{{ index = 1, segment = [[{:?}, 0.0], [{:?}, 0.0]] }}]
+            discretization = {{ tolerance = 0.02 }}
+            "#,
+            held.join(", "),
+            middle - 1.0,
+            middle + 1.0,
+            middle + 0.3,
+            middle + 1.0,
+            middle + 3.0,
+        );
+        let scene = Scene::parse(&text, "strip.toml").unwrap();
+        let refused = discretise_judged(&scene).unwrap_err();
+        assert!(matches!(refused, ModelError::TooManyNodes { .. }), "{refused}");
+        let told = refused.to_string();
+        assert!(told.contains("at most 40000") && told.contains("fem-t6"), "{told}");
+    }
 }
