@@ -36,8 +36,7 @@ const SHARP_SHARE: f64 = 0.08;
 /// What a refinement found out about its own error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ErrorEstimate {
-    /// Estimated worst relative error of the controllability measures, of paddles that may control the target (see
-    /// [`Reference::counted`]).
+    /// Estimated worst relative error of the controllability measures.
     pub controllability: f64,
     /// Estimated worst error of the small-depth target displacement, over the largest one.
     pub target_displacement: f64,
@@ -53,7 +52,7 @@ impl ErrorEstimate {
     fn of(responses: &[RestResponse], reference: &Reference, level: i32) -> Self {
         let (_, target_displacement) = reference.distance(responses);
         Self {
-            controllability: reference.worst(reference.errors(responses)),
+            controllability: reference.errors(responses).into_iter().fold(0.0, f64::max),
             target_displacement: target_displacement + reference.open_displacement(),
             reference: reference.open,
             reference_nodes: reference.nodes,
@@ -67,9 +66,8 @@ impl ErrorEstimate {
 
     /// Whose error is the worst.
     fn decided_by(&self, scene: &Scene, responses: &[RestResponse], reference: &Reference) -> DecidedBy {
-        let paddles = scene.paddles.iter().map(|paddle| vec![paddle.index]).zip(reference.errors(responses));
-        let known = paddles.zip(reference.counted()).filter(|(_, counts)| **counts).map(|(paddle, _)| paddle);
-        DecidedBy::measures(known, Some(self.target_displacement))
+        let paddles = scene.paddles.iter().map(|paddle| vec![paddle.index]);
+        DecidedBy::measures(paddles.zip(reference.errors(responses)), Some(self.target_displacement))
     }
 }
 

@@ -12,7 +12,6 @@
 //! that; a whole difference is left open, half again as much as the range, because coarse meshes need not obey.
 
 use super::fields::{Fields, Loads};
-use super::hindrance::counted;
 use super::rest::{RestResponse, for_each_paddle, response_of};
 use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::{Integration, Method, Planar};
@@ -52,8 +51,6 @@ pub(super) struct Certified {
     pub limit: Vec<RestResponse>,
     /// What that leaves open of the controllability measures, relative.
     pub open: Vec<f64>,
-    /// Whose measures have to be known, by the limit.
-    pub counted: Vec<bool>,
     /// What it leaves open of the small-depth displacements, over the largest.
     pub open_displacement: f64,
     /// The share of an amplified error of the Jacobian that reaches the length, paddle by paddle.
@@ -65,10 +62,9 @@ pub(super) struct Certified {
 }
 
 impl Certified {
-    /// The largest part that is left open, of measures that have to be known and of displacements.
+    /// The largest part that is left open.
     pub(super) fn worst_open(&self) -> f64 {
-        let known = self.open.iter().zip(&self.counted).filter(|(_, counts)| **counts);
-        known.map(|(open, _)| *open).fold(self.open_displacement, f64::max)
+        self.open.iter().copied().fold(self.open_displacement, f64::max)
     }
 }
 
@@ -182,15 +178,13 @@ impl Pair {
         let responses: Vec<_> = coarse.iter().map(|fields| response_of(&self.coarse, fields)).collect();
         let largest = responses.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
         let stiffness = self.stiffness();
-        let counts = counted(&responses);
         let mut parts = vec![0.0_f64; self.coarse.cells().len()];
         let (mut limit, mut open, mut open_displacement) = (Vec::new(), Vec::new(), 0.0_f64);
         let mut shares = Vec::new();
         for_each_paddle(&self.fine, Loads::OnTarget, |paddle, fields| {
             let found = response_of(&self.fine, fields);
             let errors = self.errors(&coarse[paddle], fields);
-            // The first is of the measure.
-            for pair in pairs(&found, largest).into_iter().skip(usize::from(!counts[paddle])) {
+            for pair in pairs(&found, largest) {
                 self.add_parts(&errors, &pair, &stiffness, &mut parts);
             }
             let before = &responses[paddle];
@@ -203,17 +197,8 @@ impl Pair {
             Ok(())
         })?;
         let nodes = self.fine.nodes();
-        let certified = Certified {
-            model: self.coarse,
-            responses,
-            counted: counted(&limit),
-            limit,
-            open,
-            open_displacement,
-            shares,
-            nodes,
-            fields: coarse,
-        };
+        let certified =
+            Certified { model: self.coarse, responses, limit, open, open_displacement, shares, nodes, fields: coarse };
         Ok((certified, parts))
     }
 

@@ -44,34 +44,10 @@ pub fn hindrance(rest: &RestResponse, scene: &Scene) -> Option<Hindrance> {
     (needed > available).then_some(Hindrance::OutOfReach { needed, available, condition })
 }
 
-/// Condition numbers so many times the limit are of no paddle that controls the target, whatever a discretization leaves.
-const CLEARLY: f64 = 2.0;
-
-/// Which paddles' measures a tolerance asks for: of those that may control the target, by its Jacobian at rest. What is all but
-/// infinite is all but unknown, and nobody needs it to three digits. All count where none controls the target.
-pub(super) fn counted(responses: &[RestResponse]) -> Vec<bool> {
-    let may_control = |rest: &RestResponse| {
-        rest.best_direction.is_some() && condition_number(&rest.jacobian) <= CLEARLY * CONDITION_LIMIT
-    };
-    let each: Vec<bool> = responses.iter().map(may_control).collect();
-    if each.contains(&true) { each } else { vec![true; each.len()] }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::{Matrix2, Vector2};
-
-    #[test]
-    fn what_clearly_controls_nothing_does_not_count_beside_what_may() {
-        let scene = Scene::bundled("paper").unwrap();
-        let [good, near, bad] = [10.0, 1.5 * CONDITION_LIMIT, 3.0 * CONDITION_LIMIT].map(|c| dragged(&scene, c));
-        let none = RestResponse { best_direction: None, controllability_measure: f64::INFINITY, ..bad };
-        let all = [bad, good, near, none];
-        assert_eq!(counted(&all), [false, true, true, false]);
-        assert_eq!(counted(&[bad, none]), [true, true]);
-        assert_eq!(counted(&[]), Vec::<bool>::new());
-    }
 
     /// A target that the needle drags along by 0.3 across its axis per depth, and a paddle that moves it by half of its own
     /// displacement across and by `1/condition` of that along.

@@ -10,9 +10,8 @@ use crate::scene::Scene;
 pub struct Reference {
     responses: Vec<RestResponse>,
     open_by_paddle: Vec<f64>,
-    counted: Vec<bool>,
     open_displacement: f64,
-    /// What it leaves open: worst relative error, of the measures that [count](Self::counted) and of the displacements.
+    /// What it leaves open: worst relative error, of all paddles' measures and of the displacements.
     pub open: f64,
     /// Nodes of the finer mesh.
     pub nodes: usize,
@@ -40,7 +39,6 @@ impl Reference {
         Self {
             responses: certified.limit.clone(),
             open_by_paddle: certified.open.clone(),
-            counted: certified.counted.clone(),
             open_displacement: certified.open_displacement,
             open: certified.worst_open(),
             nodes: certified.nodes,
@@ -54,23 +52,12 @@ impl Reference {
         off.zip(&self.open_by_paddle).map(|(off, open)| off + open).collect()
     }
 
-    /// Whose measures a tolerance is of, paddle by paddle: those of paddles that may control the target; of all where none does.
-    pub fn counted(&self) -> &[bool] {
-        &self.counted
-    }
-
-    /// Worst of what is told paddle by paddle, of the measures that count.
-    pub(super) fn worst(&self, errors: impl IntoIterator<Item = f64>) -> f64 {
-        let known = errors.into_iter().zip(&self.counted).filter(|(_, counts)| **counts);
-        known.map(|(error, _)| error).fold(0.0, f64::max)
-    }
-
-    /// Whether the errors that count are known to within a factor of three: what is left open of each is at most half the
-    /// distance, or negligible.
+    /// Whether the errors are known to within a factor of three: what is left open of each is at most half the distance, or
+    /// negligible.
     pub(super) fn tells(&self, responses: &[RestResponse], negligible: f64) -> bool {
-        let open = self.open_by_paddle.iter().zip(&self.counted);
+        let open = self.open_by_paddle.iter();
         let off = responses.iter().zip(&self.responses).map(|(found, limit)| found.measure_distance(limit));
-        open.zip(off).all(|((open, counts), off)| !counts || *open <= 0.5 * off || *open <= negligible)
+        open.zip(off).all(|(open, off)| *open <= 0.5 * off || *open <= negligible)
     }
 
     /// What the limit leaves open of the controllability measures, paddle by paddle, relative.
@@ -83,11 +70,10 @@ impl Reference {
         self.open_displacement
     }
 
-    /// Worst relative distance of the controllability measures that count, and of the small-depth target displacements over
-    /// the largest one.
+    /// Worst relative distance of the controllability measures, and of the small-depth target displacements over the
+    /// largest one.
     pub fn distance(&self, responses: &[RestResponse]) -> (f64, f64) {
-        let off = responses.iter().zip(&self.responses).map(|(found, limit)| found.measure_distance(limit));
-        (self.worst(off), distance(responses, &self.responses).1)
+        distance(responses, &self.responses)
     }
 
     /// The extrapolated responses.

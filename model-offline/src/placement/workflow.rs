@@ -94,13 +94,6 @@ impl PlacementStudy {
         Ok(StudyAccuracy { errors, cross_check: check, reference_nodes: reference.nodes })
     }
 
-    /// Indices of the paddles whose measures the error estimate leaves out; see [`Reference::counted`].
-    pub fn left_out(&self) -> Vec<u32> {
-        let counted = self.reference.as_ref().map(Reference::counted).unwrap_or_default();
-        let paddles = self.model.scene().paddles.iter().zip(counted);
-        paddles.filter(|(_, counts)| !**counts).map(|(paddle, _)| paddle.index).collect()
-    }
-
     /// Lines for people about paddles that cannot hold the target; empty when all can.
     pub fn verdict(&self) -> Vec<String> {
         verdict(&self.placement)
