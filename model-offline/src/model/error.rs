@@ -38,6 +38,19 @@ impl DecidedBy {
         Self::Measure { paddles, others }
     }
 
+    /// What else may be done where a single set of paddles is beyond a tolerance.
+    fn alternative(&self, tolerance: f64) -> &'static str {
+        match self {
+            Self::Measure { paddles, others: Some(others) } if *others <= tolerance => match paddles[..] {
+                [_] => {
+                    ", leave that paddle out of the scene (it may hardly control the target: --spacing shows its measure)"
+                }
+                _ => ", leave that pair out of the scene",
+            },
+            _ => "",
+        }
+    }
+
     /// The same where estimates are told as multiples of what they were.
     pub(crate) fn scaled(self, factor: f64) -> Self {
         match self {
@@ -166,9 +179,10 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}{}; take a larger tolerance, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
+        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}{}; take a larger tolerance{}, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
         estimate(*reached),
-        memory.as_ref().map_or_else(String::new, |missing| format!("; a finer model did not fit into memory ({missing})"))
+        memory.as_ref().map_or_else(String::new, |missing| format!("; a finer model did not fit into memory ({missing})")),
+        decided_by.alternative(*tolerance)
     )]
     ToleranceNotReached {
         /// Asked for.

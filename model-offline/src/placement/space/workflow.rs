@@ -441,7 +441,7 @@ mod tests {
         assert!(
             text.contains(
                 "0.0114 (of the measure of paddles 2 + 5; 0.002 of all else); a finer model did not fit into memory (to factorise \
-                 9 unknowns); take"
+                 9 unknowns); take a larger tolerance, leave that pair out of the scene, or"
             ),
             "{text}"
         );
