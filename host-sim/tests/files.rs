@@ -127,6 +127,39 @@ fn check_vtu(report: &Path) {
     assert!((deepest.parse::<f64>().unwrap() + 0.1).abs() < 6e-3, "the needle is 0.1 deep: {said}");
 }
 
+/// What ParaView's script asks of ParaView, from a folder that is not its own. As it runs in ParaView's window: nothing tells it
+/// which file it is but the command line. Colours are scaled by all that is to be seen; at rest that is nothing.
+fn check_script(report: &Path) {
+    const IN_A_WINDOW: &str = "import os, sys, types\n\
+         from unittest.mock import MagicMock\n\
+         names = 'GetActiveViewOrCreate OpenDataFile WarpByVector Show ColorBy GetScalarBar GetColorTransferFunction Threshold \\\n\
+         Glyph GetAnimationScene ResetCamera Render SaveScreenshot'.split()\n\
+         every, simple = MagicMock(), types.ModuleType('paraview.simple')\n\
+         for name in names: setattr(simple, name, getattr(every, name))\n\
+         opened = []\n\
+         def open_data_file(path):\n\
+         \x20   assert os.path.isfile(path), path\n\
+         \x20   opened.append(os.path.basename(path))\n\
+         every.OpenDataFile.side_effect = open_data_file\n\
+         warped = every.WarpByVector.return_value\n\
+         warped.GetDataInformation.return_value.GetBounds.return_value = (0.0, 2.0, -1.0, 0.5, 0.0, 0.0)\n\
+         sys.modules.update({'paraview': types.ModuleType('paraview'), 'paraview.simple': simple})\n\
+         script, sys.argv = sys.argv[1].partition('=')[2], ['']\n\
+         exec(open(script).read(), {})\n\
+         calls = [str(call[0]) for call in every.mock_calls]\n\
+         after = [name for name in calls[calls.index('GetAnimationScene().GoToLast'):] if 'Rescale' in name]\n\
+         assert after == ['Show().RescaleTransferFunctionToDataRangeOverTime'], calls\n\
+         assert every.Glyph.return_value.ScaleFactor == 0.08\n\
+         assert not every.SaveScreenshot.called\n\
+         print(*opened)\n";
+    let elsewhere = tempfile::tempdir().unwrap();
+    let script = format!("--script={}", report.join("inclusion-dynamic.py").display());
+    let output = Command::new("python3").args(["-c", IN_A_WINDOW, &script]).current_dir(elsewhere.path()).output();
+    let Ok(output) = output else { return println!("skipped: no python3") };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "inclusion-dynamic.pvd inclusion-dynamic-parts.pvd\n");
+}
+
 /// `jsonschema` finds the result to be what its schema says.
 fn check_schema(folder: &Path) {
     let schema = host_sim().args(["schema", "result"]).assert().success();
@@ -161,6 +194,7 @@ fn a_run_can_be_opened_elsewhere() {
     check_series(&report);
     check_mcap(folder.path(), &report, rows);
     check_vtu(&report);
+    check_script(&report);
     check_bodies(&report);
     check_schema(folder.path());
 }

@@ -206,6 +206,12 @@ fn a_vtu_in_space_has_the_body_and_all_that_is_known_in_it() {
         assert_eq!(array(&document, "cauchy_stress").len(), 9 * known);
         assert!(array(&document, "von_mises_stress").iter().all(|v| *v > 0.0));
         assert!(array(&document, "region").contains(&1.0));
+        let script = std::fs::read_to_string(folder.path().join("a.py")).unwrap();
+        let coloured =
+            format!("ColorBy(body, (\"{}\", \"von_mises_stress\"", if of_points { "POINTS" } else { "CELLS" });
+        assert!(script.contains(&coloured) && script.contains("\"a.vtu\", \"a-parts.vtu\""), "{script}");
+        let parts = std::fs::read_to_string(folder.path().join("a-parts.vtu")).unwrap();
+        assert!(array(&Document::parse(&parts).unwrap(), "part").contains(&2.0), "the target");
         // The needle's contact goes down by the depth.
         let deepest = moved.chunks(3).map(|u| u[2]).fold(0.0, f64::min);
         assert!((deepest + 0.01).abs() < 1e-3, "{deepest}");

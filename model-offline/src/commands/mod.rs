@@ -9,6 +9,7 @@ mod draw;
 mod error;
 mod fit;
 mod fit_space;
+mod for_paraview;
 mod inspect;
 mod json;
 mod man;

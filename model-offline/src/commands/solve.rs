@@ -2,6 +2,7 @@
 
 use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
+use super::for_paraview::ForParaView;
 use super::json::write_json;
 use super::solve_space::{self, SpaceArgs};
 use model_offline::model::{Body, ModelError, Pose, TissueModel};
@@ -67,9 +68,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     }
     if let Some(scene) = args.scene.read_in_space()? {
         let scene = args.discretization.over_space(scene)?;
-        let [json, vtu, svg] = [&args.json, &args.vtu, &args.svg].map(Option::as_deref);
-        let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg)];
-        check_outputs(&args.scene.files(&scene), &outputs)?;
+        check_all_outputs(&args.scene.files(&scene), args)?;
         return in_space(&scene, args);
     }
     let scene = args.discretization.over(args.scene.read_still()?)?;
@@ -108,12 +107,16 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
         ));
     }
     note_what_is_too_deep(&scene, args.depth);
-    let beside = args.vtu.as_deref().map(beside);
-    let [parts, script] = [0, 1].map(|i| ("--vtu", beside.as_ref().map(|files| files[i].as_path())));
-    let [json, vtu, svg] = [&args.json, &args.vtu, &args.svg].map(Option::as_deref);
-    let outputs = [("--json", json), ("--vtu", vtu), ("--svg", svg), parts, script];
-    check_outputs(&[&args.scene.scene], &outputs)?;
+    check_all_outputs(&[&args.scene.scene], args)?;
     solve(&scene, Held { paddle, displacement }, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
+}
+
+/// That all files that are asked for can be written and are none of these.
+fn check_all_outputs(inputs: &[&Path], args: &SolveArgs) -> Result<(), CliError> {
+    let vtu = args.vtu.as_deref().map(ForParaView::beside);
+    let [body, parts, script] = [0, 1, 2].map(|i| ("--vtu", vtu.as_ref().map(|vtu| vtu.files()[i])));
+    let [json, svg] = [&args.json, &args.svg].map(Option::as_deref);
+    Ok(check_outputs(inputs, &[("--json", json), body, ("--svg", svg), parts, script])?)
 }
 
 /// Says what would be unusual about the scene if its needle went as deep as is asked for.
@@ -349,28 +352,13 @@ fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveA
     let within = matches!(solved, Solved::Within(..));
     let state = State { coefficients: solved.coefficients(), depth: args.depth, within };
     if let Some(path) = &args.vtu {
-        write_for_paraview(model, state, path)?;
+        let scene = model.scene();
+        let units = [&scene.length_unit[..], &scene.stress_unit];
+        let shown = Shown { scene: &scene.name, units, stress: has_stress(model), ..Shown::default() };
+        ForParaView::beside(path).write(&vtu::vtu(model, state.coefficients), &vtu::parts(model, state), shown)?;
     }
     if let Some(path) = &args.svg {
         output::write_whole(path, body::svg(model, state).as_bytes())?;
     }
     Ok(())
-}
-
-/// Files beside the body's: needle, target and paddles, and the script that shows all of it.
-fn beside(vtu: &Path) -> [PathBuf; 2] {
-    let stem = vtu.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    [vtu.with_file_name(format!("{stem}-parts.vtu")), vtu.with_file_name(format!("{stem}.py"))]
-}
-
-fn write_for_paraview(model: &TissueModel, state: State<'_>, file: &Path) -> Result<(), CliError> {
-    let [parts, script] = beside(file);
-    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let scene = model.scene();
-    let (units, stress) = ([&scene.length_unit[..], &scene.stress_unit], has_stress(model));
-    let (body, beside) = (name(file), name(&parts));
-    let shown = Shown { scene: &scene.name, units, body: &body, parts: &beside, stress, in_space: None };
-    output::write_whole(file, vtu::vtu(model, state.coefficients).as_bytes())?;
-    output::write_whole(&parts, vtu::parts(model, state).as_bytes())?;
-    Ok(output::write_whole(&script, vtu::script(shown).as_bytes())?)
 }

@@ -2,13 +2,14 @@
 
 use super::common::check_displacements;
 use super::error::CliError;
+use super::for_paraview::ForParaView;
 use super::json::write_json;
 use model_offline::model::ModelError;
 use model_offline::model::space::{SpaceBody, SpaceModel};
 use model_offline::number::{in_unit, short};
 use model_offline::output;
 use model_offline::output::space_picture::{self, SpaceGeometry, SpaceState};
-use model_offline::output::vtu;
+use model_offline::output::vtu::{self, Shown, Sight};
 use model_offline::parallel;
 use model_offline::placement::space::workflow;
 use model_offline::scene::space::SpaceScene;
@@ -153,11 +154,22 @@ fn write(
         "failure": null,
     });
     write_json(args.json, &document)?;
+    draw(model, body, args)
+}
+
+/// The pictures that are asked for.
+fn draw(model: &SpaceModel, body: &SpaceBody, args: SpaceArgs<'_>) -> Result<(), CliError> {
+    let (geometry, state) = (SpaceGeometry::new(model), SpaceState::new(body, args.paddles));
     if let Some(file) = args.vtu {
-        output::write_whole(file, vtu::vtu_in_space(model, coefficients).as_bytes())?;
+        let text = vtu::vtu_in_space(model, body.equilibrium().coefficients());
+        let scene = model.scene();
+        let units = [&scene.length_unit[..], &scene.stress_unit];
+        let of_points = scene.discretization.method.integration.is_nodal();
+        let in_space = Some(Sight::new(&geometry, args.paddles));
+        let shown = Shown { scene: &scene.name, units, stress: true, of_points, in_space, ..Shown::default() };
+        ForParaView::beside(file).write(&text, &vtu::parts_in_space(&geometry, &state), shown)?;
     }
     if let Some(file) = args.svg {
-        let (geometry, state) = (SpaceGeometry::new(model), SpaceState::new(body, args.paddles));
         output::write_whole(file, space_picture::svg(&geometry, &state).as_bytes())?;
     }
     Ok(())

@@ -150,7 +150,8 @@ pub struct NeedleForcesMessage {
     pub shaft: Vec<StationState>,
 }
 
-/// A schema as Foxglove and Lichtblick read them: nothing defined elsewhere, one type for everything, and every item described.
+/// A schema as Foxglove and Lichtblick read them: nothing defined elsewhere, one type for everything, every item described, and
+/// of every object what it has, be it nothing.
 fn schema_of<T: JsonSchema>() -> schemars::Schema {
     fn plain(value: &mut serde_json::Value) {
         if let serde_json::Value::Object(object) = value {
@@ -158,6 +159,9 @@ fn schema_of<T: JsonSchema>() -> schemars::Schema {
             if let Some(serde_json::Value::Array(types)) = object.get("type") {
                 let there = types.iter().find(|name| *name != "null").cloned();
                 object.extend(there.map(|name| ("type".to_owned(), name)));
+            }
+            if object.get("type").is_some_and(|name| name == "object") {
+                object.entry("properties").or_insert_with(|| serde_json::json!({}));
             }
             object.values_mut().for_each(plain);
         } else if let serde_json::Value::Array(items) = value {
@@ -373,15 +377,16 @@ mod tests {
     use super::*;
     use serde_json::Value;
 
-    /// What their readers throw at: references, several types, items of no type (lichtblick-suite/lichtblick,
-    /// packages/mcap-support/src/parseJsonSchema.ts).
+    /// What their readers throw at: references, several types, items of no type, objects without properties
+    /// (lichtblick-suite/lichtblick, packages/mcap-support/src/parseJsonSchema.ts).
     fn assert_readable(schema: &Value, what: &str) {
         let object = schema.as_object().unwrap_or_else(|| panic!("{what}: {schema}"));
         assert!(!object.contains_key("$ref") && !object.contains_key("$defs"), "{what}: {schema}");
         match object.get("type").and_then(Value::as_str) {
             Some("object") => {
-                let properties = object.get("properties").and_then(Value::as_object).into_iter().flatten();
-                properties.for_each(|(name, schema)| assert_readable(schema, &format!("{what}.{name}")));
+                let properties = object.get("properties").and_then(Value::as_object);
+                let properties = properties.unwrap_or_else(|| panic!("{what} has no properties: {schema}"));
+                properties.iter().for_each(|(name, schema)| assert_readable(schema, &format!("{what}.{name}")));
             }
             Some("array") => assert_readable(&object["items"], &format!("{what}[]")),
             Some("boolean" | "string" | "number" | "integer") => {}

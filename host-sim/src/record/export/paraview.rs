@@ -61,6 +61,7 @@ pub fn series_in_space(
         scene: &scene.name,
         units: [&scene.length_unit, &scene.stress_unit],
         stress: true,
+        of_points: scene.discretization.method.integration.is_nodal(),
         in_space: Some(Sight::new(&geometry, paddles)),
         ..Shown::default()
     })

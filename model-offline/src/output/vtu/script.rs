@@ -16,6 +16,8 @@ pub struct Shown<'a> {
     pub parts: &'a str,
     /// Whether stress is in the body's file.
     pub stress: bool,
+    /// Whether stress and strain are of points, as nodal rules in space have them, not of cells.
+    pub of_points: bool,
     /// How a body in space is looked at; none in the plane.
     pub in_space: Option<Sight>,
 }
@@ -59,7 +61,7 @@ impl Sight {
 /// is known), with needle, target, immobile boundary and paddles: `paraview --script=FILE`, or `pvpython FILE
 /// picture.png` for a picture without a window. A body in space is cut open.
 pub fn script(shown: Shown<'_>) -> String {
-    let Shown { scene, units: [length, stress_unit], body, parts, stress, in_space } = shown;
+    let Shown { scene, units: [length, stress_unit], body, parts, stress, of_points, in_space } = shown;
     let flat = ["view.InteractionMode = \"2D\"".to_owned(), String::new(), String::new()];
     let [mode, cut, camera] = in_space.map_or(flat, |sight| sight.lines());
     // Lines are drawn over the surface that they lie in; surfaces are not.
@@ -77,7 +79,27 @@ import sys
 
 from paraview.simple import *
 
-here = os.path.dirname(os.path.abspath(__file__)) if "__file__" in globals() else os.getcwd()
+BODY, PARTS = {body}, {parts}
+
+
+def folders():
+    """Where the files may be: beside this script, of which ParaView's window does not tell where it is."""
+    if "__file__" in globals():
+        yield os.path.dirname(os.path.abspath(__file__))
+    try:
+        with open("/proc/self/cmdline", "rb") as line:
+            words = [os.fsdecode(word) for word in line.read().split(b"\0")]
+    except OSError:
+        words = []
+    for word, following in zip(words, words[1:]):
+        if word.startswith("--script"):
+            yield os.path.dirname(os.path.abspath(word.partition("=")[2] or following))
+    yield os.getcwd()
+
+
+here = next((folder for folder in folders() if os.path.exists(os.path.join(folder, BODY))), None)
+if here is None:
+    raise RuntimeError("start ParaView in the folder of this script: " + BODY + " is there")
 
 
 def deformed(name):
@@ -91,13 +113,15 @@ view = GetActiveViewOrCreate("RenderView")
 view.UseColorPaletteForBackground = 0
 view.Background = [1.0, 1.0, 1.0]
 view.OrientationAxesVisibility = 0
+if len(sys.argv) > 1:
+    # Texts keep their size beside the picture's.
+    view.ViewSize = [1280, 960]
 
-body = deformed({body})
+body = deformed(BODY)
 {cut}body = Show(body, view)
 body.Representation = "Surface With Edges"
 body.EdgeColor = [0.75, 0.75, 0.75]
-ColorBy(body, ("CELLS", {colour}, {component}))
-body.RescaleTransferFunctionToDataRange(True, False)
+ColorBy(body, ("{of}", {colour}, {component}))
 body.SetScalarBarVisibility(view, True)
 bar = GetScalarBar(GetColorTransferFunction({colour}), view)
 bar.TitleColor = bar.LabelColor = [0.0, 0.0, 0.0]
@@ -105,24 +129,43 @@ bar.Orientation = "Horizontal"
 bar.WindowLocation = "Lower Center"
 bar.ScalarBarLength = 0.5
 
-everything = deformed({parts})
-for part, colour, width in [
+everything = deformed(PARTS)
+
+
+def part(number):
+    """Of needle (1), target (2), immobile boundary (3) and paddles (4) one."""
+    one = Threshold(Input=everything, Scalars=["CELLS", "part"])
+    one.LowerThreshold = one.UpperThreshold = number
+    return one
+
+
+def painted(source, colour):
+    """The source, in one colour."""
+    shown = Show(source, view)
+    shown.ColorArrayName = [None, ""]
+    shown.AmbientColor = shown.DiffuseColor = colour
+    return shown
+
+
+for number, colour, width in [
     (1, [0.0, 0.0, 0.0], 6.0),
-    (2, [0.84, 0.37, 0.0], 20.0),
     (3, [0.4, 0.4, 0.4], 5.0),
     (4, [0.0, 0.45, 0.7], 6.0),
 ]:
-    one = Threshold(Input=everything, Scalars=["CELLS", "part"])
-    one.LowerThreshold = one.UpperThreshold = part
-    shown = Show(one, view)
-    shown.ColorArrayName = [None, ""]
-    shown.AmbientColor = shown.DiffuseColor = colour
-    shown.LineWidth = shown.PointSize = width
-    shown.RenderPointsAsSpheres = 1{representation}
+    shown = painted(part(number), colour)
+    shown.LineWidth = width{representation}
+
+everything.UpdatePipeline()
+low, high = [everything.GetDataInformation().GetBounds()[end:4:2] for end in (0, 1)]
+ball = Glyph(Input=part(2), GlyphType="Sphere", ScaleArray=["POINTS", "No scale array"], GlyphMode="All Points")
+ball.ScaleFactor = 0.04 * max(high[0] - low[0], high[1] - low[1])
+painted(ball, [0.84, 0.37, 0.0])
 
 scene = GetAnimationScene()
 scene.UpdateAnimationUsingDataTimeSteps()
 scene.GoToLast()
+# At rest there is nothing to scale colours by.
+body.RescaleTransferFunctionToDataRangeOverTime()
 {camera}ResetCamera(view)
 view.CameraParallelScale *= 1.4
 Render(view)
@@ -135,5 +178,6 @@ if len(sys.argv) > 1:
         parts = quoted(parts),
         colour = quoted(&colour),
         component = quoted(component),
+        of = if of_points { "POINTS" } else { "CELLS" },
     )
 }

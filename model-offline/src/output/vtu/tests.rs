@@ -128,8 +128,11 @@ fn parts_and_script_show_the_scene() {
     assert!(points.chunks(3).any(|x| [x[0], x[1]] == target));
     let units = [&scene.length_unit[..], &scene.stress_unit];
     let (scene, body, parts) = (&scene.name[..], "a \"b\".vtu", "p.vtu");
-    let script = script(Shown { scene, units, body, parts, stress: true, in_space: None });
-    assert!(script.contains(r#"deformed("a \"b\".vtu")"#) && script.contains(r#"displacement [\"<m>&]"#), "{script}");
+    let script = script(Shown { scene, units, body, parts, stress: true, ..Shown::default() });
+    assert!(
+        script.contains(r#"BODY, PARTS = "a \"b\".vtu", "p.vtu""#) && script.contains(r#"displacement [\"<m>&]"#),
+        "{script}"
+    );
 }
 
 /// A script of a body in space cuts it open along the needle through the target, and what is left out is on the side of the eye.
@@ -150,7 +153,9 @@ fn a_body_in_space_is_cut_open_towards_the_eye() {
         assert!(normal.dot(&towards) >= aside.norm() * 0.5f64.sqrt() - 1e-9, "{name}");
         assert!(up.dot(&towards).abs() < 1e-9, "{name}");
         let units = [&scene.length_unit[..], &scene.stress_unit];
-        let shown = Shown { scene: name, units, body: "b.vtu", parts: "p.vtu", stress: true, in_space: Some(sight) };
+        let in_space = Some(sight);
+        let shown =
+            Shown { scene: name, units, body: "b.vtu", parts: "p.vtu", stress: true, of_points: true, in_space };
         let script = script(shown);
         for line in ["ClipType.Origin = ", "ClipType.Normal = ", "CameraPosition = ", "shown.Representation = "] {
             assert_eq!(script.matches(line).count(), 1, "{line}");

@@ -4,6 +4,9 @@ use serde_json::{Map, Value, json};
 
 use super::FRAME;
 
+/// Length of the axes of frames, of the body's longest side.
+const AXES: f64 = 0.1;
+
 /// Where a scene is looked at from, as the 3D panel has it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Camera {
@@ -42,7 +45,9 @@ pub(super) fn layout(camera: &Camera, moving: &[&str], paddles: &[&str]) -> Valu
                     "targetOffset": middle, "target": [0.0, 0.0, 0.0],
                     "targetOrientation": [0.0, 0.0, 0.0, 1.0], "fovy": 45.0, "near": 1e-3 * extent, "far": 1e3 * extent,
                 },
-                "followMode": "follow-none", "followTf": FRAME, "scene": {}, "transforms": {}, "layers": {},
+                "followMode": "follow-none", "followTf": FRAME, "transforms": {}, "layers": {},
+                // Axes and names of frames are as large as a metre, whatever the body.
+                "scene": {"transforms": {"showLabel": false, "axisScale": AXES * extent}},
                 "topics": topics,
             },
             "Plot!error": plot("Orthogonal error", &["/truth.orthogonal_error"]),

@@ -14,7 +14,7 @@ use crate::world::truth::Truth;
 const LINE: f64 = 2.0;
 const TOOL: f64 = 5.0;
 /// How much is seen, over the body's longer side.
-const AROUND: f64 = 1.4;
+const AROUND: f64 = 1.8;
 
 /// A planar scene with one of its paddles.
 #[derive(Clone, Debug)]
