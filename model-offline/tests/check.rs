@@ -93,7 +93,7 @@ fn nothing_is_unusual_in_the_bundled_scenes_and_in_the_block() {
 fn every_warning_is_given_with_its_numbers_where_it_is_due() {
     let tip = |length: f64| format!("{SHAFT}kinetic_friction = 0.2\ntip_length = {length}\n");
     type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
-    let cases: [Case<'_>; 21] = [
+    let cases: [Case<'_>; 23] = [
         (&[(AXIS, "axis = [0.0, 1.0]")], &["points out of the body: 180°", "turn the axis round"]),
         (&[(AXIS, "axis = [0.5, 1.0]")], &["points out of the body: 153°"]),
         (&[(AXIS, "axis = [1.0, -0.1]")], &["along the surface: 5.7°", "turn the axis inwards"]),
@@ -112,6 +112,15 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
             &["contact is shorter than the node spacing: 1 mm of 5 mm"],
         ),
         (&[(TARGET, "position = [50.0, 2.0]")], &["the target is nearer to the boundary", "2 mm of 5 mm"]),
+        (
+            // Nodes are as fine there as the tolerance takes; what is held stays held.
+            &[(TARGET, "position = [50.0, 0.5]"), ("spacing = 5.0", "tolerance = 0.05")],
+            &["the target is next to the immobile part, 0.5 mm from it", "hardly any paddle"],
+        ),
+        (
+            &[(LAST_PADDLE, "segment = [[60.1, 60.0], [80.0, 60.0]]")],
+            &["paddle 7 is 0.1 mm beside the needle's contact, which is pushed by 20 mm", "may stop at once"],
+        ),
         (
             &[(INCLUSION, "[[60.0, -10.0], [80.0, -10.0], [80.0, 30.0], [60.0, 30.0]]")],
             &["inclusion 1 is partly outside the body: 25 % of its area"],

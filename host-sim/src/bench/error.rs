@@ -7,7 +7,7 @@ use firmware::contract::TableError;
 use mcap::McapError;
 use model_offline::model::ModelError;
 use model_offline::output::OutputRefused;
-use model_offline::scene::{SceneError, TableScalar, UnknownLength};
+use model_offline::scene::{SceneError, TableScalar, TissueVariant, UnknownLength};
 use model_offline::table::TableBuildError;
 
 use super::board::measure::MeasureError;
@@ -127,6 +127,17 @@ pub enum SimError {
     /// The tissue cannot be modelled.
     #[error("the tissue cannot be modelled")]
     Model(#[from] ModelError),
+    /// One tissue of a scene cannot be modelled.
+    #[error("the {tissue} tissue cannot be modelled")]
+    Tissue {
+        /// Which.
+        tissue: TissueVariant,
+        /// What may be asked for instead, if anything.
+        #[help]
+        instead: Option<String>,
+        /// Why.
+        source: Box<ModelError>,
+    },
     /// The table cannot be computed.
     #[error("the controller table cannot be computed")]
     TableBuild(#[from] TableBuildError),
@@ -199,6 +210,11 @@ impl From<SceneError> for SimError {
 }
 
 impl SimError {
+    /// That a tissue cannot be modelled, and what may be asked for instead.
+    pub(super) fn of_tissue(tissue: TissueVariant, instead: Option<String>, source: ModelError) -> Self {
+        Self::Tissue { tissue, instead, source: Box::new(source) }
+    }
+
     /// Exit code of the process: 2 for bad input or usage, 1 for everything else.
     pub fn exit_code(&self) -> u8 {
         let is_input = match self {
@@ -216,6 +232,7 @@ impl SimError {
             | Self::TableUnits { .. }
             | Self::NotARun { .. } => true,
             Self::Model(error) => error.is_usage(),
+            Self::Tissue { source, .. } => source.is_usage(),
             Self::File(error) => is_unreadable(error),
             Self::Record(RecordError::File(error)) => is_unreadable(error),
             Self::Record(RecordError::Recording { .. } | RecordError::Table { .. }) => true,

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use firmware::scalar::ScalarKind;
 use firmware::{Faults, Mode};
+use model_offline::model::ModelError;
 use model_offline::output::space_picture::SpaceGeometry;
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
@@ -422,13 +423,17 @@ pub fn compare(
 
 /// The homogeneous tissue of a scene, and the one with its inclusions where there are any, with what is best on them.
 fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>), SimError> {
-    let with = parallel::within(threads, || insertion_model(scene))?;
-    let study = |model: InsertionModel| -> Result<Tissue, SimError> {
+    let with = parallel::within(threads, || insertion_model(scene));
+    let with = with.map_err(|source| SimError::of_tissue(scene.tissue(), None, source))?;
+    let study = |model: InsertionModel| {
         let placement = place_in_space(&model, threads, &|| ())?;
         Ok(Tissue { optimum: placement.optimum, model })
     };
-    let homogeneous = study(parallel::within(threads, || with.without_inclusions())?)?;
-    let inclusion = if scene.inclusions.is_empty() { None } else { Some(study(with)?) };
+    let of = |tissue| move |source: ModelError| SimError::of_tissue(tissue, None, source);
+    let homogeneous = parallel::within(threads, || with.without_inclusions()).and_then(study);
+    let homogeneous = homogeneous.map_err(of(TissueVariant::Homogeneous))?;
+    let inclusion = (!scene.inclusions.is_empty()).then(|| study(with)).transpose();
+    let inclusion = inclusion.map_err(of(TissueVariant::Inclusion))?;
     Ok((homogeneous, inclusion))
 }
 

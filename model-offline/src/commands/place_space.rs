@@ -145,8 +145,8 @@ fn summary(study: &SpaceStudy) -> String {
 
 /// Says so where even the best fixture moves the target more than no paddle does.
 fn harms(what: &str, best: &SpaceAnswer, no_paddle: &SpaceStatic) -> Option<String> {
-    let factor = best.static_study.max_orthogonal / no_paddle.max_orthogonal;
-    (factor > 1.0 && factor.is_finite()).then(|| {
+    let factor = best.static_study.over(no_paddle)?;
+    (factor > 1.0).then(|| {
         format!("no static {what} helps: the best moves the target {factor:.2} times as far as no paddle does\n")
     })
 }
@@ -157,10 +157,15 @@ fn second_pays(study: &SpaceStudy) -> Option<String> {
     let least = |measures: &mut dyn Iterator<Item = f64>| measures.min_by(f64::total_cmp).filter(|m| m.is_finite());
     let single = least(&mut placement.paddles.iter().map(|p| p.answer.controllability_measure))?;
     let pair = least(&mut placement.pairs.iter().map(|p| p.answer.controllability_measure))?;
-    Some(format!(
-        "a second paddle shortens the way for the worst direction by {:.1} % ({single:.3} to {pair:.3})",
-        100.0 * (1.0 - pair / single)
-    ))
+    let way = "the way for the worst direction";
+    let gain = 100.0 * (1.0 - pair / single);
+    // What would be told as nothing is nothing.
+    Some(match format!("{gain:.1}") {
+        told if gain > 0.0 && told != "0.0" => {
+            format!("a second paddle shortens {way} by {told} % ({single:.3} to {pair:.3})")
+        }
+        _ => format!("a second paddle does not shorten {way} ({single:.3} to {pair:.3})"),
+    })
 }
 
 fn named(paddles: &[u32]) -> String {
@@ -176,5 +181,7 @@ fn fixture(study: &SpaceStatic, digits: usize) -> String {
         .failure
         .as_ref()
         .map_or(String::new(), |f| format!("  stopped at depth {}: {}", length(f.depth), f.reason));
-    format!("{:.digits$}{stopped}", study.max_orthogonal)
+    // Of an insertion that stopped at once nothing is known.
+    let largest = study.depth.last().map_or(NONE.to_owned(), |_| format!("{:.digits$}", study.max_orthogonal));
+    format!("{largest}{stopped}")
 }

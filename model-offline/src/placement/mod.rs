@@ -9,6 +9,7 @@ pub mod controllability;
 pub mod cross_check;
 mod curvature;
 mod fields;
+mod fixture;
 mod goal_oriented;
 pub mod hindrance;
 pub mod reference;

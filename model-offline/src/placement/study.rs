@@ -2,6 +2,7 @@
 
 use super::adaptive::profile_model;
 use super::controllability::rows;
+use super::fixture::{self, Fixture};
 use super::hindrance::{Hindrance, hindrance};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::Resolution;
@@ -324,27 +325,22 @@ impl StaticStudy {
     /// Largest orthogonal displacement over that of another insertion, to the depth that both reached; none where they
     /// have no depth in common, or the other one does not move the target.
     pub fn over(&self, other: &Self) -> Option<f64> {
-        let common = self.depth.len().min(other.depth.len());
-        let largest = |study: &Self| study.orthogonal[..common].iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let (own, reference) = (largest(self), largest(other));
-        (reference > 0.0).then_some(own / reference)
+        fixture::over(&self.orthogonal, &other.orthogonal)
     }
 }
 
-/// The best paddles. A static paddle that did not reach the depth ranks below every one that did. When none did, they are
-/// compared over the depth that all of them reached, or by their small-depth limit when there is none.
+/// The best paddles: as a [fixture](fixture::best), and to control the target.
 fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
-    let complete = paddles.iter().any(|p| p.static_study.failure.is_none());
-    let common = paddles.iter().map(|p| p.static_study.depth.len()).min().unwrap_or(0);
-    let key = |p: &PaddleResult| match &p.static_study.failure {
-        None => p.static_study.max_orthogonal,
-        Some(_) if complete => f64::INFINITY,
-        Some(_) if common > 0 => p.static_study.orthogonal[..common].iter().fold(0.0, |m, x| f64::max(m, x.abs())),
-        Some(_) => Vector2::from(p.target_per_depth).dot(&normal).abs(),
-    };
-    let static_paddle = paddles.iter().min_by(|a, b| key(a).total_cmp(&key(b)));
+    let fixtures: Vec<Fixture<'_>> = paddles
+        .iter()
+        .map(|p| Fixture {
+            stopped: p.static_study.failure.is_some(),
+            orthogonal: &p.static_study.orthogonal,
+            per_depth: Vector2::from(p.target_per_depth).dot(&normal),
+        })
+        .collect();
     Optimum {
-        static_paddle: static_paddle.map_or(0, |p| p.index),
+        static_paddle: fixture::best(&fixtures).map_or(0, |place| paddles[place].index),
         dynamic_paddle: least(paddles.iter().map(|p| (p.index, p.controllability_measure))),
     }
 }

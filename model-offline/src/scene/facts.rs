@@ -196,7 +196,8 @@ impl Scene {
         }
     }
 
-    fn paddle_facts(&self, place: usize) -> PaddleFacts {
+    /// Where a paddle is, by its place in the scene's list.
+    pub(super) fn paddle_facts(&self, place: usize) -> PaddleFacts {
         let paddle = &self.paddles[place];
         let to = |path: &[Point2]| polyline_to_segment(path, paddle.segment);
         PaddleFacts {

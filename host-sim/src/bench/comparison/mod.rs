@@ -286,12 +286,20 @@ impl<'p> Comparison<'p> {
             let step = || self.progress.step();
             let options = PlacementOptions { threads: self.options.threads, progress: &step, newton: None };
             let simulated = tissue.of(&self.scene);
-            let study = PlacementStudy::run(&simulated.without_a_past(), &options)?;
+            let failed = |source| SimError::of_tissue(tissue, self.other_alone(tissue), source);
+            let study = PlacementStudy::run(&simulated.without_a_past(), &options).map_err(failed)?;
             signals::check()?;
-            let world = simulated.has_a_past().then(|| discretise(&simulated)).transpose()?.map(|(model, _)| model);
+            let world = simulated.has_a_past().then(|| discretise(&simulated)).transpose().map_err(failed)?;
+            let world = world.map(|(model, _)| model);
             self.studied.push(Studied { tissue, study, world, reductions: Reductions::default() });
         }
         Ok(())
+    }
+
+    /// How the other tissue would be simulated without this one, where both are asked for.
+    fn other_alone(&self, tissue: TissueVariant) -> Option<String> {
+        let alone = self.cases.iter().find(|case| ![case.tissue, case.table_tissue].contains(&tissue))?;
+        Some(format!("--tissue {} is simulated without it", alone.tissue))
     }
 
     fn studied(&self, tissue: TissueVariant) -> &Studied {

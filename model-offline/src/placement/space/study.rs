@@ -6,6 +6,7 @@ use super::rest::{SpaceResponse, all_sets};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
 use crate::parallel;
+use crate::placement::fixture::{self, Fixture};
 use crate::placement::study::StaticFailure;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::{DMatrix, Vector3};
@@ -28,6 +29,14 @@ pub struct SpaceStatic {
     pub reached_depth: f64,
     /// Why it stopped there; none when it reached the full depth.
     pub failure: Option<StaticFailure>,
+}
+
+impl SpaceStatic {
+    /// Largest orthogonal displacement over that of another insertion, to the depth that both reached; none where they
+    /// have no depth in common, or the other one does not move the target.
+    pub fn over(&self, other: &Self) -> Option<f64> {
+        fixture::over(&self.orthogonal, &other.orthogonal)
+    }
 }
 
 /// What paddles do together, one or two of them.
@@ -145,14 +154,15 @@ pub fn place_in_space(
         .zip(answers)
         .map(|(pair, answer)| SpacePairResult { paddles: pair.map(|p| scene.paddles[p].index), answer })
         .collect();
-    let optimum_single = best(paddles.iter().map(|p| (vec![p.index], &p.answer)));
+    let axis = scene.needle.axis;
+    let optimum_single = best(paddles.iter().map(|p| (vec![p.index], &p.answer)), axis);
     // Two paddles cannot be in one place.
     let apart = |pair: &[usize; 2]| !model.overlapping().contains(pair);
     let apart: Vec<&SpacePairResult> =
         scene.pairs.iter().zip(&pairs).filter(|(pair, _)| apart(pair)).map(|(_, result)| result).collect();
     let optimum = match apart.is_empty() {
         true => optimum_single.clone(),
-        false => best(apart.iter().map(|p| (p.paddles.to_vec(), &p.answer))),
+        false => best(apart.iter().map(|p| (p.paddles.to_vec(), &p.answer)), axis),
     };
     let per_depth = rest.last().map_or_else(Vector3::zeros, |r| r.target_per_depth);
     let no_paddle = SpaceNoPaddle { target_per_depth: per_depth.into(), static_study: without };
@@ -213,24 +223,19 @@ fn follow(
     Ok(study)
 }
 
-/// The best of some. Those that did not reach the depth rank below every one that did; where none did, they are compared over
-/// the depth that all reached, or at small depths.
-fn best<'a>(candidates: impl Iterator<Item = (Vec<u32>, &'a SpaceAnswer)>) -> SpaceOptimum {
+/// The best of some: as a [fixture](fixture::best), and to control the target.
+fn best<'a>(candidates: impl Iterator<Item = (Vec<u32>, &'a SpaceAnswer)>, axis: Vector3<f64>) -> SpaceOptimum {
     let all: Vec<(Vec<u32>, &SpaceAnswer)> = candidates.collect();
-    let studies = || all.iter().map(|(_, answer)| &answer.static_study);
-    let complete = studies().any(|study| study.failure.is_none());
-    let common = studies().map(|study| study.depth.len()).min().unwrap_or(0);
-    let key = |answer: &SpaceAnswer| {
-        let study = &answer.static_study;
-        match &study.failure {
-            None => study.max_orthogonal,
-            Some(_) if complete => f64::INFINITY,
-            _ => study.orthogonal[..common].iter().fold(0.0, |m, x| f64::max(m, *x)),
-        }
-    };
-    let fixture = all.iter().min_by(|a, b| key(a.1).total_cmp(&key(b.1)));
+    let fixtures: Vec<Fixture<'_>> = all
+        .iter()
+        .map(|(_, answer)| Fixture {
+            stopped: answer.static_study.failure.is_some(),
+            orthogonal: &answer.static_study.orthogonal,
+            per_depth: axis.cross(&Vector3::from(answer.target_per_depth)).norm(),
+        })
+        .collect();
     let controlling = all.iter().filter(|(_, answer)| answer.controllability_measure.is_finite());
     let dynamic = controlling.min_by(|a, b| a.1.controllability_measure.total_cmp(&b.1.controllability_measure));
     let named = |found: Option<&(Vec<u32>, &SpaceAnswer)>| found.map_or_else(Vec::new, |(name, _)| name.clone());
-    SpaceOptimum { fixture: named(fixture), dynamic: named(dynamic) }
+    SpaceOptimum { fixture: named(fixture::best(&fixtures).map(|place| &all[place])), dynamic: named(dynamic) }
 }

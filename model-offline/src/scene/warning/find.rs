@@ -25,6 +25,11 @@ const SHARED_EDGE: f64 = 1e-3;
 const MOST_OVERLAPS: usize = 100;
 /// Part of a paddle's length below which an overlap with another is hardly meant: two places that share more are alternatives.
 const SHORT_OVERLAP: f64 = 0.02;
+/// Part of the depth that a paddle is away from the needle's contact at least: at a depth of 5.8 in ten increments, `fem-t6` stopped
+/// at once at gaps of 0.03 and less.
+const BESIDE_NEEDLE: f64 = 0.01;
+/// Part of the body's size within which what cannot move holds a target as well.
+const HELD: f64 = 0.01;
 
 impl Scene {
     /// What is allowed in the scene and seldom meant, in the order of the file.
@@ -229,6 +234,11 @@ impl Rules<'_> {
     }
 
     fn target(&self) -> Option<SceneWarning> {
+        let to_immobile = self.scene.immobile.iter().map(|path| distance_to_polyline(self.scene.target, path));
+        let from_immobile = to_immobile.fold(f64::INFINITY, f64::min);
+        if self.spacing.is_none() && from_immobile < HELD * self.size {
+            return Some(SceneWarning::TargetNearImmobile { distance: from_immobile });
+        }
         let distance = self.scene.outline.distance_to_boundary(self.scene.target);
         self.longer_spacing(distance).map(|spacing| SceneWarning::TargetNearBoundary { distance, spacing })
     }
@@ -240,6 +250,10 @@ impl Rules<'_> {
             let length = (b - a).norm();
             if let Some(spacing) = self.longer_spacing(length) {
                 found.push(SceneWarning::PaddleShort { index: paddle.index, length, spacing });
+            }
+            let (gap, depth) = (self.scene.paddle_facts(i).from_contact, self.scene.needle.depth);
+            if self.scene.needle.shaft.is_none() && gap < BESIDE_NEEDLE * depth {
+                found.push(SceneWarning::PaddleBesideNeedle { index: paddle.index, gap, depth });
             }
             if let Some(at) = self.in_the_way([a, b]) {
                 found.push(SceneWarning::PaddleInTheWay { index: paddle.index, at });

@@ -88,6 +88,11 @@ pub enum SceneWarning {
         /// Node spacing.
         spacing: f64,
     },
+    /// The target is next to what cannot move.
+    TargetNearImmobile {
+        /// Its distance from there.
+        distance: f64,
+    },
     /// An inclusion reaches out of the body.
     InclusionPartlyOutside {
         /// Which.
@@ -139,6 +144,15 @@ pub enum SceneWarning {
         length: f64,
         /// Node spacing.
         spacing: f64,
+    },
+    /// Next to nothing is between a paddle and the needle's contact.
+    PaddleBesideNeedle {
+        /// Its index.
+        index: u32,
+        /// Distance between them.
+        gap: f64,
+        /// How far the contact is pushed.
+        depth: f64,
     },
     /// The needle's way leads through a paddle.
     PaddleInTheWay {
@@ -200,6 +214,9 @@ impl SceneWarning {
                 long(distance),
                 long(spacing)
             ),
+            Self::TargetNearImmobile { distance } => {
+                format!("the target is next to the immobile part, {} from it", long(distance))
+            }
             Self::InclusionPartlyOutside { inclusion, outside } => {
                 format!("inclusion {inclusion} is partly outside the body: {} of its area", percent(outside))
             }
@@ -223,6 +240,11 @@ impl SceneWarning {
             Self::PaddleShort { index, length, spacing } => {
                 format!("paddle {index} is shorter than the node spacing: {} of {}", long(length), long(spacing))
             }
+            Self::PaddleBesideNeedle { index, gap, depth } => format!(
+                "paddle {index} is {} beside the needle's contact, which is pushed by {}",
+                long(gap),
+                long(depth)
+            ),
             Self::PaddleInTheWay { index, at } if at < 0.0 => {
                 format!("paddle {index} is in the needle's way, {} before its entry", long(-at))
             }
@@ -248,6 +270,7 @@ impl SceneWarning {
                 "give a longer tip_length, or a spacing in place of the tolerance: on fine nodes there may be no equilibrium"
             }
             Self::TargetNearBoundary { .. } => "take a smaller spacing, or move the target inwards",
+            Self::TargetNearImmobile { .. } => "move it away: hardly any paddle moves what is held so near",
             Self::InclusionPartlyOutside { .. } => "the part outside does nothing: move it, or cut it off",
             Self::InclusionNarrow { .. } => {
                 "take a smaller spacing, or a tolerance: nodes so far apart hardly know of it"
@@ -259,6 +282,9 @@ impl SceneWarning {
             }
             Self::PaddlesOverlap { .. } => {
                 "let one end where the other begins: an overlap so short takes elements as short, and insertions do not get far on them"
+            }
+            Self::PaddleBesideNeedle { .. } => {
+                "move it away: elements between them are as small, and insertions with this paddle may stop at once"
             }
             Self::PaddleInTheWay { .. } => "move the paddle, or the needle",
         }

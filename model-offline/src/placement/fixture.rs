@@ -1,0 +1,69 @@
+//! Which static paddles are best, where insertions may stop before the full depth.
+
+use std::cmp::Ordering;
+
+/// What is known of an insertion with paddles that do not move.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fixture<'a> {
+    /// Whether it stopped before the full depth.
+    pub stopped: bool,
+    /// Orthogonal displacement of the target at every increment that it reached, length.
+    pub orthogonal: &'a [f64],
+    /// The same per depth, at the beginning.
+    pub per_depth: f64,
+}
+
+/// The largest of some displacements.
+fn largest(displacements: &[f64]) -> f64 {
+    displacements.iter().fold(0.0, |most, u| f64::max(most, u.abs()))
+}
+
+/// Place of the best: of those that reached the full depth the one with the smallest largest displacement. Where none did, of those
+/// that went some way, over the depth that all of these reached; where none did even that, by how they begin. None of none.
+pub(super) fn best(fixtures: &[Fixture<'_>]) -> Option<usize> {
+    let began = |fixture: &Fixture<'_>| !fixture.orthogonal.is_empty();
+    let common = fixtures.iter().filter(|f| began(f)).map(|f| f.orthogonal.len()).min().unwrap_or(0);
+    let key = |fixture: &Fixture<'_>| match fixture {
+        Fixture { stopped: false, orthogonal, .. } => (0, largest(orthogonal)),
+        Fixture { orthogonal, .. } if began(fixture) => (1, largest(&orthogonal[..common])),
+        Fixture { per_depth, .. } => (2, per_depth.abs()),
+    };
+    let order = |a: (u8, f64), b: (u8, f64)| -> Ordering { a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)) };
+    (0..fixtures.len()).min_by(|&a, &b| order(key(&fixtures[a]), key(&fixtures[b])))
+}
+
+/// Largest displacement over that of another insertion, to the depth that both reached; none where they have no depth in common, or
+/// the other one does not move the target.
+pub(super) fn over(own: &[f64], other: &[f64]) -> Option<f64> {
+    let common = own.len().min(other.len());
+    let reference = largest(&other[..common]);
+    (reference > 0.0).then(|| largest(&own[..common]) / reference)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NOWHERE: Fixture<'_> = Fixture { stopped: true, orthogonal: &[], per_depth: 0.01 };
+
+    fn stopped(orthogonal: &[f64]) -> Fixture<'_> {
+        Fixture { stopped: true, orthogonal, per_depth: 0.0 }
+    }
+
+    #[test]
+    fn what_reached_the_depth_comes_before_what_stopped_and_that_before_what_never_began() {
+        let whole = |orthogonal| Fixture { stopped: false, orthogonal, per_depth: 0.0 };
+        assert_eq!(best(&[NOWHERE, stopped(&[0.1]), whole(&[-0.2, 0.3]), whole(&[0.1, -0.4])]), Some(2));
+        assert_eq!(best(&[NOWHERE, stopped(&[0.2, 0.3, 0.9]), stopped(&[-0.3, 0.3])]), Some(1), "over two increments");
+        assert_eq!(best(&[stopped(&[0.4]), NOWHERE]), Some(0), "nothing is known of what never began");
+        assert_eq!(best(&[Fixture { per_depth: -0.02, ..NOWHERE }, NOWHERE]), Some(1), "by how they begin");
+        assert_eq!(best(&[]), None);
+    }
+
+    #[test]
+    fn insertions_are_compared_over_the_depth_that_both_reached() {
+        assert_eq!(over(&[0.25, -0.75], &[0.5, 0.5, 5.0]), Some(1.5));
+        assert_eq!(over(&[0.1], &[]), None);
+        assert_eq!(over(&[0.1], &[0.0, 1.0]), None);
+    }
+}
