@@ -88,6 +88,78 @@ fn mistakes_of_a_first_day() {
     assert_eq!(entries(folder.path()), before, "nothing was written");
 }
 
+/// A body whose third paddle all but misses the target, more so without its inclusions: the tolerance is beyond what is tried there.
+const HARD_WITHOUT_INCLUSIONS: &str = r#"
+[scene]
+name = "concave"
+dimension = 2
+units = { length = "m", stress = "kPa" }
+
+[domain]
+outline = [[0, 0], [0.12, 0], [0.12, 0.05], [0.1, 0.08], [0.075, 0.08], [0.06, 0.055], [0.045, 0.08], [0.02, 0.08], [0, 0.05]]
+
+[material]
+model = "neo-hookean"
+lambda = 4.0
+mu = 1.0
+
+[[inclusion]]
+outline = [[0.03, 0.02], [0.05, 0.02], [0.05, 0.04], [0.03, 0.04]]
+stiffness = 8.0
+
+[[inclusion]]
+outline = [[0.105, 0.02], [0.13, 0.02], [0.13, 0.04], [0.105, 0.04]]
+stiffness = 5.0
+
+[immobile]
+paths = [[[0, 0], [0.12, 0]]]
+
+[needle]
+contact = [[0.095, 0.08], [0.08, 0.08]]
+axis = [0.0, -1.0]
+depth = 0.006
+increments = 10
+
+[target]
+position = [0.088, 0.04]
+
+[[paddle]]
+index = 2
+segment = [[0.12, 0.015], [0.12, 0.04]]
+
+[[paddle]]
+index = 3
+segment = [[0.025, 0.08], [0.04, 0.08]]
+
+[discretization]
+tolerance = 0.02
+integration = "fem-t6"
+"#;
+
+/// A run on two tissues says which of them it cannot have, and how it can have the other.
+#[test]
+fn a_tissue_that_cannot_be_modelled_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("concave.toml"), HARD_WITHOUT_INCLUSIONS).unwrap();
+    let run = |more: &[&str]| {
+        let words = "run --scene concave.toml --mode lockstep --insertion-time 0.1 --quiet --out";
+        let mut run = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+        run.args(words.split(' ')).arg("report").args(more).current_dir(folder.path()).assert()
+    };
+    let refused = run(&[]).code(1);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert!(said.contains("the homogeneous tissue cannot be modelled") && said.contains("paddle 3"), "{said}");
+    assert!(said.contains("--tissue inclusion is simulated without it"), "{said}");
+    assert!(!folder.path().join("report").exists());
+    let alone = run(&["--tissue", "homogeneous"]).code(1);
+    let said = String::from_utf8_lossy(&alone.get_output().stderr).into_owned();
+    assert!(
+        said.contains("the homogeneous tissue cannot be modelled") && !said.contains("--tissue inclusion"),
+        "{said}"
+    );
+    run(&["--tissue", "inclusion"]).success();
+}
+
 fn entries(folder: &std::path::Path) -> Vec<std::path::PathBuf> {
     let mut found: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     found.sort();

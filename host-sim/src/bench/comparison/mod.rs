@@ -336,7 +336,8 @@ impl<'p> Comparison<'p> {
 
     fn compute_table(&self, tissue: TissueVariant) -> Result<EncodedTable, SimError> {
         let studied = self.studied(tissue);
-        let paddle = studied.study.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
+        let none = || SimError::of_tissue(tissue, self.other_alone(tissue), ModelError::NoPaddleControls);
+        let paddle = studied.study.placement.optimum.dynamic_paddle.ok_or_else(none)?;
         let needle_speed = self.simulation.needle_speed();
         let model = if self.options.table_knows_the_world { studied.plant() } else { &studied.study.model };
         let table = build(model, paddle, &TableOptions { needle_speed, ..TableOptions::default() })?;

@@ -3,6 +3,9 @@
 use super::in_unit;
 use crate::output::space_picture::{SpaceGeometry, planes, seen_from};
 
+/// The script, with names between `@` where something is put in.
+const TEMPLATE: &str = include_str!("script.py.in");
+
 /// What a script shows.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Shown<'a> {
@@ -71,113 +74,26 @@ pub fn script(shown: Shown<'_>) -> String {
         if stress { (in_unit("von_mises_stress", stress_unit), "") } else { ("principal_strain".to_owned(), "X") };
     // What JSON takes for a string Python does, too.
     let quoted = |text: &str| serde_json::json!(text).to_string();
-    format!(
-        r#"# {name}: the deformed body with needle (black), target (orange), immobile boundary (grey) and paddles (blue).
-# In ParaView: paraview --script=THIS. Without a window: pvpython THIS picture.png
-import os
-import sys
+    fill(&[
+        ("name", &scene.replace(['\n', '\r'], " ")),
+        ("displacement", &quoted(&displacement)),
+        ("body", &quoted(body)),
+        ("parts", &quoted(parts)),
+        ("colour", &quoted(&colour)),
+        ("component", &quoted(component)),
+        ("of", if of_points { "POINTS" } else { "CELLS" }),
+        ("mode", &mode),
+        ("cut", &cut),
+        ("camera", &camera),
+        ("representation", representation),
+    ])
+}
 
-from paraview.simple import *
-
-BODY, PARTS = {body}, {parts}
-
-
-def folders():
-    """Where the files may be: beside this script, of which ParaView's window does not tell where it is."""
-    if "__file__" in globals():
-        yield os.path.dirname(os.path.abspath(__file__))
-    try:
-        with open("/proc/self/cmdline", "rb") as line:
-            words = [os.fsdecode(word) for word in line.read().split(b"\0")]
-    except OSError:
-        words = []
-    for word, following in zip(words, words[1:]):
-        if word.startswith("--script"):
-            yield os.path.dirname(os.path.abspath(word.partition("=")[2] or following))
-    yield os.getcwd()
-
-
-here = next((folder for folder in folders() if os.path.exists(os.path.join(folder, BODY))), None)
-if here is None:
-    raise RuntimeError("start ParaView in the folder of this script: " + BODY + " is there")
-
-
-def deformed(name):
-    """The file, every point where it is now."""
-    source = OpenDataFile(os.path.join(here, name))
-    return WarpByVector(Input=source, Vectors=["POINTS", {displacement}])
-
-
-view = GetActiveViewOrCreate("RenderView")
-{mode}
-view.UseColorPaletteForBackground = 0
-view.Background = [1.0, 1.0, 1.0]
-view.OrientationAxesVisibility = 0
-if len(sys.argv) > 1:
-    # Texts keep their size beside the picture's.
-    view.ViewSize = [1280, 960]
-
-body = deformed(BODY)
-{cut}body = Show(body, view)
-body.Representation = "Surface With Edges"
-body.EdgeColor = [0.75, 0.75, 0.75]
-ColorBy(body, ("{of}", {colour}, {component}))
-body.SetScalarBarVisibility(view, True)
-bar = GetScalarBar(GetColorTransferFunction({colour}), view)
-bar.TitleColor = bar.LabelColor = [0.0, 0.0, 0.0]
-bar.Orientation = "Horizontal"
-bar.WindowLocation = "Lower Center"
-bar.ScalarBarLength = 0.5
-
-everything = deformed(PARTS)
-
-
-def part(number):
-    """Of needle (1), target (2), immobile boundary (3) and paddles (4) one."""
-    one = Threshold(Input=everything, Scalars=["CELLS", "part"])
-    one.LowerThreshold = one.UpperThreshold = number
-    return one
-
-
-def painted(source, colour):
-    """The source, in one colour."""
-    shown = Show(source, view)
-    shown.ColorArrayName = [None, ""]
-    shown.AmbientColor = shown.DiffuseColor = colour
-    return shown
-
-
-for number, colour, width in [
-    (1, [0.0, 0.0, 0.0], 6.0),
-    (3, [0.4, 0.4, 0.4], 5.0),
-    (4, [0.0, 0.45, 0.7], 6.0),
-]:
-    shown = painted(part(number), colour)
-    shown.LineWidth = width{representation}
-
-everything.UpdatePipeline()
-low, high = [everything.GetDataInformation().GetBounds()[end:4:2] for end in (0, 1)]
-ball = Glyph(Input=part(2), GlyphType="Sphere", ScaleArray=["POINTS", "No scale array"], GlyphMode="All Points")
-ball.ScaleFactor = 0.04 * max(high[0] - low[0], high[1] - low[1])
-painted(ball, [0.84, 0.37, 0.0])
-
-scene = GetAnimationScene()
-scene.UpdateAnimationUsingDataTimeSteps()
-scene.GoToLast()
-# At rest there is nothing to scale colours by.
-body.RescaleTransferFunctionToDataRangeOverTime()
-{camera}ResetCamera(view)
-view.CameraParallelScale *= 1.4
-Render(view)
-if len(sys.argv) > 1:
-    SaveScreenshot(sys.argv[1], view, ImageResolution=[1280, 960])
-"#,
-        name = scene.replace(['\n', '\r'], " "),
-        displacement = quoted(&displacement),
-        body = quoted(body),
-        parts = quoted(parts),
-        colour = quoted(&colour),
-        component = quoted(component),
-        of = if of_points { "POINTS" } else { "CELLS" },
-    )
+/// The script with these in the place of their names. What is put in is not looked at again, whatever it contains.
+fn fill(named: &[(&str, &str)]) -> String {
+    let pieces = TEMPLATE.split('@').enumerate().map(|(i, piece)| match i % 2 {
+        0 => piece,
+        _ => named.iter().find(|(name, _)| *name == piece).map_or("", |(_, text)| text),
+    });
+    pieces.collect()
 }

@@ -130,7 +130,9 @@ fn parts_and_script_show_the_scene() {
     let (scene, body, parts) = (&scene.name[..], "a \"b\".vtu", "p.vtu");
     let script = script(Shown { scene, units, body, parts, stress: true, ..Shown::default() });
     assert!(
-        script.contains(r#"BODY, PARTS = "a \"b\".vtu", "p.vtu""#) && script.contains(r#"displacement [\"<m>&]"#),
+        script.contains(r#"BODY, PARTS = "a \"b\".vtu", "p.vtu""#)
+            && !script.contains('@')
+            && script.contains(r#"displacement [\"<m>&]"#),
         "{script}"
     );
 }

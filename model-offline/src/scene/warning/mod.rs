@@ -178,42 +178,40 @@ impl SceneWarning {
                 "the needle does not go towards the target: its line misses it by {}, {degrees:.0}° off the way there",
                 long(miss)
             ),
-            Self::NeedlePassesBeside { miss, depth, nearest_at } => format!(
-                "the needle goes beside the target: at depth {} it is nearest, {} off, and it goes to {}",
-                long(nearest_at),
-                long(miss),
-                long(depth)
-            ),
-            Self::DeeperThanTarget { depth, nearest_at } => format!(
-                "the needle goes deeper than the target: depth {}, the target lies at {}",
-                long(depth),
-                long(nearest_at)
-            ),
+            Self::NeedlePassesBeside { miss, depth, nearest_at } => {
+                let [miss, depth, at] = [miss, depth, nearest_at].map(long);
+                format!(
+                    "the needle goes beside the target: at depth {at} it is nearest, {miss} off; it goes to {depth}"
+                )
+            }
+            Self::DeeperThanTarget { depth, nearest_at } => {
+                let [depth, nearest_at] = [depth, nearest_at].map(long);
+                format!("the needle goes deeper than the target: depth {depth}, the target lies at {nearest_at}")
+            }
             Self::NeedleLeavesBody { depth, at } => {
                 format!("the needle leaves the body at depth {}, and its depth is {}", long(at), long(depth))
             }
-            Self::NeedleMeetsImmobile { depth, distance } => format!(
-                "the needle ends at the immobile part: at depth {} its way comes within {} of it",
-                long(depth),
-                long(distance)
-            ),
+            Self::NeedleMeetsImmobile { depth, distance } => {
+                let [depth, distance] = [depth, distance].map(long);
+                format!("the needle ends at the immobile part: at depth {depth} its way comes within {distance} of it")
+            }
             Self::ContactShort { length, spacing } => {
                 format!("the needle contact is shorter than the node spacing: {} of {}", long(length), long(spacing))
             }
-            Self::FrictionOnlySticks { inclusion, static_friction } => format!(
-                "the friction of {} only sticks: static_friction is {} and what slides is not held at all",
-                whose(inclusion),
-                short(static_friction)
-            ),
+            Self::FrictionOnlySticks { inclusion, static_friction } => {
+                let (whose, held) = (whose(inclusion), short(static_friction));
+                format!(
+                    "the friction of {whose} only sticks: static_friction is {held} and what slides is not held at all"
+                )
+            }
             Self::TipTooShort { inclusion, tip_length, least } => {
                 let (whose, on, from) = (whose(inclusion), long(tip_length), long(least));
                 format!("the tip is {on} long, and tissue bears the cutting force of {whose} from {from} on")
             }
-            Self::TargetNearBoundary { distance, spacing } => format!(
-                "the target is nearer to the boundary than the nodes are to each other: {} of {}",
-                long(distance),
-                long(spacing)
-            ),
+            Self::TargetNearBoundary { distance, spacing } => {
+                let [at, nodes] = [distance, spacing].map(long);
+                format!("the target is nearer to the boundary than the nodes are to each other: {at} of {nodes}")
+            }
             Self::TargetNearImmobile { distance } => {
                 format!("the target is next to the immobile part, {} from it", long(distance))
             }
@@ -224,9 +222,7 @@ impl SceneWarning {
                 format!("inclusion {inclusion} is narrower than the node spacing: {} of {}", long(width), long(spacing))
             }
             Self::InclusionCovered { inclusion, by } => {
-                format!(
-                    "inclusion {inclusion} does nothing: inclusion {by} covers it, and counts because it comes later"
-                )
+                format!("inclusion {inclusion} does nothing: inclusion {by} covers it, and the later one counts")
             }
             Self::InclusionsOverlap { first, second, area, share } => format!(
                 "inclusions {first} and {second} overlap: an area of {}, {} of the smaller one, is taken to be of inclusion {second}, \
@@ -240,16 +236,14 @@ impl SceneWarning {
             Self::PaddleShort { index, length, spacing } => {
                 format!("paddle {index} is shorter than the node spacing: {} of {}", long(length), long(spacing))
             }
-            Self::PaddleBesideNeedle { index, gap, depth } => format!(
-                "paddle {index} is {} beside the needle's contact, which is pushed by {}",
-                long(gap),
-                long(depth)
-            ),
-            Self::PaddleInTheWay { index, at } if at < 0.0 => {
-                format!("paddle {index} is in the needle's way, {} before its entry", long(-at))
+            Self::PaddleBesideNeedle { index, gap, depth } => {
+                let [gap, depth] = [gap, depth].map(long);
+                format!("paddle {index} is {gap} beside the needle's contact, which is pushed by {depth}")
             }
             Self::PaddleInTheWay { index, at } => {
-                format!("paddle {index} is in the needle's way, at depth {}", long(at))
+                let where_it_is =
+                    if at < 0.0 { format!("{} before its entry", long(-at)) } else { format!("at depth {}", long(at)) };
+                format!("paddle {index} is in the needle's way, {where_it_is}")
             }
         }
     }
