@@ -199,10 +199,8 @@ impl SceneWarning {
                 format!("the needle contact is shorter than the node spacing: {} of {}", long(length), long(spacing))
             }
             Self::FrictionOnlySticks { inclusion, static_friction } => {
-                let (whose, held) = (whose(inclusion), short(static_friction));
-                format!(
-                    "the friction of {whose} only sticks: static_friction is {held} and what slides is not held at all"
-                )
+                let (of, is) = (whose(inclusion), short(static_friction));
+                format!("the friction of {of} only sticks: static_friction is {is} and what slides is not held at all")
             }
             Self::TipTooShort { inclusion, tip_length, least } => {
                 let (whose, on, from) = (whose(inclusion), long(tip_length), long(least));
