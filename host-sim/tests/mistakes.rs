@@ -138,7 +138,7 @@ integration = "fem-t6"
 
 /// A run on two tissues says which of them it cannot have, and how it can have the other.
 #[test]
-fn a_tissue_that_cannot_be_modelled_is_named() {
+fn a_tissue_that_cannot_be_simulated_is_named() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("concave.toml"), HARD_WITHOUT_INCLUSIONS).unwrap();
     let run = |more: &[&str]| {
@@ -148,13 +148,13 @@ fn a_tissue_that_cannot_be_modelled_is_named() {
     };
     let refused = run(&[]).code(1);
     let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
-    assert!(said.contains("the homogeneous tissue cannot be modelled") && said.contains("paddle 3"), "{said}");
+    assert!(said.contains("the homogeneous tissue cannot be simulated") && said.contains("paddle 3"), "{said}");
     assert!(said.contains("--tissue inclusion is simulated without it"), "{said}");
     assert!(!folder.path().join("report").exists());
     let alone = run(&["--tissue", "homogeneous"]).code(1);
     let said = String::from_utf8_lossy(&alone.get_output().stderr).into_owned();
     assert!(
-        said.contains("the homogeneous tissue cannot be modelled") && !said.contains("--tissue inclusion"),
+        said.contains("the homogeneous tissue cannot be simulated") && !said.contains("--tissue inclusion"),
         "{said}"
     );
     run(&["--tissue", "inclusion"]).success();

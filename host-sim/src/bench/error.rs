@@ -127,8 +127,8 @@ pub enum SimError {
     /// The tissue cannot be modelled.
     #[error("the tissue cannot be modelled")]
     Model(#[from] ModelError),
-    /// One tissue of a scene cannot be modelled.
-    #[error("the {tissue} tissue cannot be modelled")]
+    /// One tissue of a scene cannot be modelled, or controlled by no paddle.
+    #[error("the {tissue} tissue cannot be simulated")]
     Tissue {
         /// Which.
         tissue: TissueVariant,
@@ -210,7 +210,7 @@ impl From<SceneError> for SimError {
 }
 
 impl SimError {
-    /// That a tissue cannot be modelled, and what may be asked for instead.
+    /// That a tissue cannot be simulated, and what may be asked for instead.
     pub(super) fn of_tissue(tissue: TissueVariant, instead: Option<String>, source: ModelError) -> Self {
         Self::Tissue { tissue, instead, source: Box::new(source) }
     }

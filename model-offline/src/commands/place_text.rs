@@ -140,9 +140,11 @@ fn compared_to(study: &PlacementStudy) -> Option<String> {
     if all().any(|study| study.failure.is_none()) {
         return None;
     }
-    let shortest = all().min_by_key(|study| study.depth.len())?;
-    let depth = shortest.depth.last().map_or("zero, by what is at rest".to_owned(), |depth| length(*depth));
-    Some(format!("no static paddle reaches the full depth: the best one is best to depth {depth}, which all reach\n"))
+    let compared = match StaticStudy::common_depth(all()) {
+        Some(depth) => format!("is best to depth {}, which all reach that reach an increment", length(depth)),
+        None => "comes the farthest, or is best at rest".to_owned(),
+    };
+    Some(format!("no static paddle reaches the full depth: the best one {compared}\n"))
 }
 
 /// Where the errors come from, and what they do not cover.

@@ -114,9 +114,9 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
 /// That all files that are asked for can be written and are none of these.
 fn check_all_outputs(inputs: &[&Path], args: &SolveArgs) -> Result<(), CliError> {
     let vtu = args.vtu.as_deref().map(ForParaView::beside);
-    let [body, parts, script] = [0, 1, 2].map(|i| ("--vtu", vtu.as_ref().map(|vtu| vtu.files()[i])));
-    let [json, svg] = [&args.json, &args.svg].map(Option::as_deref);
-    Ok(check_outputs(inputs, &[("--json", json), body, ("--svg", svg), parts, script])?)
+    let mut outputs = vec![("--json", args.json.as_deref()), ("--svg", args.svg.as_deref())];
+    outputs.extend(vtu.iter().flat_map(ForParaView::outputs));
+    Ok(check_outputs(inputs, &outputs)?)
 }
 
 /// Says what would be unusual about the scene if its needle went as deep as is asked for.

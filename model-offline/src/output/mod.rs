@@ -52,6 +52,11 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     .map_err(fail)
 }
 
+/// Whether a path is of something that bytes flow into, a pipe, a device or `/dev/stdout`: nothing can be put beside it.
+pub fn is_stream(path: &Path) -> bool {
+    matches!(Destination::of(path), Ok(Destination::Stream(_)))
+}
+
 /// Puts a file with these bytes in place of what is there.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut builder = tempfile::Builder::new();

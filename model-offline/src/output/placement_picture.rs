@@ -58,8 +58,18 @@ struct Does {
 /// The insertion with them held.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct Held {
+    #[serde(default)]
+    depth: Option<Vec<f64>>,
     max_orthogonal: f64,
     failure: Option<serde_json::Value>,
+}
+
+impl Held {
+    /// Largest displacement, length; not a number where the insertion stopped at once, so that nothing is known of it.
+    fn largest(&self) -> f64 {
+        let stopped_at_once = self.failure.is_some() && self.depth.as_ref().is_some_and(Vec::is_empty);
+        if stopped_at_once { f64::NAN } else { self.max_orthogonal }
+    }
 }
 
 /// Estimated errors: of the measure over itself, of the displacement in units of length.
@@ -257,10 +267,11 @@ pub fn svg(study: &DrawnStudy, earlier: Earlier) -> String {
         y: axis,
         best: held.as_ref(),
         colour: Colour::Vermillion,
-        of: |does| (does.held.max_orthogonal, does.held_range()),
+        of: |does| (does.held.largest(), does.held_range()),
     };
     let mut fixture = study.panel(still, earlier);
-    fixture.lines.push(ReferenceLine::new("no paddle", Place::Y(study.no_paddle.held.max_orthogonal), Dash::Dashed));
+    let none = Some(study.no_paddle.held.largest()).filter(|none| none.is_finite());
+    fixture.lines.extend(none.map(|none| ReferenceLine::new("no paddle", Place::Y(none), Dash::Dashed)));
     let panels = vec![study.panel(moved, earlier), fixture];
     Figure { title: title(study, earlier), caption: caption(study, earlier), panels, columns: 2 }.svg()
 }

@@ -322,6 +322,13 @@ impl PaddleResult {
 }
 
 impl StaticStudy {
+    /// The depth over which insertions are compared that stopped early: to which all came that reached an increment; none where
+    /// none did.
+    pub fn common_depth<'a>(studies: impl Iterator<Item = &'a Self> + Clone) -> Option<f64> {
+        let common = fixture::common(studies.clone().map(|study| &study.orthogonal[..]))?;
+        studies.into_iter().find_map(|study| study.depth.get(common - 1)).copied()
+    }
+
     /// Largest orthogonal displacement over that of another insertion, to the depth that both reached; none where they
     /// have no depth in common, or the other one does not move the target.
     pub fn over(&self, other: &Self) -> Option<f64> {
@@ -334,7 +341,7 @@ fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
     let fixtures: Vec<Fixture<'_>> = paddles
         .iter()
         .map(|p| Fixture {
-            stopped: p.static_study.failure.is_some(),
+            stopped: p.static_study.failure.as_ref().map(|failure| failure.depth),
             orthogonal: &p.static_study.orthogonal,
             per_depth: Vector2::from(p.target_per_depth).dot(&normal),
         })

@@ -23,6 +23,11 @@ fn at_the_end(paddle: &PaddlePlacement) -> f64 {
     paddle.orthogonal.last().copied().unwrap_or(f64::NAN)
 }
 
+/// Its largest size on the way; not a number where the insertion stopped at once.
+fn largest(orthogonal: &[f64], max_orthogonal: f64) -> f64 {
+    if orthogonal.is_empty() { f64::NAN } else { max_orthogonal }
+}
+
 /// The same without a paddle.
 fn without_paddle(placement: &PlacementResult) -> Option<f64> {
     placement.no_paddle.as_ref()?.orthogonal.last().copied()
@@ -72,7 +77,7 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
                     "largest size on the way",
                     Colour::Ink,
                     Marker::Dash,
-                    over(placement, |p| p.max_orthogonal),
+                    over(placement, |p| largest(&p.orthogonal, p.max_orthogonal)),
                 ),
             ];
             panel
@@ -150,7 +155,7 @@ pub(super) fn static_table(run: &RunResult) -> Markup {
             tbody { @for placement in &run.placements { @for paddle in &placement.paddles {
                 tr class=[(paddle.index == placement.best_static).then_some("best")] {
                     td { (placement.tissue) } td { (paddle.index) }
-                    td { (number(at_the_end(paddle), 4)) } td { (number(paddle.max_orthogonal, 4)) }
+                    td { (number(at_the_end(paddle), 4)) } td { (number(largest(&paddle.orthogonal, paddle.max_orthogonal), 4)) }
                     td { (plain(paddle.reached_depth)) }
                     td.wrap { (remark(run, placement, paddle)) }
                 }
@@ -158,7 +163,7 @@ pub(super) fn static_table(run: &RunResult) -> Markup {
             @if let Some(none) = &placement.no_paddle { tr {
                 td { (placement.tissue) } td { "none" }
                 td { (number(none.orthogonal.last().copied().unwrap_or(f64::NAN), 4)) }
-                td { (number(none.max_orthogonal, 4)) } td { (plain(none.reached_depth)) }
+                td { (number(largest(&none.orthogonal, none.max_orthogonal), 4)) } td { (plain(none.reached_depth)) }
                 td.wrap { (none.failure.as_ref().map(|f| format!("stopped early: {f}")).unwrap_or_default()) }
             } }
             } }

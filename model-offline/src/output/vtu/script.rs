@@ -93,7 +93,7 @@ pub fn script(shown: Shown<'_>) -> String {
 fn fill(named: &[(&str, &str)]) -> String {
     let pieces = TEMPLATE.split('@').enumerate().map(|(i, piece)| match i % 2 {
         0 => piece,
-        _ => named.iter().find(|(name, _)| *name == piece).map_or("", |(_, text)| text),
+        _ => named.iter().find(|(name, _)| *name == piece).map_or(piece, |(_, text)| text),
     });
     pieces.collect()
 }

@@ -229,7 +229,7 @@ fn best<'a>(candidates: impl Iterator<Item = (Vec<u32>, &'a SpaceAnswer)>, axis:
     let fixtures: Vec<Fixture<'_>> = all
         .iter()
         .map(|(_, answer)| Fixture {
-            stopped: answer.static_study.failure.is_some(),
+            stopped: answer.static_study.failure.as_ref().map(|failure| failure.depth),
             orthogonal: &answer.static_study.orthogonal,
             per_depth: axis.cross(&Vector3::from(answer.target_per_depth)).norm(),
         })

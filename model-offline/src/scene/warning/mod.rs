@@ -276,7 +276,7 @@ impl SceneWarning {
                 "let one end where the other begins: an overlap so short takes elements as short, and insertions do not get far on them"
             }
             Self::PaddleBesideNeedle { .. } => {
-                "move it away: elements between them are as small, and insertions with this paddle may stop at once"
+                "move it away: next to no tissue is between them, and insertions with this paddle may stop at once"
             }
             Self::PaddleInTheWay { .. } => "move the paddle, or the needle",
         }

@@ -87,7 +87,12 @@ fn of(study: &SpaceStudy, paddles: Vec<u32>, answer: &SpaceAnswer, believed: Opt
         slope
     });
     let rate = steepest.fold(0.0, f64::max) * needle.speed;
-    let without_help = study.placement.no_paddle.static_study.max_orthogonal;
+    let none = &study.placement.no_paddle;
+    // Of an insertion that stopped at once nothing is known but how it would have begun.
+    let without_help = match none.static_study.depth.is_empty() {
+        true => needle.axis.cross(&Vector3::from(none.target_per_depth)).norm() * needle.depth,
+        false => none.static_study.max_orthogonal,
+    };
     let over = stroke / limits.max_displacement;
     PaddleSet {
         paddles,
