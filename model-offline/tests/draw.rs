@@ -274,6 +274,19 @@ fn a_placement_study_is_drawn_alone_and_beside_an_earlier_one() {
     model_offline().arg("draw").arg(&cannot).arg("-o").arg(&out).assert().success();
     let failed = |svg: &str| texts(svg).iter().any(|text| text == "failed");
     assert!(failed(&std::fs::read_to_string(&out).unwrap()) && !failed(&alone));
+    // Of an insertion that stopped at once nothing is known: no bar of no height, and no line at none.
+    let at_once = studied(folder.path(), "at-once.json", "paper", |value| {
+        let stopped = serde_json::json!({"reason": "element-inverted", "depth": 0.0, "detail": ""});
+        for study in ["/paddles/4/static", "/no_paddle/static"] {
+            let study = value.pointer_mut(study).unwrap();
+            (study["depth"], study["max_orthogonal"], study["failure"]) =
+                (serde_json::json!([]), 0.0.into(), stopped.clone());
+        }
+    });
+    model_offline().arg("draw").arg(&at_once).arg("-o").arg(&out).assert().success();
+    let at_once = std::fs::read_to_string(&out).unwrap();
+    let has_line = |svg: &str| texts(svg).iter().any(|text| text == "no paddle");
+    assert!(failed(&at_once) && !has_line(&at_once) && has_line(&alone), "{:?}", texts(&at_once));
     // What is no study, or no use for one.
     assert!(refused(&study, &["--field", "strain"]).contains("leave them out"));
     let solution = solved(folder.path(), &[]);
