@@ -160,6 +160,20 @@ fn check_script(report: &Path) {
     assert_eq!(String::from_utf8_lossy(&output.stdout), "inclusion-dynamic.pvd inclusion-dynamic-parts.pvd\n");
 }
 
+/// A script may be called as a module is that it needs: it does not take itself for that.
+fn check_script_named_paraview(report: &Path) {
+    let [own, modules] = [(); 2].map(|()| tempfile::tempdir().unwrap());
+    std::fs::copy(report.join("inclusion-dynamic.py"), own.path().join("paraview.py")).unwrap();
+    std::fs::create_dir(modules.path().join("paraview")).unwrap();
+    std::fs::write(modules.path().join("paraview/__init__.py"), "").unwrap();
+    std::fs::write(modules.path().join("paraview/simple.py"), "raise SystemExit('this is simple')").unwrap();
+    let mut python = Command::new("python3");
+    let output = python.arg("paraview.py").current_dir(own.path()).env("PYTHONPATH", modules.path()).output();
+    let Ok(output) = output else { return println!("skipped: no python3") };
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("this is simple"), "{said}");
+}
+
 /// `jsonschema` finds the result to be what its schema says.
 fn check_schema(folder: &Path) {
     let schema = host_sim().args(["schema", "result"]).assert().success();
@@ -195,6 +209,7 @@ fn a_run_can_be_opened_elsewhere() {
     check_mcap(folder.path(), &report, rows);
     check_vtu(&report);
     check_script(&report);
+    check_script_named_paraview(&report);
     check_bodies(&report);
     check_schema(folder.path());
 }

@@ -162,6 +162,18 @@ fn solve_writes_json_vtu_and_svg() {
         assert!(vtu.contains(name), "{name}");
     }
     assert!(std::fs::read_to_string(file("b.svg")).unwrap().ends_with("</svg>\n"));
+    assert!(file("b-parts.vtu").is_file() && file("b.py").is_file());
+}
+
+/// A pipe takes the body, and nothing can be put beside it.
+#[cfg(unix)]
+#[test]
+fn a_vtu_that_goes_into_a_pipe_has_nothing_beside_it() {
+    let call = ["solve", "paper", "--depth", "0.01", "--quiet", "--vtu", "/dev/stdout"];
+    let piped = model_offline().args(call).assert().success();
+    let text = String::from_utf8_lossy(&piped.get_output().stdout).into_owned();
+    assert!(text.starts_with("<?xml") && text.trim_end().ends_with("</VTKFile>"), "{}", text.len());
+    assert!(!Path::new("/dev/stdout.py").exists() && !Path::new("/dev/stdout-parts.vtu").exists());
 }
 
 #[test]

@@ -137,6 +137,16 @@ fn parts_and_script_show_the_scene() {
     );
 }
 
+/// A name that Python would take for an encoding, or the template for a place of its own, is only a name.
+#[test]
+fn any_name_of_a_scene_is_only_a_name() {
+    let script = script(Shown { scene: "recoding: a@body@\nb", body: "c.vtu", parts: "p.vtu", ..Shown::default() });
+    let lines: Vec<&str> = script.lines().collect();
+    assert!(lines[0].contains("coding: utf-8"), "{}", lines[0]);
+    assert!(lines[2].starts_with("# recoding: a@body@ b:"), "{}", lines[2]);
+    assert!(!lines[1].contains("recoding"), "Python looks at two lines");
+}
+
 /// A script of a body in space cuts it open along the needle through the target, and what is left out is on the side of the eye.
 #[test]
 fn a_body_in_space_is_cut_open_towards_the_eye() {
