@@ -4,9 +4,11 @@ mod commands;
 
 use std::process::ExitCode;
 
+use model_offline::output::end_between_results;
 use model_offline::output::terminal::all_was_said;
 
 fn main() -> ExitCode {
+    end_between_results();
     match commands::run(commands::parse()) {
         Ok(()) if all_was_said() => ExitCode::SUCCESS,
         Ok(()) => ExitCode::FAILURE,

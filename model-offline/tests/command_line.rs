@@ -176,6 +176,33 @@ fn a_vtu_that_goes_into_a_pipe_has_nothing_beside_it() {
     assert!(!Path::new("/dev/stdout.py").exists() && !Path::new("/dev/stdout-parts.vtu").exists());
 }
 
+/// The JSON goes into a pipe that is slow to be read, a signal comes meanwhile, and the picture is still to be written.
+#[cfg(unix)]
+#[test]
+fn a_signal_does_not_part_files_that_belong_together() {
+    use std::io::Read as _;
+    use std::process::{Command, Stdio};
+    let folder = tempfile::tempdir().unwrap();
+    let [pipe, picture] = ["a.json", "a.svg"].map(|name| folder.path().join(name));
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let mut command = Command::new(env!("CARGO_BIN_EXE_model-offline"));
+    command.args(["solve", "paper", "--spacing", "0.05", "--depth", "0.01", "--quiet", "--json"]).arg(&pipe);
+    let mut solve = command.arg("--svg").arg(&picture).stdin(Stdio::null()).spawn().unwrap();
+    let mut json = std::fs::File::open(&pipe).unwrap();
+    let mut text = vec![0];
+    json.read_exact(&mut text).unwrap();
+    assert!(Command::new("kill").arg(solve.id().to_string()).status().unwrap().success());
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(solve.try_wait().unwrap().is_none(), "it ended with the picture not written");
+    json.read_to_end(&mut text).unwrap();
+    assert!(solve.wait().unwrap().success());
+    // More than a pipe holds, or it was all written before the signal came.
+    assert!(text.len() > 70_000, "{}", text.len());
+    serde_json::from_slice::<serde_json::Value>(&text).unwrap();
+    assert!(std::fs::read_to_string(&picture).unwrap().ends_with("</svg>\n"));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+}
+
 #[test]
 fn a_computation_that_fails_exits_1_with_the_reason_in_the_json() {
     let folder = tempfile::tempdir().unwrap();

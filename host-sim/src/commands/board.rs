@@ -12,6 +12,7 @@ use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::record::recording::Recording;
 use host_sim::report::board_chart;
+use host_sim::runtime::signals;
 
 use model_offline::output::check_outputs;
 use model_offline::parallel;
@@ -42,6 +43,7 @@ pub(crate) struct BoardArgs {
 /// # Errors
 /// [`SimError::Measure`], [`SimError::File`], [`SimError::Record`].
 pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
+    signals::install();
     let outputs = [("--write-budget", args.write_budget.as_deref()), ("--svg", args.svg.as_deref())];
     check_outputs(&[&args.recording], &outputs)?;
     let recording = Recording::read(&args.recording)?;
@@ -49,17 +51,22 @@ pub(crate) fn board(args: &BoardArgs) -> Result<(), SimError> {
     let scenarios = Scenarios::of(&recording)?;
     let mut measured = Budget::new();
     let mut complaints = Vec::new();
-    let mut images = measure::images().map_err(MeasureError::from)?;
-    images.push(measure::spatial_image().map_err(MeasureError::from)?);
+    let images = signals::ends_at_once(|| -> Result<_, MeasureError> {
+        let mut images = measure::images()?;
+        images.push(measure::spatial_image()?);
+        Ok(images)
+    })?;
     let runs = if args.twice { 2 } else { 1 };
     let bar = super::progress_bar(false);
     bar.begin((images.len() * runs) as u64);
     // Instructions are counted, not timed: how many run at once changes nothing. The last image, in space, takes longest and begins.
-    let mut found = parallel::map(images.len() * runs, parallel::threads(None), |k| {
+    let measure_image = |k: usize| {
         let figures = scenarios.measure(&images[images.len() - 1 - k / runs]);
         bar.step();
         figures
-    });
+    };
+    let measure_all = || parallel::map(images.len() * runs, parallel::threads(None), measure_image);
+    let mut found = signals::ends_at_once(measure_all);
     bar.finish_and_clear();
     for image in &images {
         let name = measure::name(image);

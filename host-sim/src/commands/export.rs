@@ -12,8 +12,8 @@ use host_sim::record::recording::{Recording, Salvaged};
 use host_sim::world::retrace::solved_bodies;
 
 use model_offline::model::space::SpaceModel;
-use model_offline::output::check_outputs;
 use model_offline::output::space_picture::SpaceGeometry;
+use model_offline::output::{check_outputs, together};
 use model_offline::placement::space::workflow::coarse;
 use model_offline::say;
 use model_offline::scene::space::{AnyScene, SpaceScene};
@@ -55,9 +55,12 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
         _ => files::<2, 1, 1>(args, &recording),
     };
     let mut said: Vec<String> = damage.map(|damage| format!("damaged: {damage}")).into_iter().collect();
-    for (path, bytes) in files? {
+    let files = files?;
+    let together = together();
+    for (path, bytes) in files {
         said.push(written(path, &bytes)?);
     }
+    drop(together);
     say!("{} ticks, {}\n{}", recording.records.len(), recording.header.mode, said.join("\n"));
     Ok(())
 }

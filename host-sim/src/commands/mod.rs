@@ -27,8 +27,8 @@ use clap::error::ContextKind;
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 use host_sim::SimError;
 use host_sim::record::error::FileError;
-use host_sim::runtime::signals;
 use indicatif::ProgressBar;
+use model_offline::output::end_between_results;
 use model_offline::output::terminal;
 use model_offline::{say, tell};
 
@@ -162,17 +162,14 @@ pub(crate) fn execute(command: Command) -> Result<(), SimError> {
         Command::TimingPeer(args) => timing_peer(&args),
         Command::Faults(args) => faults(&args),
         Command::Stability(args) => stability(&args),
-        Command::Tables(args) => {
-            signals::install();
-            signals::ends_at_once(|| tables(&args))
-        }
+        Command::Tables(args) => tables(&args),
         Command::Worlds(args) => worlds(&args),
         Command::Replay(args) => replay(&args),
-        Command::Board(args) => {
-            signals::install();
-            signals::ends_at_once(|| board(&args))
+        Command::Board(args) => board(&args),
+        Command::Export(args) => {
+            end_between_results();
+            export(&args)
         }
-        Command::Export(args) => export(&args),
         Command::Schema { of } => {
             say!("{:#}", schema(of));
             Ok(())
@@ -184,7 +181,10 @@ pub(crate) fn execute(command: Command) -> Result<(), SimError> {
             Ok(())
         }
         Command::Man { directory } => man(&directory),
-        Command::Report(args) => report(&args),
+        Command::Report(args) => {
+            end_between_results();
+            report(&args)
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use host_sim::bench::tables::{KNOTS, compare};
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::studies::tables::{csv, figure, summary};
+use host_sim::runtime::signals;
 use model_offline::parallel;
 use model_offline::placement::model_with_paddle;
 use model_offline::scene::Scene;
@@ -40,13 +41,16 @@ pub(crate) struct TablesArgs {
 /// # Errors
 /// [`SimError`]: a bad scene, tissue that cannot be modelled or reduced, files that cannot be written.
 pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
+    signals::install();
     let scene = args.tissue.of(&Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?);
     std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
     let threads = parallel::threads(args.threads);
     let bar = super::progress_bar(args.quiet);
     bar.begin(KNOTS.len() as u64);
-    let (model, paddle) = model_with_paddle(&scene, None)?;
-    let trials = compare(&model, paddle, threads, &|| bar.step())?;
+    let trials = signals::ends_at_once(|| {
+        let (model, paddle) = model_with_paddle(&scene, None)?;
+        compare(&model, paddle, threads, &|| bar.step())
+    })?;
     bar.finish_and_clear();
     write_bytes(&args.out.join("tables.csv"), &csv(&trials))?;
     let svg = figure(&trials, &scene.name, &scene.length_unit).svg();

@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use model_offline::output::together;
 use model_offline::scene::TissueVariant;
 use serde::{Deserialize, Serialize};
 
@@ -231,6 +232,7 @@ pub fn write_pictures(directory: &Path, into: &Path) -> Result<Vec<PathBuf>, Sim
     };
     std::fs::create_dir_all(into).map_err(FileError::write(into))?;
     let pictures = pictures.into_iter().map(|(name, svg)| (into.join(name), svg));
+    let _together = together();
     pictures.map(|(path, svg)| Ok(write_bytes(&path, svg.as_bytes()).map(|()| path)?)).collect()
 }
 

@@ -42,6 +42,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), CliError> {
     let outputs = [("--json", args.json.as_deref()), ("--svg", args.svg.as_deref()), ("--csv", args.csv.as_deref())];
     check_outputs(&[&args.scene.scene], &outputs)?;
     let found = effects::compare(&scene, args.effect_tolerance, args.run.threads())?;
+    let together = output::together();
     write_json(args.json.as_deref(), &found)?;
     if let Some(path) = &args.svg {
         output::write_whole(path, found.svg().as_bytes())?;
@@ -49,6 +50,7 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), CliError> {
     if let Some(path) = &args.csv {
         output::write_whole(path, &found.csv())?;
     }
+    drop(together);
     if !args.run.quiet {
         tell!("{}", found.table());
     }

@@ -79,10 +79,12 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
         .map_err(CliError::from)
         .and_then(|fit| Ok((scene_with(&fit, &args.scene.scene)?, fit)));
     let (text, fit) = outcome.map_err(|error| error.reported(args.json.as_deref(), &scene))?;
+    let together = output::together();
     if let Some(file) = &args.output {
         output::write_whole(file, text.as_bytes())?;
     }
     write_json(args.json.as_deref(), &fit)?;
+    drop(together);
     if !args.quiet {
         tell!("{}", fit.summary());
     }

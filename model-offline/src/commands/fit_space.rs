@@ -36,6 +36,7 @@ pub(super) fn run(scene: &SpaceScene, args: &Asked<'_>) -> Result<(), CliError> 
     }
     let text = Scene::text(&args.scene.scene)?;
     let fit = fitted(scene, &text, args).map_err(|error| error.reported_of(args.json, &scene.name, scene.tissue()))?;
+    let together = output::together();
     if let Some(file) = args.output {
         let text = fit
             .written(scene, &text)
@@ -52,6 +53,7 @@ pub(super) fn run(scene: &SpaceScene, args: &Asked<'_>) -> Result<(), CliError> 
         output::write_whole(file, fit.svg().as_bytes())?;
     }
     write_json(args.json, &fit)?;
+    drop(together);
     if !args.quiet {
         tell!("{}", fit.summary());
     }

@@ -30,6 +30,7 @@ impl<'a> ForParaView<'a> {
 
     /// Writes the body, the parts, and a script that shows them so.
     pub(super) fn write(&self, body: &str, parts: &str, shown: Shown<'_>) -> Result<(), CliError> {
+        let _together = output::together();
         output::write_whole(self.body, body.as_bytes())?;
         let Some([parts_file, script_file]) = &self.beside else { return Ok(()) };
         let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,7 +1,7 @@
 //! `model-offline man`: manual pages.
 
 use super::error::CliError;
-use model_offline::output::OutputError;
+use model_offline::output::{self, OutputError};
 use model_offline::say;
 use std::path::PathBuf;
 
@@ -15,7 +15,9 @@ pub(super) struct ManArgs {
 pub(super) fn run(args: &ManArgs, command: clap::Command) -> Result<(), CliError> {
     let fail = |source| OutputError { path: args.directory.clone(), source };
     std::fs::create_dir_all(&args.directory).map_err(fail)?;
+    let together = output::together();
     clap_mangen::generate_to(command, &args.directory).map_err(fail)?;
+    drop(together);
     say!("{}", args.directory.join("model-offline.1").display());
     Ok(())
 }

@@ -56,8 +56,10 @@ fn shown(
 /// Writes chart and numbers.
 fn written(args: &ParetoArgs, comparison: &Pareto, scene: &str, tissue: TissueVariant) -> Result<(), CliError> {
     let [csv, svg] = FILES.map(|name| args.out.join(name));
+    let together = output::together();
     output::write_whole(&csv, &comparison.csv())?;
     output::write_whole(&svg, comparison.svg(scene, tissue).as_bytes())?;
+    drop(together);
     if !args.run.quiet {
         tell!("{}", comparison.table());
         say!("{}\n{}", csv.display(), svg.display());

@@ -39,8 +39,10 @@ pub(super) fn run(args: &SliceArgs) -> Result<(), CliError> {
     })?;
     check_outputs(&args.scene.files(&scene), &[("--output", Some(&args.output)), ("--json", args.json.as_deref())])?;
     let slice = slice_of(&scene, args)?;
+    let together = output::together();
     output::write_whole(&args.output, slice.text.as_bytes())?;
     write_json(args.json.as_deref(), &document(&slice))?;
+    drop(together);
     if !args.quiet {
         tell!("{}", summary(&slice));
     }

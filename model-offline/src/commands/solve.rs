@@ -348,6 +348,7 @@ fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveA
         document["strain_energy"] = needle.energy().stored.into();
         document["energy_imbalance"] = needle.energy().imbalance().into();
     }
+    let _together = output::together();
     write_json(args.json.as_deref(), &document)?;
     let within = matches!(solved, Solved::Within(..));
     let state = State { coefficients: solved.coefficients(), depth: args.depth, within };

@@ -153,6 +153,7 @@ fn write(
         "units": [&scene.length_unit, &scene.stress_unit],
         "failure": null,
     });
+    let _together = output::together();
     write_json(args.json, &document)?;
     draw(model, body, args)
 }

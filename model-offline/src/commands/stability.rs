@@ -107,11 +107,13 @@ fn studied(
     let bar = args.run.progress(plan.runs() as u64);
     let result = run(&plan, &|| bar.inc(1))?;
     bar.finish_and_clear();
+    let together = output::together();
     output::write_whole(&csv, &stability::csv(&result))?;
     if !result.zero_energy.is_empty() {
         output::write_whole(&zero_energy, &stability::zero_energy_csv(&result))?;
     }
     output::write_whole(&svg, stability::figure(&result).svg().as_bytes())?;
+    drop(together);
     if !args.run.quiet {
         tell!("{}", stability::summary(&result));
     }

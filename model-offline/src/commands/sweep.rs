@@ -27,8 +27,10 @@ pub(super) fn run(args: &SweepArgs) -> Result<(), CliError> {
     let bar = args.run.progress(sweep::STEPS);
     let found = sweep::sweep(&scene, args.run.threads(), &|| bar.inc(1))?;
     bar.finish_and_clear();
+    let together = output::together();
     output::write_whole(&csv, &found.csv())?;
     output::write_whole(&svg, found.svg().as_bytes())?;
+    drop(together);
     if !args.run.quiet {
         say!("{}\n{}\n{}", found.table(), csv.display(), svg.display());
     }

@@ -17,12 +17,14 @@ mod state;
 pub mod surface;
 pub mod table_text;
 pub mod terminal;
+mod together;
 pub mod vtu;
 
 pub use geometry::{Geometry, PaddleGeometry};
 pub use picture_file::{PictureError, PictureFormat, write_picture};
 pub use preflight::{OutputRefused, RefusalReason, check_outputs};
 pub use state::{NodalFields, State, has_stress};
+pub use together::{Together, end_between_results, together};
 
 use destination::Destination;
 use std::io::Write as _;
@@ -59,6 +61,7 @@ pub fn is_stream(path: &Path) -> bool {
 
 /// Puts a file with these bytes in place of what is there.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let _together = together();
     let mut builder = tempfile::Builder::new();
     builder.prefix(".stillpoint-");
     // Temporary files are private; a result is for whom the umask lets read it.
