@@ -88,7 +88,8 @@ fn mistakes_of_a_first_day() {
     assert_eq!(entries(folder.path()), before, "nothing was written");
 }
 
-/// A body whose third paddle all but misses the target, more so without its inclusions: the tolerance is beyond what is tried there.
+/// A body whose third paddle all but misses the target, more so without its inclusions: the tolerance is beyond what is tried
+/// there, and its condition number so near to the limit of 1e3 that it cannot be left out.
 const HARD_WITHOUT_INCLUSIONS: &str = r#"
 [scene]
 name = "concave"
@@ -121,7 +122,7 @@ depth = 0.006
 increments = 10
 
 [target]
-position = [0.088, 0.04]
+position = [0.08374, 0.03]
 
 [[paddle]]
 index = 2
@@ -132,7 +133,7 @@ index = 3
 segment = [[0.025, 0.08], [0.04, 0.08]]
 
 [discretization]
-tolerance = 0.02
+tolerance = 0.005
 integration = "fem-t6"
 "#;
 

@@ -97,8 +97,9 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
     if let Some(e) = study.error_estimate {
         let _ = writeln!(
             out,
-            "\nestimated error: controllability {:.2} %, small-depth target displacement {:.2} % of the largest",
+            "\nestimated error: controllability {:.2} %{}, small-depth target displacement {:.2} % of the largest",
             100.0 * e.controllability,
+            without(&study.left_out()),
             100.0 * e.target_displacement
         );
     }
@@ -122,6 +123,16 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
     }
     out.push_str(&warned(&study.model.scene().told_warnings()));
     out
+}
+
+/// Paddles that a tolerance does not count.
+fn without(paddles: &[u32]) -> String {
+    let names: Vec<String> = paddles.iter().map(ToString::to_string).collect();
+    match names.len() {
+        0 => String::new(),
+        1 => format!(" (without paddle {}, whose Jacobian is all but singular)", names[0]),
+        _ => format!(" (without paddles {}, whose Jacobians are all but singular)", names.join(", ")),
+    }
 }
 
 /// Paddles that the errors do not tell from the best.

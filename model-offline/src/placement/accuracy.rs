@@ -1,6 +1,7 @@
 //! How far every number of a study may be off: those at rest by a certified solution, those at depth by an insertion that
 //! another method follows on nodes of its own.
 
+use super::hindrance::is_usable;
 use super::reference::Reference;
 use super::study::{FollowedInsertion, PaddleResult, Placement, StaticStudy, follow, newton_for};
 use crate::discretization::{Essential, Integration, Method, Resolution};
@@ -73,7 +74,10 @@ impl Accuracy {
             let largest = paddle.static_study.max_orthogonal;
             (paddle.index, errors.static_study.max_orthogonal.map(|error| [largest - error, largest + error]))
         });
-        let moved = all().map(|(paddle, errors)| {
+        // What no table can be made of is not as good as what one can.
+        let usable = |paddle: &PaddleResult| is_usable(&paddle.rest());
+        let among = placement.paddles.iter().any(usable);
+        let moved = all().filter(|(paddle, _)| !among || usable(paddle)).map(|(paddle, errors)| {
             let error = errors.controllability_measure;
             (paddle.index, error.map(|error| measure_range(paddle.controllability_measure, error)))
         });

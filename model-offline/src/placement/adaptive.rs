@@ -36,7 +36,7 @@ const SHARP_SHARE: f64 = 0.08;
 /// What a refinement found out about its own error.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ErrorEstimate {
-    /// Estimated worst relative error of the controllability measures.
+    /// Estimated worst relative error of the controllability measures that [count](Reference::counts).
     pub controllability: f64,
     /// Estimated worst error of the small-depth target displacement, over the largest one.
     pub target_displacement: f64,
@@ -52,7 +52,7 @@ impl ErrorEstimate {
     fn of(responses: &[RestResponse], reference: &Reference, level: i32) -> Self {
         let (_, target_displacement) = reference.distance(responses);
         Self {
-            controllability: reference.errors(responses).into_iter().fold(0.0, f64::max),
+            controllability: reference.worst_error(responses),
             target_displacement: target_displacement + reference.open_displacement(),
             reference: reference.open,
             reference_nodes: reference.nodes,
@@ -66,8 +66,9 @@ impl ErrorEstimate {
 
     /// Whose error is the worst.
     fn decided_by(&self, scene: &Scene, responses: &[RestResponse], reference: &Reference) -> DecidedBy {
-        let paddles = scene.paddles.iter().map(|paddle| vec![paddle.index]);
-        DecidedBy::measures(paddles.zip(reference.errors(responses)), Some(self.target_displacement))
+        let paddles = scene.paddles.iter().map(|paddle| vec![paddle.index]).zip(reference.errors(responses));
+        let known = paddles.zip(reference.counts(responses)).filter(|(_, counts)| *counts).map(|(paddle, _)| paddle);
+        DecidedBy::measures(known, Some(self.target_displacement))
     }
 }
 
@@ -241,6 +242,48 @@ mod tests {
         });
         let [(loose, few), (tight, many)] = found;
         assert!(tight > loose && many > few, "{found:?}");
+    }
+
+    /// A paddle that moves the target in one direction only, or all but: its measure asks for no nodes. Its own error is told all
+    /// the same, beside the estimate of what is accepted.
+    #[test]
+    fn what_no_table_can_be_made_of_asks_for_no_nodes() {
+        let concave = |paddles: &[(u32, &str)], integration| {
+            let paddles: String =
+                paddles.iter().map(|(index, at)| format!("[[paddle]]\nindex = {index}\nsegment = {at}\n")).collect();
+            let text = format!(
+                r#"
+                scene = {{ name = "concave", dimension = 2, units = {{ length = "m", stress = "kPa" }} }}
+                domain.outline = [[0, 0], [0.12, 0], [0.12, 0.05], [0.1, 0.08], [0.075, 0.08], [0.06, 0.055], [0.045, 0.08], [0.02, 0.08], [0, 0.05]]
+                material = {{ model = "neo-hookean", lambda = 4.0, mu = 1.0 }}
+                immobile.paths = [[[0, 0], [0.12, 0]]]
+                needle = {{ contact = [[0.095, 0.08], [0.08, 0.08]], axis = [0.0, -1.0], depth = 0.006, increments = 10 }}
+                target.position = [0.088, 0.04]
+                discretization = {{ tolerance = 0.02, integration = "{integration}" }}
+                {paddles}"#
+            );
+            discretise_judged(&Scene::parse(&text, "concave.toml").unwrap()).unwrap()
+        };
+        let (good, useless) = ((2, "[[0.12, 0.015], [0.12, 0.04]]"), (3, "[[0.025, 0.08], [0.04, 0.08]]"));
+        for integration in [Integration::FemT6, Integration::ScniStabilised] {
+            let [alone, both] = [&[good][..], &[good, useless]].map(|paddles| concave(paddles, integration));
+            let responses = rest_responses(&both.model).unwrap();
+            let (reference, estimate) = (both.reference.unwrap(), both.estimate.unwrap());
+            assert_eq!(reference.counts(&responses), [true, false], "{integration}");
+            let errors = reference.errors(&responses);
+            assert!(estimate.controllability <= 0.02, "{integration}: {estimate:?}");
+            assert!(
+                (errors[0] / estimate.controllability - 1.0).abs() < 1e-6,
+                "{integration}: {errors:?} {estimate:?}"
+            );
+            assert!(errors[1] > 0.1, "{integration}: {errors:?}");
+            // What it takes to be sure that it is useless is not much beside what it would take to know its measure.
+            let (few, many) = (alone.model.nodes(), both.model.nodes());
+            assert!(many < 12 * few, "{integration}: {many} nodes, {few} without it");
+            // What the judged model takes for usable counts, whatever the limit says.
+            let taken = [responses[0], RestResponse { jacobian: responses[0].jacobian, ..responses[1] }];
+            assert_eq!(reference.counts(&taken), [true, true], "{integration}");
+        }
     }
 
     /// A strip so long and thin that even the first nodes are too many: they are made once, and what is too many is said.

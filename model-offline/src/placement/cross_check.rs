@@ -18,11 +18,13 @@ pub struct CrossCheck {
     pub nodes: usize,
 }
 
-/// The worst of the errors that a reference finds; none where there is nothing to compare.
+/// The worst of the errors that a reference finds, of those that [count](Reference::counts); none where there is nothing to
+/// compare.
 pub fn cross_check(placement: &Placement, reference: &Reference) -> Option<CrossCheck> {
     let rest: Vec<_> = placement.paddles.iter().map(|p| p.rest()).collect();
-    let errors = reference.errors(&rest).into_iter().zip(&placement.paddles);
-    let (controllability, paddle) = errors.max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let errors = reference.errors(&rest).into_iter().zip(&placement.paddles).zip(reference.counts(&rest));
+    let counted = errors.filter(|(_, counts)| *counts).map(|(error, _)| error);
+    let (controllability, paddle) = counted.max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(CrossCheck { controllability, paddle: paddle.index, nodes: reference.nodes })
 }
 

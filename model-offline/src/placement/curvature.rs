@@ -32,11 +32,12 @@ pub(super) fn spacing_for(error: f64, mesh: &Triangulation, certified: &Certifie
 
 /// w of every triangle, that of the answer which feels it most.
 fn curvature(certified: &Certified) -> Vec<f64> {
-    let Certified { model, responses, fields, .. } = certified;
+    let Certified { model, responses, fields, counted, .. } = certified;
     let largest = responses.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
     let mut most = vec![0.0_f64; model.cells().len()];
-    for (response, fields) in responses.iter().zip(fields) {
-        let answers = pairs(response, largest);
+    for ((response, fields), counts) in responses.iter().zip(fields).zip(counted) {
+        // The first is of the measure.
+        let answers = &pairs(response, largest)[usize::from(!counts)..];
         for (cell, (most, bends)) in most.iter_mut().zip(bends(certified, fields)).enumerate() {
             let felt = answers.iter().map(|(u, z)| size(&bends, u) * size(&bends, z)).fold(0.0, f64::max);
             *most = most.max(2.0 * model.tissue().rest_shear_modulus(cell as u32) * felt);

@@ -44,10 +44,64 @@ pub fn hindrance(rest: &RestResponse, scene: &Scene) -> Option<Hindrance> {
     (needed > available).then_some(Hindrance::OutOfReach { needed, available, condition })
 }
 
+/// Whether a table can be made of a paddle, as far as its Jacobian at rest tells.
+pub fn is_usable(rest: &RestResponse) -> bool {
+    rest.best_direction.is_some() && condition_number(&rest.jacobian) <= CONDITION_LIMIT
+}
+
+/// The place of the paddle that controls the target best: the smallest measure of those that [a table can be made
+/// of](is_usable); where there is none, the smallest that is finite.
+pub fn best_to_control<'r>(responses: impl IntoIterator<Item = &'r RestResponse>) -> Option<usize> {
+    let all = responses.into_iter().enumerate();
+    let finite = all.filter(|(_, rest)| rest.controllability_measure.is_finite());
+    let rank = |rest: &RestResponse| (!is_usable(rest), rest.controllability_measure);
+    let better = finite.min_by(|(_, a), (_, b)| {
+        let ((a_not, a), (b_not, b)) = (rank(a), rank(b));
+        a_not.cmp(&b_not).then(a.total_cmp(&b))
+    });
+    better.map(|(place, _)| place)
+}
+
+/// Whether no table can be made of a paddle whose Jacobian is within `open` of this one, in the Frobenius norm, whichever it
+/// is: condition numbers ‖J‖·‖J⁻¹‖ are at least (‖J‖ − open) / (σ_min + open) there.
+pub(super) fn is_useless_within(rest: &RestResponse, open: f64) -> bool {
+    let least = rest.jacobian.singular_values().min();
+    (least + open) * CONDITION_LIMIT < rest.jacobian.norm() - open
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use nalgebra::{Matrix2, Vector2};
+
+    /// Every Jacobian around one that is useless within a distance is useless; around others there is one that is not.
+    #[test]
+    fn what_is_useless_within_a_distance_is_so_all_over_it() {
+        let of = |j: Matrix2<f64>| RestResponse::new(j, Vector2::zeros(), Vector2::y());
+        let turned = nalgebra::Rotation2::new(0.4).into_inner();
+        for least in [0.0, 1e-4, 5e-4, 9e-4, 1.1e-3] {
+            let jacobian = turned * Matrix2::new(1.0, 0.0, 0.0, least);
+            for open in [0.0, 5e-5, 2e-4, 6e-4, 2e-3] {
+                // Towards the best that there is: what is smallest grows, along its own singular vectors.
+                let best = turned * Matrix2::new(1.0, 0.0, 0.0, least + open);
+                assert_eq!(is_useless_within(&of(jacobian), open), !is_usable(&of(best)), "{least} {open}");
+            }
+        }
+        // No length, no class.
+        assert!(!is_useless_within(&of(Matrix2::zeros()), 0.0));
+    }
+
+    #[test]
+    fn what_a_table_can_be_made_of_is_better_than_what_is_nearer() {
+        let scene = Scene::bundled("paper").unwrap();
+        let [good, bad] = [10.0, 3.0 * CONDITION_LIMIT].map(|c| dragged(&scene, c));
+        let near = RestResponse { controllability_measure: 0.5, ..bad };
+        let none = RestResponse { best_direction: None, controllability_measure: f64::INFINITY, ..bad };
+        assert_eq!(best_to_control(&[none, near, good]), Some(2));
+        assert_eq!(best_to_control(&[none, bad, near]), Some(2));
+        assert_eq!(best_to_control(&[none]), None);
+        assert_eq!([good, bad, none].map(|rest| is_usable(&rest)), [true, false, false]);
+    }
 
     /// A target that the needle drags along by 0.3 across its axis per depth, and a paddle that moves it by half of its own
     /// displacement across and by `1/condition` of that along.

@@ -1,6 +1,7 @@
 //! A solution to judge others by: quadratic triangles, refined where the answers ask for it and extrapolated.
 
 use super::goal_oriented::{Certified, Refinement};
+use super::hindrance::is_usable;
 use super::rest::RestResponse;
 use crate::model::ModelError;
 use crate::scene::Scene;
@@ -10,8 +11,10 @@ use crate::scene::Scene;
 pub struct Reference {
     responses: Vec<RestResponse>,
     open_by_paddle: Vec<f64>,
+    counted: Vec<bool>,
     open_displacement: f64,
-    /// What it leaves open: worst relative error, of all paddles' measures and of the displacements.
+    /// What it leaves open: worst relative error, of the displacements and of the measures of all paddles but those that are given
+    /// up (see [`Self::counts`]).
     pub open: f64,
     /// Nodes of the finer mesh.
     pub nodes: usize,
@@ -39,6 +42,7 @@ impl Reference {
         Self {
             responses: certified.limit.clone(),
             open_by_paddle: certified.open.clone(),
+            counted: certified.counted.clone(),
             open_displacement: certified.open_displacement,
             open: certified.worst_open(),
             nodes: certified.nodes,
@@ -52,12 +56,24 @@ impl Reference {
         off.zip(&self.open_by_paddle).map(|(off, open)| off + open).collect()
     }
 
-    /// Whether the errors are known to within a factor of three: what is left open of each is at most half the distance, or
-    /// negligible.
+    /// Whose measures a tolerance is of, paddle by paddle: not those of paddles that no table can be made of, neither by these
+    /// responses nor wherever the limit lies, if they are not known to a tenth. Their Jacobians are all but singular, and nobody
+    /// needs their measures to three digits. All count where that leaves none.
+    pub fn counts(&self, responses: &[RestResponse]) -> Vec<bool> {
+        responses.iter().zip(&self.counted).map(|(found, counted)| *counted || is_usable(found)).collect()
+    }
+
+    /// Worst of the [errors](Self::errors) that [count](Self::counts).
+    pub fn worst_error(&self, responses: &[RestResponse]) -> f64 {
+        worst(self.errors(responses), &self.counts(responses))
+    }
+
+    /// Whether the errors that count are known to within a factor of three: what is left open of each is at most half the
+    /// distance, or negligible.
     pub(super) fn tells(&self, responses: &[RestResponse], negligible: f64) -> bool {
-        let open = self.open_by_paddle.iter();
+        let open = self.open_by_paddle.iter().zip(self.counts(responses));
         let off = responses.iter().zip(&self.responses).map(|(found, limit)| found.measure_distance(limit));
-        open.zip(off).all(|(open, off)| *open <= 0.5 * off || *open <= negligible)
+        open.zip(off).all(|((open, counts), off)| !counts || *open <= 0.5 * off || *open <= negligible)
     }
 
     /// What the limit leaves open of the controllability measures, paddle by paddle, relative.
@@ -70,10 +86,10 @@ impl Reference {
         self.open_displacement
     }
 
-    /// Worst relative distance of the controllability measures, and of the small-depth target displacements over the
-    /// largest one.
+    /// Worst relative distance of the controllability measures that [count](Self::counts), and of the small-depth target
+    /// displacements over the largest one.
     pub fn distance(&self, responses: &[RestResponse]) -> (f64, f64) {
-        distance(responses, &self.responses)
+        distance(responses, &self.responses, &self.counts(responses))
     }
 
     /// The extrapolated responses.
@@ -82,13 +98,15 @@ impl Reference {
     }
 }
 
-/// Worst relative distance of the measures, and of the displacements over the largest one.
-pub fn distance(a: &[RestResponse], b: &[RestResponse]) -> (f64, f64) {
+/// Worst relative distance of the measures that count, and of the displacements over the largest one.
+pub fn distance(a: &[RestResponse], b: &[RestResponse], counts: &[bool]) -> (f64, f64) {
     let largest = b.iter().map(|r| r.target_per_depth.norm()).fold(f64::MIN_POSITIVE, f64::max);
-    a.iter().zip(b).fold((0.0, 0.0), |(measure, displacement): (f64, f64), (a, b)| {
-        (
-            measure.max(a.measure_distance(b)),
-            displacement.max((a.target_per_depth - b.target_per_depth).norm() / largest),
-        )
-    })
+    let apart = a.iter().zip(b).map(|(a, b)| (a.target_per_depth - b.target_per_depth).norm() / largest);
+    (worst(a.iter().zip(b).map(|(a, b)| a.measure_distance(b)), counts), apart.fold(0.0, f64::max))
+}
+
+/// The largest of what counts.
+fn worst(errors: impl IntoIterator<Item = f64>, counts: &[bool]) -> f64 {
+    let counted = errors.into_iter().zip(counts).filter(|(_, counts)| **counts);
+    counted.map(|(error, _)| error).fold(0.0, f64::max)
 }

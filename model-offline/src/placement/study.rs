@@ -3,7 +3,7 @@
 use super::adaptive::profile_model;
 use super::controllability::rows;
 use super::fixture::{self, Fixture};
-use super::hindrance::{Hindrance, hindrance};
+use super::hindrance::{Hindrance, best_to_control, hindrance};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::Resolution;
 use crate::model::{Body, ModelError, TissueModel};
@@ -194,19 +194,13 @@ pub fn steps(scene: &Scene) -> u64 {
     (scene.paddles.len() as u64 + 1) * u64::from(scene.needle.increments)
 }
 
-/// The paddle with the smallest controllability measure, by index; no static study is run.
+/// The paddle that [controls the target best](best_to_control), by index; no static study is run.
 ///
 /// # Errors
 /// [`ModelError::NoPaddleControls`] when none can control the target; any other when the body at rest cannot be solved.
 pub fn best_dynamic(model: &TissueModel) -> Result<u32, ModelError> {
-    let measures = rest_responses(model)?;
-    let indices = model.scene().paddles.iter().map(|paddle| paddle.index);
-    least(indices.zip(measures.iter().map(|r| r.controllability_measure))).ok_or(ModelError::NoPaddleControls)
-}
-
-/// The index with the smallest finite measure.
-fn least(measures: impl Iterator<Item = (u32, f64)>) -> Option<u32> {
-    measures.filter(|m| m.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1)).map(|m| m.0)
+    let best = best_to_control(&rest_responses(model)?).ok_or(ModelError::NoPaddleControls)?;
+    Ok(model.scene().paddles[best].index)
 }
 
 /// One insertion with a paddle held still, or without one.
@@ -348,7 +342,8 @@ fn rank(paddles: &[PaddleResult], normal: Vector2<f64>) -> Optimum {
         .collect();
     Optimum {
         static_paddle: fixture::best(&fixtures).map_or(0, |place| paddles[place].index),
-        dynamic_paddle: least(paddles.iter().map(|p| (p.index, p.controllability_measure))),
+        dynamic_paddle: best_to_control(&paddles.iter().map(PaddleResult::rest).collect::<Vec<_>>())
+            .map(|place| paddles[place].index),
     }
 }
 

@@ -6,7 +6,8 @@ use super::accuracy::{Accuracy, accuracy};
 use super::adaptive::{ErrorEstimate, Judged, discretise_judged};
 use super::cross_check::{CrossCheck, cross_check};
 use super::reference::Reference;
-use super::study::{Placement, PlacementOptions, best_dynamic, place};
+use super::rest::RestResponse;
+use super::study::{PaddleResult, Placement, PlacementOptions, best_dynamic, place};
 use super::verdict::verdict;
 use crate::model::{ModelError, TissueModel};
 use crate::scene::Scene;
@@ -92,6 +93,14 @@ impl PlacementStudy {
         let check = if self.error_estimate.is_some() { None } else { cross_check(&self.placement, &reference) };
         let errors = accuracy(scene, &self.placement, &reference, threads)?;
         Ok(StudyAccuracy { errors, cross_check: check, reference_nodes: reference.nodes })
+    }
+
+    /// Indices of the paddles whose measures the error estimate leaves out; see [`Reference::counts`].
+    pub fn left_out(&self) -> Vec<u32> {
+        let rest: Vec<RestResponse> = self.placement.paddles.iter().map(PaddleResult::rest).collect();
+        let counts = self.reference.as_ref().map(|reference| reference.counts(&rest)).unwrap_or_default();
+        let paddles = self.placement.paddles.iter().zip(counts);
+        paddles.filter(|(_, counts)| !counts).map(|(paddle, _)| paddle.index).collect()
     }
 
     /// Lines for people about paddles that cannot hold the target; empty when all can.

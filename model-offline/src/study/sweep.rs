@@ -6,6 +6,7 @@ use crate::model::{ModelError, TissueModel};
 use crate::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Series};
 use crate::output::csv;
 use crate::parallel;
+use crate::placement::hindrance::best_to_control;
 use crate::placement::reference::Reference;
 use crate::placement::rest::{RestResponse, rest_responses};
 use crate::scene::Scene;
@@ -102,11 +103,10 @@ impl Sweep {
 
     /// Best static paddle for small depths, and best dynamic one; none where no paddle has a finite measure.
     pub fn optima(&self, responses: &[RestResponse]) -> Optima {
-        let best = |key: &dyn Fn(&RestResponse) -> f64| {
-            let paddles = self.scene.paddles.iter().zip(responses).filter(|paddle| key(paddle.1).is_finite());
-            paddles.min_by(|a, b| key(a.1).total_cmp(&key(b.1))).map(|best| best.0.index)
-        };
-        (best(&|r| self.orthogonal(r).abs()), best(&|r| r.controllability_measure))
+        let drifts = responses.iter().map(|rest| self.orthogonal(rest).abs()).enumerate();
+        let still = drifts.filter(|drift| drift.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
+        let named = |place: usize| self.scene.paddles[place].index;
+        (still.map(|still| named(still.0)), best_to_control(responses).map(named))
     }
 
     fn rows(&self) -> impl Iterator<Item = Row<'_>> {

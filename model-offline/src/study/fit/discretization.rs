@@ -105,7 +105,8 @@ impl Trials<Discretization> for SceneTrials<'_> {
     fn confirm(&mut self, candidate: &Discretization, solution: &Assessment) -> Result<f64, ModelError> {
         let finer = Discretization { resolution: candidate.resolution.finer(), ..*candidate };
         let finer = rest_responses(&build(self.scene, &finer)?)?;
-        let (measure, displacement) = distance(&solution.responses, &finer);
+        let counts = self.reference.counts(&solution.responses);
+        let (measure, displacement) = distance(&solution.responses, &finer, &counts);
         Ok(measure.max(displacement))
     }
 }
