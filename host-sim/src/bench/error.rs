@@ -181,6 +181,13 @@ pub enum SimError {
         /// Random schedules that failed.
         schedules: usize,
     },
+    /// A report is written, of all but what was to run on the machine's clock.
+    #[error("the report has no free-run: {source}")]
+    #[diagnostic(help("lower --rate, try --plant reduced or --plant condensed, or leave it out with --mode lockstep"))]
+    NotKept {
+        /// Why.
+        source: Box<SimError>,
+    },
     /// The catalogue does not notice that monitors are off.
     #[error("no row notices that {monitors} of the controller's monitors are off; see above")]
     Unnoticed {
@@ -215,6 +222,11 @@ impl SimError {
         Self::Tissue { tissue, instead, source: Box::new(source) }
     }
 
+    /// Whether the simulated tissue cannot keep the period of the loop.
+    pub(super) fn is_too_slow(&self) -> bool {
+        matches!(self, Self::Runtime(RuntimeError::World(WorldError::TooSlow { .. })))
+    }
+
     /// Exit code of the process: 2 for bad input or usage, 1 for everything else.
     pub fn exit_code(&self) -> u8 {
         let is_input = match self {
@@ -233,6 +245,7 @@ impl SimError {
             | Self::NotARun { .. } => true,
             Self::Model(error) => error.is_usage(),
             Self::Tissue { source, .. } => source.is_usage(),
+            Self::NotKept { source } => return source.exit_code(),
             Self::File(error) => is_unreadable(error),
             Self::Record(RecordError::File(error)) => is_unreadable(error),
             Self::Record(RecordError::Recording { .. } | RecordError::Table { .. }) => true,

@@ -277,6 +277,12 @@ impl Strategies {
         }
     }
 
+    /// All that were asked for, to be changed.
+    pub(super) fn all_mut(&mut self) -> impl Iterator<Item = &mut StrategyResult> {
+        let Self { none, static_paddle, dynamic, dynamic_free_run } = self;
+        [none, static_paddle, dynamic, dynamic_free_run].into_iter().flatten()
+    }
+
     /// All that were asked for, in the order in which they are shown.
     pub fn iter(&self) -> impl Iterator<Item = (Strategy, &StrategyResult)> {
         Strategy::ALL.into_iter().filter_map(|strategy| Some((strategy, self.get(strategy)?)))

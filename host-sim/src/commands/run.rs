@@ -154,7 +154,7 @@ impl RunArgs {
 /// Runs everything that was asked for and writes the report.
 ///
 /// # Errors
-/// [`SimError`]; nothing is written then.
+/// [`SimError`]; nothing is written then, but by [`SimError::NotKept`], which comes after the report.
 pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     signals::install();
     super::sweep();
@@ -179,6 +179,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     }
     if !args.quiet {
         tell!("{}", summary(&compared.result, &args.out));
+    }
+    if let Some(source) = compared.not_kept {
+        return Err(SimError::NotKept { source: Box::new(source) });
     }
     view.map_or(Ok(()), |view| go_on(args, &view, &comparison))
 }

@@ -113,7 +113,7 @@ fn document(
         "integration": scene.discretization.method.integration,
         "wall_s": study.wall_s,
         "error_estimate": study.error_estimate,
-        "error_estimate_without": study.left_out(),
+        "left_out": known.map(|known| &known.left_out),
         "cross_check": known.and_then(|known| known.cross_check),
         "errors_unknown": accuracy.and_then(|a| a.as_ref().err()).map(ToString::to_string),
         "reference_nodes": known.map(|known| known.reference_nodes),

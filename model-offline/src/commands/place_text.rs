@@ -93,13 +93,14 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
         Some(Ok(known)) => known.errors.as_good(&study.placement),
         _ => AsGood::default(),
     };
+    let left_out = accuracy.and_then(|known| known.as_ref().ok()).map_or(&[][..], |known| &known.left_out);
     let mut out = String::new();
     if let Some(e) = study.error_estimate {
         let _ = writeln!(
             out,
             "\nestimated error: controllability {:.2} %{}, small-depth target displacement {:.2} % of the largest",
             100.0 * e.controllability,
-            without(&study.left_out()),
+            without(left_out),
             100.0 * e.target_displacement
         );
     }
@@ -125,13 +126,13 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
     out
 }
 
-/// Paddles that a tolerance does not count.
+/// Paddles that estimate and cross-check do not count.
 fn without(paddles: &[u32]) -> String {
     let names: Vec<String> = paddles.iter().map(ToString::to_string).collect();
     match names.len() {
         0 => String::new(),
-        1 => format!(" (without paddle {}, whose Jacobian is all but singular)", names[0]),
-        _ => format!(" (without paddles {}, whose Jacobians are all but singular)", names.join(", ")),
+        1 => format!(" (without paddle {}, of which no table can be made)", names[0]),
+        _ => format!(" (without paddles {}, of which no table can be made)", names.join(", ")),
     }
 }
 
@@ -162,7 +163,7 @@ fn compared_to(study: &PlacementStudy) -> Option<String> {
 fn how_known(study: &PlacementStudy, known: &StudyAccuracy) -> String {
     let mut out = String::new();
     if let Some(check) = known.cross_check {
-        let _ = writeln!(out, "{}", check.line());
+        let _ = writeln!(out, "{}{}", check.line(), without(&known.left_out));
     }
     let placement = &study.placement;
     if placement.profile_nodes != study.model.nodes() {

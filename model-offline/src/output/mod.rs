@@ -9,6 +9,7 @@ mod geometry;
 mod picture_file;
 pub mod placement_picture;
 mod preflight;
+pub mod resampling;
 pub mod result_file;
 pub mod scene_picture;
 pub mod space_picture;

@@ -68,9 +68,20 @@ impl Interpolated {
             let weights = barycentric(corners.map(|corner| rest[corner]), point);
             Self { corners: *corners, weights }
         };
-        let least = |of: &Self| of.weights.iter().copied().fold(f64::INFINITY, f64::min);
         // The one whose least weight is largest holds the point, or is nearest in its own measure.
-        triangles.iter().map(of).max_by(|a, b| least(a).total_cmp(&least(b)))
+        triangles.iter().map(of).max_by(|a, b| a.least().total_cmp(&b.least()))
+    }
+
+    /// The least of its weights; negative outside of the triangle.
+    pub(super) fn least(&self) -> f64 {
+        self.weights.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same of one value for each of these nodes, between them also beyond the edge.
+    pub(super) fn value(&self, values: &[f64]) -> f64 {
+        let weights = self.weights.map(|weight| weight.max(0.0));
+        let sum: f64 = self.corners.iter().zip(weights).map(|(corner, weight)| weight * values[*corner]).sum();
+        sum / weights.iter().sum::<f64>()
     }
 
     /// The same of what these nodes have.

@@ -174,7 +174,7 @@ impl<'a> Rest<'a> {
         let directions = paddle.best_direction.map(Vector2::from).zip(limit.best_direction);
         let followed = Followed { study: &paddle.static_study, jacobians: &paddle.jacobians };
         PaddleErrors {
-            jacobian: relative(&matrix(&paddle.jacobian), &limit.jacobian) + open,
+            jacobian: relative(&matrix(&paddle.jacobian), &limit.jacobian) + self.reference.open_jacobian()[i],
             controllability_measure: measure.is_finite().then_some(measure),
             best_direction: directions.map(|(found, limit)| (found - limit).norm() + open * limit.norm()),
             target_per_depth: self.per_depth_error(i, paddle.target_per_depth),

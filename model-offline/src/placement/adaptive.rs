@@ -244,29 +244,50 @@ mod tests {
         assert!(tight > loose && many > few, "{found:?}");
     }
 
+    /// Two paddles of a body with a notch.
+    const PADDLES: [(u32, &str); 2] = [(2, "[[0.12, 0.015], [0.12, 0.04]]"), (3, "[[0.025, 0.08], [0.04, 0.08]]")];
+
+    fn concave(paddles: &[(u32, &str)], [x, y]: [f64; 2], tolerance: f64, integration: Integration) -> Judged {
+        let paddles: String =
+            paddles.iter().map(|(index, at)| format!("[[paddle]]\nindex = {index}\nsegment = {at}\n")).collect();
+        let text = format!(
+            r#"
+            scene = {{ name = "concave", dimension = 2, units = {{ length = "m", stress = "kPa" }} }}
+            domain.outline = [[0, 0], [0.12, 0], [0.12, 0.05], [0.1, 0.08], [0.075, 0.08], [0.06, 0.055], [0.045, 0.08], [0.02, 0.08], [0, 0.05]]
+            material = {{ model = "neo-hookean", lambda = 4.0, mu = 1.0 }}
+            immobile.paths = [[[0, 0], [0.12, 0]]]
+            needle = {{ contact = [[0.095, 0.08], [0.08, 0.08]], axis = [0.0, -1.0], depth = 0.006, increments = 10 }}
+            target.position = [{x}, {y}]
+            discretization = {{ tolerance = {tolerance}, integration = "{integration}" }}
+            {paddles}"#
+        );
+        discretise_judged(&Scene::parse(&text, "concave.toml").unwrap()).unwrap()
+    }
+
+    /// Two meshes of some 900 nodes agree to 1 % on the second paddle here, and are 10 % off: the limit went by 6 % to get there. The
+    /// truth is that of the paddle in a scene of its own, whose meshes are others.
+    #[test]
+    fn what_agrees_by_accident_is_not_believed() {
+        let at = [0.08132, 0.03342];
+        let alone = concave(&PADDLES[1..], at, 0.002, Integration::FemT6);
+        let truth = rest_responses(&alone.model).unwrap()[0].controllability_measure;
+        for integration in [Integration::FemT6, Integration::ScniStabilised] {
+            let both = concave(&PADDLES, at, 0.05, integration);
+            let responses = rest_responses(&both.model).unwrap();
+            let told = both.reference.unwrap().errors(&responses)[1];
+            let off = (responses[1].controllability_measure / truth - 1.0).abs();
+            assert!(told <= 0.05 && off < told, "{integration}: {off} of {told}");
+        }
+    }
+
     /// A paddle that moves the target in one direction only, or all but: its measure asks for no nodes. Its own error is told all
     /// the same, beside the estimate of what is accepted.
     #[test]
     fn what_no_table_can_be_made_of_asks_for_no_nodes() {
-        let concave = |paddles: &[(u32, &str)], integration| {
-            let paddles: String =
-                paddles.iter().map(|(index, at)| format!("[[paddle]]\nindex = {index}\nsegment = {at}\n")).collect();
-            let text = format!(
-                r#"
-                scene = {{ name = "concave", dimension = 2, units = {{ length = "m", stress = "kPa" }} }}
-                domain.outline = [[0, 0], [0.12, 0], [0.12, 0.05], [0.1, 0.08], [0.075, 0.08], [0.06, 0.055], [0.045, 0.08], [0.02, 0.08], [0, 0.05]]
-                material = {{ model = "neo-hookean", lambda = 4.0, mu = 1.0 }}
-                immobile.paths = [[[0, 0], [0.12, 0]]]
-                needle = {{ contact = [[0.095, 0.08], [0.08, 0.08]], axis = [0.0, -1.0], depth = 0.006, increments = 10 }}
-                target.position = [0.088, 0.04]
-                discretization = {{ tolerance = 0.02, integration = "{integration}" }}
-                {paddles}"#
-            );
-            discretise_judged(&Scene::parse(&text, "concave.toml").unwrap()).unwrap()
-        };
-        let (good, useless) = ((2, "[[0.12, 0.015], [0.12, 0.04]]"), (3, "[[0.025, 0.08], [0.04, 0.08]]"));
+        let [good, useless] = PADDLES;
         for integration in [Integration::FemT6, Integration::ScniStabilised] {
-            let [alone, both] = [&[good][..], &[good, useless]].map(|paddles| concave(paddles, integration));
+            let [alone, both] =
+                [&[good][..], &[good, useless]].map(|paddles| concave(paddles, [0.088, 0.04], 0.02, integration));
             let responses = rest_responses(&both.model).unwrap();
             let (reference, estimate) = (both.reference.unwrap(), both.estimate.unwrap());
             assert_eq!(reference.counts(&responses), [true, false], "{integration}");

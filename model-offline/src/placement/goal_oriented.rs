@@ -9,7 +9,8 @@
 //! **Error.** One more cut of everything would reduce what is left by a factor r: 1/16 where the solution is smooth, 1/2
 //! where the type of boundary condition changes (order 2α of the singularity r^α, α = ½), and up to 0.57 at corners of stiff
 //! inclusions. So the limit lies between 0.07 and 1.35 differences beyond the fine answer, which is shifted to the middle of
-//! that; a whole difference is left open, half again as much as the range, because coarse meshes need not obey.
+//! that; a whole difference is left open, half again as much as the range, because coarse meshes need not obey. Where the limit
+//! has gone farther than that since the pair of meshes before, that way is left open.
 
 use super::fields::{Fields, Loads};
 use super::hindrance::is_useless_within;
@@ -34,8 +35,6 @@ const UNKNOWN_SHARE: f64 = 0.1;
 /// How much of the share counts one pair of meshes later: where a Jacobian is all but singular, the differences of one
 /// pair cancel by accident.
 const REMEMBERED: f64 = 0.5;
-/// What is left open, relative, from which on the measure of a paddle that no table can be made of is given up.
-const HOPELESS: f64 = 0.1;
 /// Share of the sum of the triangles' parts that the triangles cut next make up.
 const CUT: f64 = 0.6;
 /// More nodes than this are not tried on the fine mesh.
@@ -54,8 +53,10 @@ pub(super) struct Certified {
     pub limit: Vec<RestResponse>,
     /// What that leaves open of the controllability measures, relative.
     pub open: Vec<f64>,
-    /// Whose measures have to be known: of all but those that no table can be made of, wherever the limit lies, and that are far
-    /// from known; of all where that leaves none.
+    /// What it leaves open of the Jacobians, over their norm.
+    pub open_jacobian: Vec<f64>,
+    /// Whose measures have to be known: of all but those that no table can be made of, wherever the limit lies; of all where
+    /// that leaves none.
     pub counted: Vec<bool>,
     /// What it leaves open of the small-depth displacements, over the largest.
     pub open_displacement: f64,
@@ -187,7 +188,7 @@ impl Pair {
         let stiffness = self.stiffness();
         let mut parts = vec![0.0_f64; self.coarse.cells().len()];
         let (mut limit, mut open, mut open_displacement) = (Vec::new(), Vec::new(), 0.0_f64);
-        let (mut shares, mut counted) = (Vec::new(), Vec::new());
+        let (mut open_jacobian, mut shares, mut counted) = (Vec::new(), Vec::new(), Vec::new());
         // What one pair of meshes has decided is decided; the next one looks again.
         let is_asked = |paddle: usize| earlier.is_none_or(|earlier| earlier.counted[paddle]);
         for_each_paddle(&self.fine, Loads::OnTarget, |paddle, fields| {
@@ -200,10 +201,11 @@ impl Pair {
             let before = &responses[paddle];
             let shifted = shifted(before, &found, self.fine.scene().needle.orthogonal());
             let left = left_open(before, &found, earlier.map(|earlier| earlier.shares[paddle]));
-            let is_useless = is_useless_within(&shifted, OPEN * (found.jacobian - before.jacobian).norm());
-            counted.push(!(is_useless && left.open > HOPELESS));
+            let jacobian = OPEN * (found.jacobian - before.jacobian).norm();
+            counted.push(!is_useless_within(&shifted, jacobian));
+            open_jacobian.push(jacobian / shifted.jacobian.norm().max(f64::MIN_POSITIVE));
+            open.push(left.open.max(earlier.map_or(0.0, |earlier| went(&earlier.limit[paddle], &shifted))));
             limit.push(shifted);
-            open.push(left.open);
             shares.push(left.share);
             let moved = (found.target_per_depth - before.target_per_depth).norm();
             open_displacement = open_displacement.max(OPEN * moved / largest);
@@ -219,6 +221,7 @@ impl Pair {
             counted,
             limit,
             open,
+            open_jacobian,
             open_displacement,
             shares,
             nodes,
@@ -302,6 +305,12 @@ fn shifted(coarse: &RestResponse, fine: &RestResponse, normal: Vector2<f64>) -> 
     let jacobian = fine.jacobian + (fine.jacobian - coarse.jacobian) * SHIFT;
     let per_depth = fine.target_per_depth + (fine.target_per_depth - coarse.target_per_depth) * SHIFT;
     RestResponse::new(jacobian, per_depth, normal)
+}
+
+/// How far the limit of a measure went from one pair of meshes to the next, relative: pairs that agree by accident on two meshes
+/// do not on three. What only one of them can control went nowhere that is known.
+fn went(from: &RestResponse, to: &RestResponse) -> f64 {
+    Some(from.measure_distance(to)).filter(|way| way.is_finite()).unwrap_or(0.0)
 }
 
 /// What a pair of meshes says of one controllability measure.

@@ -11,10 +11,11 @@ use crate::scene::Scene;
 pub struct Reference {
     responses: Vec<RestResponse>,
     open_by_paddle: Vec<f64>,
+    open_jacobian: Vec<f64>,
     counted: Vec<bool>,
     open_displacement: f64,
-    /// What it leaves open: worst relative error, of the displacements and of the measures of all paddles but those that are given
-    /// up (see [`Self::counts`]).
+    /// What it leaves open: worst relative error, of the displacements and of the measures of all paddles but those that no table
+    /// can be made of, wherever the limit lies.
     pub open: f64,
     /// Nodes of the finer mesh.
     pub nodes: usize,
@@ -42,6 +43,7 @@ impl Reference {
         Self {
             responses: certified.limit.clone(),
             open_by_paddle: certified.open.clone(),
+            open_jacobian: certified.open_jacobian.clone(),
             counted: certified.counted.clone(),
             open_displacement: certified.open_displacement,
             open: certified.worst_open(),
@@ -57,8 +59,8 @@ impl Reference {
     }
 
     /// Whose measures a tolerance is of, paddle by paddle: not those of paddles that no table can be made of, neither by these
-    /// responses nor wherever the limit lies, if they are not known to a tenth. Their Jacobians are all but singular, and nobody
-    /// needs their measures to three digits. All count where that leaves none.
+    /// responses nor wherever the limit lies. Their Jacobians are all but singular and their measures hard to know, and nobody
+    /// needs them to three digits. All count where that leaves none.
     pub fn counts(&self, responses: &[RestResponse]) -> Vec<bool> {
         responses.iter().zip(&self.counted).map(|(found, counted)| *counted || is_usable(found)).collect()
     }
@@ -79,6 +81,16 @@ impl Reference {
     /// What the limit leaves open of the controllability measures, paddle by paddle, relative.
     pub fn open_by_paddle(&self) -> &[f64] {
         &self.open_by_paddle
+    }
+
+    /// What the limit leaves open of the Jacobians, paddle by paddle, over their norm.
+    pub fn open_jacobian(&self) -> &[f64] {
+        &self.open_jacobian
+    }
+
+    /// Whose measures do not count by the limit alone, as places in the scene's list of paddles.
+    pub fn left_out(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.counted.len()).filter(|&place| !self.counted[place])
     }
 
     /// What the limit leaves open of the small-depth displacements, over the largest.

@@ -47,6 +47,8 @@ pub struct StudyAccuracy {
     pub errors: Accuracy,
     /// The worst of them in a line for people; none where the study has estimated its own error.
     pub cross_check: Option<CrossCheck>,
+    /// Indices of the paddles whose measures error estimate and cross-check leave out; see [`Reference::counts`].
+    pub left_out: Vec<u32>,
     /// Nodes of the triangles that the numbers at rest are judged by.
     pub reference_nodes: usize,
 }
@@ -92,15 +94,10 @@ impl PlacementStudy {
         };
         let check = if self.error_estimate.is_some() { None } else { cross_check(&self.placement, &reference) };
         let errors = accuracy(scene, &self.placement, &reference, threads)?;
-        Ok(StudyAccuracy { errors, cross_check: check, reference_nodes: reference.nodes })
-    }
-
-    /// Indices of the paddles whose measures the error estimate leaves out; see [`Reference::counts`].
-    pub fn left_out(&self) -> Vec<u32> {
         let rest: Vec<RestResponse> = self.placement.paddles.iter().map(PaddleResult::rest).collect();
-        let counts = self.reference.as_ref().map(|reference| reference.counts(&rest)).unwrap_or_default();
-        let paddles = self.placement.paddles.iter().zip(counts);
-        paddles.filter(|(_, counts)| !counts).map(|(paddle, _)| paddle.index).collect()
+        let judged = self.placement.paddles.iter().zip(reference.counts(&rest));
+        let left_out = judged.filter(|(_, counts)| !counts).map(|(paddle, _)| paddle.index).collect();
+        Ok(StudyAccuracy { errors, cross_check: check, left_out, reference_nodes: reference.nodes })
     }
 
     /// Lines for people about paddles that cannot hold the target; empty when all can.
@@ -128,7 +125,8 @@ mod tests {
             let measure = errors.controllability_measure.unwrap();
             assert!((measure / expected - 1.0).abs() < 1e-9, "{measure} {expected}");
             let jacobian = (responses[i].jacobian - limit.jacobian).norm() / limit.jacobian.norm();
-            assert!((errors.jacobian - jacobian - open).abs() < 1e-12);
+            let open_jacobian = reference.open_jacobian()[i];
+            assert!(open_jacobian > 0.0 && (errors.jacobian - jacobian - open_jacobian).abs() < 1e-12);
             let found = responses[i].best_direction.unwrap() - limit.best_direction.unwrap();
             let direction = found.norm() + open * limit.controllability_measure;
             assert!((errors.best_direction.unwrap() - direction).abs() < 1e-9 * direction);

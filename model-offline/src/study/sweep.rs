@@ -156,10 +156,23 @@ impl Sweep {
         }
         let _ = writeln!(
             out,
-            "\nbest static paddle by |orthogonal target displacement per depth| at small depth; the limit is good to {:.2} %",
-            100.0 * self.reference.open
+            "\nbest static paddle by |orthogonal target displacement per depth| at small depth; the limit is good to {:.2} %{}",
+            100.0 * self.reference.open,
+            self.left_out()
         );
         out
+    }
+
+    /// Of which paddles that is not said.
+    fn left_out(&self) -> String {
+        let open = self.reference.open_by_paddle();
+        let of = |place: usize| match open[place] {
+            open if open.is_finite() => format!("is known to {:.0} %", 100.0 * open),
+            _ => "is not known".to_owned(),
+        };
+        let index = |place: usize| self.scene.paddles[place].index;
+        let named = |place: usize| format!("; paddle {}, of which no table can be made, {}", index(place), of(place));
+        self.reference.left_out().map(named).collect()
     }
 
     /// Best paddles on the coarsest and on the finest mesh of a rule, and in the limit.

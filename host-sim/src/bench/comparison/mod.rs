@@ -13,6 +13,7 @@ use firmware::Controller;
 use firmware::contract::Table;
 use model_offline::model::{ModelError, TissueModel};
 use model_offline::output::Geometry;
+use model_offline::output::resampling::Resampling;
 use model_offline::output::table_text::hex;
 use model_offline::parallel;
 use model_offline::placement::study::steps;
@@ -27,7 +28,7 @@ use self::forecast::Forecast;
 pub use self::progress::{Progress, Silent};
 use super::causes::{CausesResult, Examined};
 use super::describe;
-use super::insertion::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion};
+use super::insertion::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion, digits, rounding};
 use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, StrategyResult, TableResult};
 use super::strategy::Strategy;
 use super::table_tissue::TableTissue;
@@ -112,6 +113,31 @@ impl Studied {
 /// `none` and `static` of a case.
 type Uncontrolled = (Option<MeasuredInsertion>, Option<MeasuredInsertion>);
 
+/// Puts the pictures of a case whose body has nodes of its own, as conforming elements have in every tissue, onto those that
+/// all bodies are drawn on.
+fn on_nodes_of(drawn: &Geometry, model: &TissueModel, case: &mut CaseResult) {
+    let own: Vec<[f64; 2]> = model.positions().iter().map(|node| [node.x, node.y]).collect();
+    if own == drawn.nodes {
+        return;
+    }
+    let resampling = Resampling::new(&own, &drawn.nodes, &drawn.outline);
+    let rounded = rounding(model.scene().needle.depth);
+    for result in case.strategies.all_mut() {
+        // Nothing is drawn of what cannot be drawn.
+        let Some(resampling) = &resampling else {
+            (result.deformed_nodes, result.frames) = (Vec::new(), Vec::new());
+            continue;
+        };
+        result.deformed_nodes = resampling.moved(&result.deformed_nodes);
+        for frame in &mut result.frames {
+            frame.nodes = resampling.moved(&frame.nodes).into_iter().map(|node| node.map(&rounded)).collect();
+            for values in [&mut frame.strain, &mut frame.von_mises] {
+                *values = resampling.values(values).into_iter().map(digits).collect();
+            }
+        }
+    }
+}
+
 /// Nothing depends on the table without a paddle: a case that did not run it is held against that of its tissue.
 fn against_none_of_the_same_tissue(cases: &mut [CaseResult]) {
     let none: Vec<(TissueVariant, f64)> = cases
@@ -165,12 +191,21 @@ impl std::fmt::Debug for Comparison<'_> {
 }
 
 /// The result of a comparison, with the files that belong to it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Compared {
     /// The result.
     pub result: RunResult,
     /// Its files.
     pub artifacts: Vec<Artifact>,
+    /// Why it has no free-run, where one was to stand beside lockstep and the tissue cannot keep the period.
+    pub not_kept: Option<SimError>,
+}
+
+/// What is known of a case once all of it has run.
+struct Known {
+    strategies: Strategies,
+    artifacts: Vec<Artifact>,
+    not_kept: Option<SimError>,
 }
 
 impl<'p> Comparison<'p> {
@@ -224,19 +259,21 @@ impl<'p> Comparison<'p> {
     /// [`SimError`].
     pub fn run(&self, spectator: Option<&dyn Spectator>) -> Result<Compared, SimError> {
         let mut artifacts = Vec::new();
-        let mut results = Vec::new();
+        let (mut results, mut not_kept) = (Vec::new(), None);
         let uncontrolled = self.uncontrolled()?;
         let in_lockstep = self.in_lockstep(spectator)?;
         for (i, ((none, static_paddle), dynamic)) in uncontrolled.into_iter().zip(in_lockstep).enumerate() {
             let (case, table) = (&self.cases[i], &self.tables[i]);
             let known = [none, static_paddle, dynamic];
-            let (strategies, files) = self.strategies(case, known, table, spectator)?;
+            let Known { strategies, artifacts: files, not_kept: refused } =
+                self.strategies(case, known, table, spectator)?;
             artifacts.extend(files);
+            not_kept = not_kept.or(refused);
             results.push(self.case_result(case, table, strategies)?);
         }
         against_none_of_the_same_tissue(&mut results);
         signals::check()?;
-        Ok(Compared { result: self.result(results), artifacts })
+        Ok(Compared { result: self.result(results), artifacts, not_kept })
     }
 
     /// The last case's scene, and the table with its tissue, to go on from.
@@ -396,8 +433,8 @@ impl<'p> Comparison<'p> {
         [none, static_paddle, dynamic]: [Option<MeasuredInsertion>; 3],
         table: &EncodedTable,
         spectator: Option<&dyn Spectator>,
-    ) -> Result<(Strategies, Vec<Artifact>), SimError> {
-        let mut artifacts = Vec::new();
+    ) -> Result<Known, SimError> {
+        let (mut artifacts, mut not_kept) = (Vec::new(), None);
         let mut keep = |measured: MeasuredInsertion| {
             artifacts.extend(measured.artifacts);
             measured.result
@@ -412,10 +449,14 @@ impl<'p> Comparison<'p> {
             self.begins(&format!("{}: dynamic, {}", case.tissue, RunMode::FreeRun));
             let step = || self.progress.step();
             let insertion = self.insertion(case, case.label(Strategy::dynamic(RunMode::FreeRun)), &step);
-            let controlled = insertion.controlled(&self.controller(table, RunMode::FreeRun, spectator))?;
-            strategies.dynamic_free_run = Some(keep(controlled));
+            match insertion.controlled(&self.controller(table, RunMode::FreeRun, spectator)) {
+                Ok(controlled) => strategies.dynamic_free_run = Some(keep(controlled)),
+                // What has no clock has taken minutes, and is worth having by itself.
+                Err(error) if error.is_too_slow() && strategies.dynamic.is_some() => not_kept = Some(error),
+                Err(error) => return Err(error),
+            }
         }
-        Ok((strategies, artifacts))
+        Ok(Known { strategies, artifacts, not_kept })
     }
 
     fn controller<'a>(
@@ -481,7 +522,17 @@ impl<'p> Comparison<'p> {
         self.studied.iter().map(|studied| describe::placement(studied.tissue, &studied.study)).collect()
     }
 
-    fn result(&self, cases: Vec<CaseResult>) -> RunResult {
+    /// The body that all bodies are drawn on: that with the inclusions, whose edges its nodes may follow.
+    fn drawn(&self) -> &TissueModel {
+        let inclusion = self.studied.iter().find(|studied| studied.tissue == TissueVariant::Inclusion);
+        inclusion.unwrap_or(&self.studied[0]).plant()
+    }
+
+    fn result(&self, mut cases: Vec<CaseResult>) -> RunResult {
+        let geometry = Geometry::new(&self.scene, self.drawn().positions());
+        for case in &mut cases {
+            on_nodes_of(&geometry, self.studied(case.tissue).plant(), case);
+        }
         RunResult {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -490,7 +541,7 @@ impl<'p> Comparison<'p> {
             mode: self.options.mode.unwrap_or(RunMode::Lockstep),
             seed: self.simulation.seed,
             settings: describe::settings(&self.scene, &self.simulation, self.options.table_knows_the_world),
-            geometry: Geometry::new(&self.scene, self.studied[0].study.model.positions()),
+            geometry,
             placements: self.placements(),
             cases,
             wall_s: self.started.elapsed().as_secs_f64(),

@@ -96,9 +96,7 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth], started_ns
         return Vec::new();
     };
     let count = (FRAME_NUMBERS / model.nodes().max(1)).clamp(2, FRAMES);
-    // A millionth of the depth is beyond any drawing.
-    let places = 10f64.powi(6 - model.scene().needle.depth.log10().floor() as i32);
-    let rounded = |coordinate: f64| (coordinate * places).round() / places;
+    let rounded = rounding(model.scene().needle.depth);
     let mut frames = Vec::new();
     // The needle's way so far, in and out: of one that only goes in its depth.
     let gone: Vec<f64> = truths
@@ -118,7 +116,7 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth], started_ns
         let NodalFields { strain, von_mises } = tissue.nodal_fields().unwrap_or_default();
         frames.push(BodyFrame {
             depth: truths[index].depth,
-            nodes: tissue.deformed_nodes().into_iter().map(|node| node.map(rounded)).collect(),
+            nodes: tissue.deformed_nodes().into_iter().map(|node| node.map(&rounded)).collect(),
             strain: strain.into_iter().map(digits).collect(),
             von_mises: von_mises.unwrap_or_default().into_iter().map(digits).collect(),
         });
@@ -126,8 +124,14 @@ fn frames(model: &TissueModel, paddle: Option<u32>, truths: &[Truth], started_ns
     frames
 }
 
+/// Coordinates as they are drawn: a millionth of the needle's depth is beyond any drawing.
+pub(in crate::bench) fn rounding(depth: f64) -> impl Fn(f64) -> f64 {
+    let places = 10f64.powi(6 - depth.log10().floor() as i32);
+    move |coordinate: f64| (coordinate * places).round() / places
+}
+
 /// Four significant digits are beyond any colour.
-fn digits(value: f64) -> f64 {
+pub(in crate::bench) fn digits(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 

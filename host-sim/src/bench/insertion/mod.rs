@@ -12,6 +12,7 @@ use sha2::{Digest, Sha256};
 
 use self::linked::{FinishedInsertion, LinkedController, LinkedInsertion, RunShare};
 use self::measure::measure;
+pub(super) use self::measure::{digits, rounding};
 use super::result::{RecordingResult, StrategyResult};
 use super::strategy::Strategy;
 use crate::bench::error::SimError;
