@@ -150,7 +150,8 @@ proptest! {
     #[test]
     fn random_targets_are_solved_or_refused(x in -0.2..1.2_f64, y in -0.2..1.2_f64) {
         match attempt(&with("position = [0.5, 0.5]", &format!("position = [{x}, {y}]"))) {
-            Ok(Ok(measures)) => prop_assert!(measures.iter().all(|m| m.is_finite())),
+            // Infinite where a paddle cannot control the target, as some cannot that is next to what is held.
+            Ok(Ok(measures)) => prop_assert!(measures.iter().all(|m| *m > 0.0)),
             Ok(Err(error)) => prop_assert!(!error.to_string().is_empty()),
             Err(error) => prop_assert!(error.contains("fuzz.toml:")),
         }
