@@ -35,6 +35,8 @@ const UNKNOWN_SHARE: f64 = 0.1;
 /// How much of the share counts one pair of meshes later: where a Jacobian is all but singular, the differences of one
 /// pair cancel by accident.
 const REMEMBERED: f64 = 0.5;
+/// What is left open, relative, from which on the measure of a paddle that no table can be made of is given up.
+const HOPELESS: f64 = 0.1;
 /// Share of the sum of the triangles' parts that the triangles cut next make up.
 const CUT: f64 = 0.6;
 /// More nodes than this are not tried on the fine mesh.
@@ -55,8 +57,8 @@ pub(super) struct Certified {
     pub open: Vec<f64>,
     /// What it leaves open of the Jacobians, over their norm.
     pub open_jacobian: Vec<f64>,
-    /// Whose measures have to be known: of all but those that no table can be made of, wherever the limit lies; of all where
-    /// that leaves none.
+    /// Whose measures have to be known: of all but those that no table can be made of, wherever the limit lies, and that are far
+    /// from known; of all where that leaves none.
     pub counted: Vec<bool>,
     /// What it leaves open of the small-depth displacements, over the largest.
     pub open_displacement: f64,
@@ -202,9 +204,10 @@ impl Pair {
             let shifted = shifted(before, &found, self.fine.scene().needle.orthogonal());
             let left = left_open(before, &found, earlier.map(|earlier| earlier.shares[paddle]));
             let jacobian = OPEN * (found.jacobian - before.jacobian).norm();
-            counted.push(!is_useless_within(&shifted, jacobian));
+            let left_open = left.open.max(earlier.map_or(0.0, |earlier| went(&earlier.limit[paddle], &shifted)));
+            counted.push(left_open <= HOPELESS || !is_useless_within(&shifted, jacobian));
             open_jacobian.push(jacobian / shifted.jacobian.norm().max(f64::MIN_POSITIVE));
-            open.push(left.open.max(earlier.map_or(0.0, |earlier| went(&earlier.limit[paddle], &shifted))));
+            open.push(left_open);
             limit.push(shifted);
             shares.push(left.share);
             let moved = (found.target_per_depth - before.target_per_depth).norm();

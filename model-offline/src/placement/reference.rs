@@ -59,8 +59,8 @@ impl Reference {
     }
 
     /// Whose measures a tolerance is of, paddle by paddle: not those of paddles that no table can be made of, neither by these
-    /// responses nor wherever the limit lies. Their Jacobians are all but singular and their measures hard to know, and nobody
-    /// needs them to three digits. All count where that leaves none.
+    /// responses nor wherever the limit lies, where they are not known to a tenth. Their Jacobians are all but singular, and nobody
+    /// needs their measures to three digits. All count where that leaves none.
     pub fn counts(&self, responses: &[RestResponse]) -> Vec<bool> {
         responses.iter().zip(&self.counted).map(|(found, counted)| *counted || is_usable(found)).collect()
     }
