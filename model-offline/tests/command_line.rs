@@ -230,6 +230,23 @@ fn tables_are_written_inspected_and_refused_when_damaged() {
     model_offline().args(["table", "paper", "--paddle", "9", "-o"]).arg(&path).assert().code(2);
 }
 
+/// A table without a second knot is none: whose, where and what may help.
+#[test]
+fn a_table_that_stops_before_its_second_knot_says_where_and_what_may_help() {
+    let folder = tempfile::tempdir().unwrap();
+    let [deep, table] = ["deep.toml", "deep.table"].map(|name| folder.path().join(name));
+    let text = std::fs::read_to_string(scene("paper.toml")).unwrap();
+    assert!(text.contains("\ndepth = 0.1\n"));
+    std::fs::write(&deep, text.replace("\ndepth = 0.1\n", "\ndepth = 1.0\n")).unwrap();
+    let call = model_offline().arg("table").arg(&deep).args(["--knots", "2", "-o"]).arg(&table).assert().code(1);
+    let said = String::from_utf8_lossy(&call.get_output().stderr).into_owned();
+    let flat = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    for word in ["no table of paddle 3", "to depth 1.0000, where its second knot is", "--tolerance or --spacing"] {
+        assert!(flat.contains(word), "{word}: {said}");
+    }
+    assert!(!table.exists());
+}
+
 #[test]
 fn usage_errors_exit_2() {
     model_offline().args(["place"]).assert().code(2);

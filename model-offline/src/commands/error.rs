@@ -164,6 +164,7 @@ impl CliError {
             Self::Needle(_) => "no-shaft-forces".into(),
             Self::World(_) => "no-insertion".into(),
             Self::Slice(_) => "no-slice".into(),
+            Self::Table(TableBuildError::Stopped { source, .. }) => source.kind().to_string(),
             Self::Table(_) => "no-table".into(),
             Self::Output(_) | Self::Picture(_) => "not-written".into(),
             Self::Result(_) => "bad-input".into(),
@@ -176,6 +177,7 @@ impl CliError {
         match self {
             Self::Solve { depth, .. } => Some(*depth),
             Self::Needle(error) => error.depth(),
+            Self::Table(TableBuildError::Stopped { depth, .. }) => Some(*depth),
             _ => None,
         }
     }

@@ -65,6 +65,19 @@ pub enum TableBuildError {
     /// The scene has no such paddle, or the model failed before the second knot.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// The tissue cannot be followed to the second knot, without which there is no table.
+    #[error(
+        "no table of paddle {}: the tissue cannot be taken to depth {depth:.4}, where its second knot is ({source}); where contact and paddle end, nodes may be too close for the law: take a larger --tolerance or --spacing, or another --integration",
+        paddles.iter().map(ToString::to_string).collect::<Vec<_>>().join(" and ")
+    )]
+    Stopped {
+        /// Indices of the table's paddles.
+        paddles: Vec<u32>,
+        /// Needle depth of the knot.
+        depth: f64,
+        /// Why.
+        source: ModelError,
+    },
     /// The paddle would have to go farther than its actuator can.
     #[error(
         "holding the target at depth {depth:.4} takes a paddle displacement of {needed:.4}, the actuator has {available:.4}: raise [actuator] max_displacement or choose another paddle"
@@ -98,6 +111,16 @@ pub enum TableBuildError {
     /// The table breaks one of its own rules.
     #[error("the table is not valid: {0}")]
     Invalid(TableError),
+}
+
+impl TableBuildError {
+    /// That a knot was not reached which no table can do without.
+    fn at_knot(paddles: &[u32], depth: f64, error: ModelError) -> Self {
+        match error {
+            source @ ModelError::Solve(_) if depth > 0.0 => Self::Stopped { paddles: paddles.to_vec(), depth, source },
+            other => Self::Model(other),
+        }
+    }
 }
 
 /// Builds the table of one paddle. When the tissue loses stability on the way, the table ends at the last knot reached
@@ -218,7 +241,7 @@ fn knots_of_states(
                 // Capacity was checked before.
                 let _ = knots.push(knot);
             }
-            Err(error) if knots.len() < 2 => return Err(error.into()),
+            Err(error) if knots.len() < 2 => return Err(TableBuildError::at_knot(&[paddle], depth, error)),
             Err(_) => break,
         }
     }
