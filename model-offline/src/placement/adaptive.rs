@@ -7,7 +7,7 @@
 //! level. Quadratic triangles themselves are judged by the mesh in which each of them is cut into four.
 
 use super::curvature::spacing_for;
-use super::goal_oriented::Refinement;
+use super::goal_oriented::{Asked, Refinement};
 use super::reference::Reference;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
@@ -97,10 +97,7 @@ pub fn discretise(scene: &Scene) -> Result<(TissueModel, Option<ErrorEstimate>),
 /// As for [`discretise`].
 pub fn discretise_judged(scene: &Scene) -> Result<Judged, ModelError> {
     match scene.discretization.resolution {
-        Resolution::Tolerance(tolerance) if scene.discretization.method.integration == Integration::FemT6 => {
-            refine_elements(scene, tolerance)
-        }
-        Resolution::Tolerance(tolerance) => refine_nodes(scene, tolerance),
+        Resolution::Tolerance(tolerance) => refine(scene, tolerance),
         Resolution::Spacing(_) | Resolution::Level(_) => {
             Ok(Judged { model: TissueModel::new(scene)?, estimate: None, reference: None })
         }
@@ -125,10 +122,25 @@ pub fn profile_model(model: &TissueModel) -> Result<TissueModel, ModelError> {
 /// Largest model on which the finite-depth profile is followed.
 const PROFILE_NODES: usize = 1500;
 
-fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
+/// Refines until the measures of all paddles are within the tolerance; where that is not reached, of all that a table may be
+/// made of: what is reached at one tolerance is so at every larger one.
+fn refine(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
+    let refine = match scene.discretization.method.integration {
+        Integration::FemT6 => refine_elements,
+        _ => refine_nodes,
+    };
+    let mut all = Refinement::new(scene, Asked::All)?;
+    match refine(&mut all, scene, tolerance) {
+        Err(ModelError::ToleranceNotReached { .. }) if all.asks_for_useless() => {
+            refine(&mut Refinement::new(scene, Asked::Usable)?, scene, tolerance)
+        }
+        judged => judged,
+    }
+}
+
+fn refine_nodes(refinement: &mut Refinement, scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let method = scene.discretization.method;
-    let mut refinement = Refinement::new(scene)?;
-    let mut reference = Reference::sharpened(&mut refinement, REFERENCE_SHARE * tolerance)?;
+    let mut reference = Reference::sharpened(refinement, REFERENCE_SHARE * tolerance)?;
     let mut best: Option<ErrorEstimate> = None;
     let (mut decided_by, mut memory) = (DecidedBy::Whole, None);
     let mut level = first_level(tolerance);
@@ -169,12 +181,12 @@ fn refine_nodes(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
             && reference.open > SHARP_SHARE * tolerance
         {
             // What the reference leaves open decides: sharpening it costs less than another level, and serves all to come.
-            reference = Reference::sharpened(&mut refinement, SHARP_SHARE * tolerance)?;
+            reference = Reference::sharpened(refinement, SHARP_SHARE * tolerance)?;
             estimate = ErrorEstimate::of(&responses, &reference, level);
         }
         if estimate.worst() <= tolerance && !reference.tells(&responses, SHARP_SHARE * tolerance) {
             // Enough to accept, but not to say how far off each paddle is.
-            reference = Reference::sharpened(&mut refinement, TELLING_SHARE * tolerance)?;
+            reference = Reference::sharpened(refinement, TELLING_SHARE * tolerance)?;
             estimate = ErrorEstimate::of(&responses, &reference, level);
         }
         // What is now known better may be too much.
@@ -201,11 +213,10 @@ fn first_level(tolerance: f64) -> i32 {
 }
 
 /// Refines quadratic triangles where the answers ask for it; they need no other reference.
-fn refine_elements(scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
+fn refine_elements(refinement: &mut Refinement, scene: &Scene, tolerance: f64) -> Result<Judged, ModelError> {
     let mut level = MIN_LEVEL - 1;
     let mut estimate = None;
     let mut decided_by = DecidedBy::Whole;
-    let mut refinement = Refinement::new(scene)?;
     let (certified, reached) = refinement.until(|certified| {
         level += 1;
         let reference = Reference::from_certified(certified);
@@ -304,6 +315,25 @@ mod tests {
             // What the judged model takes for usable counts, whatever the limit says.
             let taken = [responses[0], RestResponse { jacobian: responses[0].jacobian, ..responses[1] }];
             assert_eq!(reference.counts(&taken), [true, true], "{integration}");
+        }
+    }
+
+    /// At 0.02 the measure of the useless paddle is known to a tenth here, and not to the tolerance.
+    #[test]
+    fn what_is_reached_at_one_tolerance_is_at_every_larger_one() {
+        for y in [0.0396, 0.0402] {
+            let at = |tolerance| concave(&PADDLES, [0.088, y], tolerance, Integration::FemT6);
+            let truth = concave(&PADDLES[..1], [0.088, y], 0.001, Integration::FemT6);
+            let truth = rest_responses(&truth.model).unwrap()[0].controllability_measure;
+            let whose = [0.05, 0.02, 0.005].map(|tolerance| {
+                let judged = at(tolerance);
+                let responses = rest_responses(&judged.model).unwrap();
+                let told = judged.estimate.unwrap().controllability;
+                let off = (responses[0].controllability_measure / truth - 1.0).abs();
+                assert!(told <= tolerance && off < told, "{y} {tolerance}: {off} of {told}");
+                judged.reference.unwrap().counts(&responses)
+            });
+            assert_eq!(whose[1..], [vec![true, false], vec![true, false]], "{y}");
         }
     }
 

@@ -35,7 +35,8 @@ const UNKNOWN_SHARE: f64 = 0.1;
 /// How much of the share counts one pair of meshes later: where a Jacobian is all but singular, the differences of one
 /// pair cancel by accident.
 const REMEMBERED: f64 = 0.5;
-/// What is left open, relative, from which on the measure of a paddle that no table can be made of is given up.
+/// What is left open, relative, from which on the measure of a paddle that no table can be made of is given up, where those of
+/// all paddles are asked for.
 const HOPELESS: f64 = 0.1;
 /// Share of the sum of the triangles' parts that the triangles cut next make up.
 const CUT: f64 = 0.6;
@@ -57,9 +58,10 @@ pub(super) struct Certified {
     pub open: Vec<f64>,
     /// What it leaves open of the Jacobians, over their norm.
     pub open_jacobian: Vec<f64>,
-    /// Whose measures have to be known: of all but those that no table can be made of, wherever the limit lies, and that are far
-    /// from known; of all where that leaves none.
+    /// Whose measures have to be known: those that are [asked for](Asked), and of all paddles where that leaves none.
     pub counted: Vec<bool>,
+    /// Of which no table can be made, wherever the limit lies.
+    useless: Vec<bool>,
     /// What it leaves open of the small-depth displacements, over the largest.
     pub open_displacement: f64,
     /// The share of an amplified error of the Jacobian that reaches the length, paddle by paddle.
@@ -78,10 +80,20 @@ impl Certified {
     }
 }
 
+/// Whose measures a refinement is to make known.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Asked {
+    /// Those of all paddles but the hopeless: no table can be made of them, wherever the limit lies, and they are far from known.
+    All,
+    /// Those of paddles that a table may be made of.
+    Usable,
+}
+
 /// A refinement on its way: it can be asked for more.
 #[derive(Debug)]
 pub(super) struct Refinement {
     scene: Scene,
+    asked: Asked,
     mesh: Triangulation,
     /// What the present mesh says, and every triangle's part of what is missing.
     last: Option<(Certified, Vec<f64>)>,
@@ -93,18 +105,25 @@ impl Refinement {
         self.last.as_ref().map(|(certified, _)| (&self.mesh, certified))
     }
 
+    /// Whether a paddle that no table can be made of has its measure asked for.
+    pub(super) fn asks_for_useless(&self) -> bool {
+        let pairs =
+            |last: &Certified| last.useless.iter().zip(&last.counted).any(|(useless, counted)| *useless && *counted);
+        self.last.as_ref().is_some_and(|(last, _)| pairs(last) && last.useless.contains(&false))
+    }
+
     /// The coarsest mesh, not solved yet.
     ///
     /// # Errors
     /// [`ModelError`] where the scene has no triangulation.
-    pub(super) fn new(scene: &Scene) -> Result<Self, ModelError> {
+    pub(super) fn new(scene: &Scene, asked: Asked) -> Result<Self, ModelError> {
         let mut scene = scene.clone();
         scene.discretization.essential = crate::discretization::Essential::Transformation;
         scene.discretization.method = Method::new(Integration::FemT6);
         let features = scene.features();
         let mesh =
             Triangulation::coarse(&features, FIRST_LEVEL).map_err(crate::discretization::DiscretizationError::from)?;
-        Ok(Self { scene, mesh, last: None })
+        Ok(Self { scene, asked, mesh, last: None })
     }
 
     /// Refines until `enough` says so; the last pair of meshes, enough or not, when more nodes would be too many.
@@ -117,7 +136,7 @@ impl Refinement {
     ) -> Result<(&Certified, bool), ModelError> {
         let mut last = match self.last.take() {
             Some(last) => last,
-            None => certified(&self.scene, &self.mesh, None)?,
+            None => certified(&self.scene, self.asked, &self.mesh, None)?,
         };
         let mut is_enough = enough(&last.0);
         while !is_enough {
@@ -126,7 +145,7 @@ impl Refinement {
             if 8 * next.triangles.len() > MAX_NODES {
                 break;
             }
-            last = certified(&self.scene, &next, Some(&last.0))?;
+            last = certified(&self.scene, self.asked, &next, Some(&last.0))?;
             self.mesh = next;
             is_enough = enough(&last.0);
         }
@@ -137,11 +156,12 @@ impl Refinement {
 /// A mesh certified by the one in which each of its triangles is cut into four, and by what coarser ones have shown.
 fn certified(
     scene: &Scene,
+    asked: Asked,
     mesh: &Triangulation,
     before: Option<&Certified>,
 ) -> Result<(Certified, Vec<f64>), ModelError> {
     let (fine, parents) = mesh.refined();
-    Pair { coarse: model_on(scene, mesh)?, fine: model_on(scene, &fine)?, parents }.certify(before)
+    Pair { coarse: model_on(scene, mesh)?, fine: model_on(scene, &fine)?, parents }.certify(asked, before)
 }
 
 fn model_on(scene: &Scene, mesh: &Triangulation) -> Result<TissueModel, ModelError> {
@@ -179,7 +199,7 @@ struct Pair {
 
 impl Pair {
     /// Answers of both, and every coarse triangle's part of their differences (the largest over all answers).
-    fn certify(self, earlier: Option<&Certified>) -> Result<(Certified, Vec<f64>), ModelError> {
+    fn certify(self, asked: Asked, earlier: Option<&Certified>) -> Result<(Certified, Vec<f64>), ModelError> {
         let mut coarse: Vec<Fields> = Vec::new();
         for_each_paddle(&self.coarse, Loads::OnTarget, |_, fields| {
             coarse.push(fields.clone());
@@ -190,7 +210,7 @@ impl Pair {
         let stiffness = self.stiffness();
         let mut parts = vec![0.0_f64; self.coarse.cells().len()];
         let (mut limit, mut open, mut open_displacement) = (Vec::new(), Vec::new(), 0.0_f64);
-        let (mut open_jacobian, mut shares, mut counted) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut open_jacobian, mut shares, mut useless) = (Vec::new(), Vec::new(), Vec::new());
         // What one pair of meshes has decided is decided; the next one looks again.
         let is_asked = |paddle: usize| earlier.is_none_or(|earlier| earlier.counted[paddle]);
         for_each_paddle(&self.fine, Loads::OnTarget, |paddle, fields| {
@@ -205,7 +225,7 @@ impl Pair {
             let left = left_open(before, &found, earlier.map(|earlier| earlier.shares[paddle]));
             let jacobian = OPEN * (found.jacobian - before.jacobian).norm();
             let left_open = left.open.max(earlier.map_or(0.0, |earlier| went(&earlier.limit[paddle], &shifted)));
-            counted.push(left_open <= HOPELESS || !is_useless_within(&shifted, jacobian));
+            useless.push(is_useless_within(&shifted, jacobian));
             open_jacobian.push(jacobian / shifted.jacobian.norm().max(f64::MIN_POSITIVE));
             open.push(left_open);
             limit.push(shifted);
@@ -214,14 +234,13 @@ impl Pair {
             open_displacement = open_displacement.max(OPEN * moved / largest);
             Ok(())
         })?;
-        if !counted.contains(&true) {
-            counted.fill(true);
-        }
+        let counted = counted(asked, &useless, &open);
         let nodes = self.fine.nodes();
         let certified = Certified {
             model: self.coarse,
             responses,
             counted,
+            useless,
             limit,
             open,
             open_jacobian,
@@ -276,6 +295,19 @@ impl Pair {
             *part = part.max(own.abs());
         }
     }
+}
+
+/// Whose measures have to be known, of paddles that are useless or not and left open so far.
+fn counted(asked: Asked, useless: &[bool], open: &[f64]) -> Vec<bool> {
+    let is_counted = |(useless, open): (&bool, &f64)| match asked {
+        Asked::All => !useless || *open <= HOPELESS,
+        Asked::Usable => !useless,
+    };
+    let mut counted: Vec<bool> = useless.iter().zip(open).map(is_counted).collect();
+    if !counted.contains(&true) {
+        counted.fill(true);
+    }
+    counted
 }
 
 /// By how much an error of the Jacobian can change the relative error of ‖b‖: ‖J⁻ᵀb‖ / ‖b‖.

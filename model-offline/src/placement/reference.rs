@@ -1,6 +1,6 @@
 //! A solution to judge others by: quadratic triangles, refined where the answers ask for it and extrapolated.
 
-use super::goal_oriented::{Certified, Refinement};
+use super::goal_oriented::{Asked, Certified, Refinement};
 use super::hindrance::is_usable;
 use super::rest::RestResponse;
 use crate::model::ModelError;
@@ -27,7 +27,7 @@ impl Reference {
     /// # Errors
     /// [`ModelError`] as for any model.
     pub fn compute(scene: &Scene, share: f64) -> Result<Self, ModelError> {
-        Self::sharpened(&mut Refinement::new(scene)?, share)
+        Self::sharpened(&mut Refinement::new(scene, Asked::All)?, share)
     }
 
     /// The same from where a refinement has got to.
@@ -59,8 +59,8 @@ impl Reference {
     }
 
     /// Whose measures a tolerance is of, paddle by paddle: not those of paddles that no table can be made of, neither by these
-    /// responses nor wherever the limit lies, where they are not known to a tenth. Their Jacobians are all but singular, and nobody
-    /// needs their measures to three digits. All count where that leaves none.
+    /// responses nor wherever the limit lies, where they are not known to a tenth or the tolerance is not reached with them. Their
+    /// Jacobians are all but singular, and nobody needs their measures to three digits. All count where that leaves none.
     pub fn counts(&self, responses: &[RestResponse]) -> Vec<bool> {
         responses.iter().zip(&self.counted).map(|(found, counted)| *counted || is_usable(found)).collect()
     }

@@ -349,7 +349,7 @@ pub struct DiscretizationSection {
     /// Node spacing, length units. Either this or `tolerance`.
     pub spacing: Option<Located<f64>>,
     /// Relative error of the controllability measures to refine down to. Either this or `spacing`. In the plane, paddles that no
-    /// table can be made of are left out where their measures are not known to a tenth.
+    /// table can be made of are left out where their measures are not known to a tenth or the tolerance is not reached with them.
     pub tolerance: Option<Located<f64>>,
     /// Refinement level of graded nodes, in place of both: what a fit to a tolerance has found.
     pub level: Option<Located<i32>>,
