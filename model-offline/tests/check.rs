@@ -93,7 +93,8 @@ fn nothing_is_unusual_in_the_bundled_scenes_and_in_the_block() {
 fn every_warning_is_given_with_its_numbers_where_it_is_due() {
     let tip = |length: f64| format!("{SHAFT}kinetic_friction = 0.2\ntip_length = {length}\n");
     type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
-    let cases: [Case<'_>; 23] = [
+    let tolerance = ("spacing = 5.0", "tolerance = 0.05");
+    let cases: [Case<'_>; 27] = [
         (&[(AXIS, "axis = [0.0, 1.0]")], &["points out of the body: 180°", "turn the axis round"]),
         (&[(AXIS, "axis = [0.5, 1.0]")], &["points out of the body: 153°"]),
         (&[(AXIS, "axis = [1.0, -0.1]")], &["along the surface: 5.7°", "turn the axis inwards"]),
@@ -116,6 +117,29 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
             // Nodes are as fine there as the tolerance takes; what is held stays held.
             &[(TARGET, "position = [50.0, 0.5]"), ("spacing = 5.0", "tolerance = 0.05")],
             &["the target is next to the immobile part, 0.5 mm from it", "hardly any paddle"],
+        ),
+        // Metres, and millimetres: no spacing is needed to see that.
+        (
+            &[(INCLUSION, "[[60.0, 10.0], [60.01, 10.0], [60.01, 10.02], [60.0, 10.02]]"), tolerance],
+            &["inclusion 1 is 0.01 mm wide, in a body of 116.6 mm", "check the numbers and their unit"],
+        ),
+        (
+            &[(CONTACT, "[[50.0, 60.0], [50.1, 60.0]]"), (TARGET, "position = [50.05, 30.0]"), tolerance],
+            &["the needle contact is 0.1 mm long, in a body of 116.6 mm"],
+        ),
+        (
+            &[(LAST_PADDLE, "segment = [[100.0, 20.0], [100.0, 20.1]]"), tolerance],
+            &["paddle 7 is 0.1 mm long, in a body of 116.6 mm"],
+        ),
+        (
+            &[
+                (TARGET, "position = [0.05, 59.0]"),
+                (CONTACT, "[[0.0, 60.0], [0.1, 60.0]]"),
+                (AXIS, "axis = [0.0, -1.0]"),
+                (DEPTH, "depth = 0.5"),
+                ("spacing = 5.0", "spacing = 0.08"),
+            ],
+            &["the target is nearer to the boundary than the nodes are to each other: 0.05 mm of 0.08 mm"],
         ),
         (
             &[(LAST_PADDLE, "segment = [[60.1, 60.0], [80.0, 60.0]]")],
@@ -420,6 +444,14 @@ fn points_near_the_boundary_are_put_onto_it_and_others_refused_with_the_way_ther
         for off in [-9.9e-4, -1e-6, -2e-9, 2e-9, 3e-7, 9.9e-4] {
             for (from, to) in [(0.2, 0.4), (0.137, 0.619), (1.0 / 3.0, 0.77)] {
                 let scene = paddle(off * size, from, to).unwrap_or_else(|error| panic!("{unit} {off}: {error}"));
+                // Who has given something else is told.
+                let moved: Vec<&str> = scene.snapped.iter().map(|snapped| snapped.what.as_str()).collect();
+                assert_eq!(moved, ["paddle 7"], "{unit} {off}");
+                assert!(
+                    (scene.snapped[0].by - off.abs() * size).abs() < 2e-10 * size,
+                    "{unit} {off}: {:?}",
+                    scene.snapped
+                );
                 for (end, part) in scene.paddles[0].segment.iter().zip([from, to]) {
                     assert!(scene.outline.distance_to_boundary(*end) <= 1e-10 * size, "{unit} {off}");
                     let there = Point2::from(beside(outline, 2, part, 0.0));

@@ -183,7 +183,10 @@ pub enum SimError {
     },
     /// A report is written, of all but what was to run on the machine's clock.
     #[error("the report has no free-run: {source}")]
-    #[diagnostic(help("lower --rate, try --plant reduced or --plant condensed, or leave it out with --mode lockstep"))]
+    #[diagnostic(help(
+        "lower --rate to that, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
+         depths --plant condensed, which is linear, or leave it out with --mode lockstep"
+    ))]
     NotKept {
         /// Why.
         source: Box<SimError>,

@@ -65,6 +65,22 @@ impl RunResult {
     pub fn results(&self) -> impl Iterator<Item = &StrategyResult> {
         self.cases.iter().flat_map(|case| case.strategies.iter()).map(|(_, result)| result)
     }
+
+    /// The insertion without a paddle of a case. What the table knows makes no difference to it, so that a case that did not run it
+    /// shows that of its tissue.
+    pub fn without_paddle(&self, case: &CaseResult) -> Option<&StrategyResult> {
+        let of_tissue = || self.cases.iter().filter(|other| other.tissue == case.tissue);
+        of_tissue().find_map(|other| other.strategies.none.as_ref())
+    }
+
+    /// What a case shows, in the order in which it is shown: its strategies but those that the clock drives, and [no
+    /// paddle](Self::without_paddle).
+    pub fn shown<'r>(&'r self, case: &'r CaseResult) -> impl Iterator<Item = (Strategy, &'r StrategyResult)> {
+        let none = self.without_paddle(case).map(|none| (Strategy::None, none));
+        let own =
+            case.strategies.iter().filter(|(strategy, _)| strategy.is_reproducible() && *strategy != Strategy::None);
+        none.into_iter().chain(own)
+    }
 }
 
 fn unnamed() -> String {

@@ -173,12 +173,16 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
     let view = args.view.then(|| View::start(args.view_port, knobs).map(said)).transpose()?;
     let compared = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
     progress.bar.finish_and_clear();
+    let replaced = args.out.join("report.html").is_file();
     write_run(&args.out, &compared.result, compared.artifacts)?;
     if let Some(path) = &args.json {
         write_json(path, &compared.result)?;
     }
     if !args.quiet {
         tell!("{}", summary(&compared.result, &args.out));
+        if replaced {
+            tell!("in place of the report that was there; --out DIR keeps both\n");
+        }
     }
     if let Some(source) = compared.not_kept {
         return Err(SimError::NotKept { source: Box::new(source) });

@@ -35,7 +35,8 @@ pub enum WorldError {
          {rate_hz:.0} Hz"
     )]
     #[diagnostic(help(
-        "lower --rate, try --plant reduced or --plant condensed, or use --mode lockstep, which has no clock"
+        "lower --rate to that, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
+         depths --plant condensed, which is linear, or --mode lockstep, which has no clock"
     ))]
     TooSlow {
         /// Mean duration of a step, µs.

@@ -59,6 +59,9 @@ fn text(scene: &Scene, facts: &SceneFacts, warnings: &[String]) -> String {
     for (i, paddle) in facts.paddles.iter().enumerate() {
         row(&format!("paddle {}", paddle.index), told.paddle(i));
     }
+    if !facts.snapped.is_empty() {
+        row("snapped", told.snapped());
+    }
     row("nodes", told.nodes(scene));
     if !scene.effects().is_empty() {
         row("effects", scene.effects().join(", "));
@@ -71,6 +74,9 @@ fn text(scene: &Scene, facts: &SceneFacts, warnings: &[String]) -> String {
     out
 }
 
+/// Distances below this are 0 but for rounding, part of the body's size.
+const ROUNDING: f64 = 1e-12;
+
 /// The facts in words.
 struct Told<'a> {
     facts: &'a SceneFacts,
@@ -79,6 +85,17 @@ struct Told<'a> {
 impl Told<'_> {
     fn long(&self, length: f64) -> String {
         in_unit(length, &self.facts.units.length)
+    }
+
+    /// A distance of two things in the body: next to its size, rounding is nothing.
+    fn beside(&self, distance: f64) -> String {
+        let is_rounding = distance.abs() < ROUNDING * self.facts.body.size;
+        self.long(if is_rounding { 0.0 } else { distance })
+    }
+
+    fn snapped(&self) -> String {
+        let told = self.facts.snapped.iter().map(|snapped| format!("{} by {}", snapped.what, self.long(snapped.by)));
+        format!("{}: put onto the outline", told.collect::<Vec<_>>().join(", "))
     }
 
     fn point(&self, p: [f64; 2]) -> String {
@@ -127,7 +144,7 @@ impl Told<'_> {
             self.point(target.position),
             self.long(target.from_entry),
             self.long(target.along_needle),
-            self.long(target.off_needle),
+            self.beside(target.off_needle),
             self.long(target.from_boundary)
         )
     }

@@ -4,6 +4,7 @@ use super::check_space;
 use super::common::SceneArgs;
 use super::common::warned;
 use super::error::CliError;
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use model_offline::output::field_picture::{self, Field};
 use model_offline::output::placement_picture::{self, DrawnStudy, read_study};
 use model_offline::output::result_file::{Which, read_body};
@@ -23,7 +24,7 @@ pub(super) struct DrawArgs {
     output: PathBuf,
     /// What the colours of a result show; a result is a .json file of `solve --json`, `place --json` or `host-sim run` in place
     /// of a scene.
-    #[arg(long, value_parser = field)]
+    #[arg(long, value_parser = PossibleValuesParser::new(Field::ALL.map(|(name, _)| name)).try_map(|name| field(&name)))]
     field: Option<Field>,
     /// Number of the case of a result of `host-sim run` [default: 1]
     #[arg(long, value_name = "N")]
@@ -41,8 +42,7 @@ pub(super) struct DrawArgs {
 
 fn field(word: &str) -> Result<Field, String> {
     let found = Field::ALL.iter().find(|(name, _)| *name == word);
-    let names = || Field::ALL.map(|(name, _)| name).join(", ");
-    found.map(|(_, field)| *field).ok_or_else(|| format!("one of {}", names()))
+    found.map(|(_, field)| *field).ok_or_else(|| format!("there is no field {word}"))
 }
 
 pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {

@@ -18,6 +18,10 @@ const NONE: &str = "–";
 const BEST: char = '*';
 const NOT_BEST: char = ' ';
 
+/// What the columns mean.
+const LEGEND: &str = "\nJ⁻¹n: how the paddle moves the target by 1 across the needle, ‖J⁻¹n‖: how far it goes for that; max orthogonal: how far\n\
+                      the target goes across the needle with the paddle held; ±: estimated error; of no paddle: share of that without; *: best\n";
+
 /// The study on a screen.
 pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
     let (scene, optimum) = (study.model.scene(), study.placement.optimum);
@@ -42,6 +46,7 @@ pub(super) fn summary(study: &PlacementStudy, accuracy: Option<&Result<StudyAccu
     let errors = known.map(|known| &known.errors.no_paddle);
     let none = static_part((none, errors), NOT_BEST, Some(1.0), digits);
     let _ = writeln!(out, "   none  {NONE:>8}  {NONE:>8}   {NONE:<20}  {none}");
+    out.push_str(LEGEND);
     out.push_str(&notes(study, accuracy));
     out
 }

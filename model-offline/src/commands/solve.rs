@@ -356,6 +356,12 @@ fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveA
         let scene = model.scene();
         let units = [&scene.length_unit[..], &scene.stress_unit];
         let shown = Shown { scene: &scene.name, units, stress: has_stress(model), ..Shown::default() };
+        if !shown.stress {
+            say!(
+                "{}: without stress, which a displacement does not tell of this tissue (it relaxes, or its law is planar)",
+                path.display()
+            );
+        }
         ForParaView::beside(path).write(&vtu::vtu(model, state.coefficients), &vtu::parts(model, state), shown)?;
     }
     if let Some(path) = &args.svg {

@@ -27,6 +27,30 @@ pub struct SceneError {
     pub at: SourceSpan,
 }
 
+/// Letters in which a name may differ from the one that it was meant for.
+const LETTERS: usize = 2;
+
+/// The name that a word was meant for: a letter or two differ, of at least three times as many.
+pub(crate) fn nearest<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    let word = word.to_lowercase();
+    let distances = names.into_iter().map(|name| (strsim::osa_distance(&word, &name.to_lowercase()), name));
+    let (distance, name) = distances.min_by_key(|near| near.0)?;
+    (distance <= LETTERS && 3 * distance <= word.chars().count()).then_some(name)
+}
+
+/// What the parser says, in words of people, and what to do: with the key or the word that was meant, where one is near.
+fn parsed(message: &str, schema: &str) -> (String, String) {
+    let told = message.replace("expected u32", "expected a whole number, 0 or more");
+    let told = told
+        .replace("expected usize", "expected a whole number, 0 or more")
+        .replace("expected f64", "expected a number");
+    let mut names = message.split('`').skip(1).step_by(2);
+    let is_unknown = message.starts_with("unknown ");
+    let meant = names.next().filter(|_| is_unknown).and_then(|word| nearest(word, names));
+    let meant = meant.map_or_else(String::new, |name| format!("did you mean `{name}`? "));
+    (told, format!("{meant}see `{schema}` for every key, its type and its meaning"))
+}
+
 /// The text of a scene file, to build errors from.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Source<'a> {
@@ -35,6 +59,12 @@ pub(crate) struct Source<'a> {
 }
 
 impl Source<'_> {
+    /// What the parser refuses; `schema` is the command that tells what a scene may say.
+    pub(crate) fn refused(self, error: &toml::de::Error, schema: &str) -> SceneError {
+        let (message, help) = parsed(error.message(), schema);
+        self.error(error.span().unwrap_or(0..0), message, help)
+    }
+
     pub(crate) fn error(self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> SceneError {
         let start = span.start.min(self.text.len());
         let before = &self.text[..self.text.floor_char_boundary(start)];
@@ -92,6 +122,36 @@ fn excerpt(text: &str, fault: Range<usize>) -> (String, Range<usize>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_meant_is_named_where_it_is_near() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Section {
+            #[expect(dead_code, reason = "only read")]
+            tolerance: Option<f64>,
+            #[expect(dead_code, reason = "only read")]
+            index: Option<u32>,
+        }
+        let refused = |text: &str| {
+            let error =
+                Source { file: "mine.toml", text }.refused(&toml::from_str::<Section>(text).unwrap_err(), "schema");
+            (error.message, error.help)
+        };
+        for (text, name) in [("tolerence = 1", "tolerance"), ("Index = 1", "index"), ("idnex = 1", "index")] {
+            let (message, help) = refused(text);
+            assert!(
+                message.contains("unknown field") && help.starts_with(&format!("did you mean `{name}`? see")),
+                "{help}"
+            );
+        }
+        // Nothing is near, and what is wrong is no name.
+        for text in ["spacing = 1", "id = 1", "index = -1", "tolerance = \"index\""] {
+            assert!(refused(text).1.starts_with("see `schema`"), "{:?}", refused(text));
+        }
+        assert!(refused("index = -1").0.contains("expected a whole number, 0 or more"), "{:?}", refused("index = -1"));
+        assert!(refused("tolerance = \"a\"").0.contains("expected a number"), "{:?}", refused("tolerance = \"a\""));
+    }
 
     #[test]
     fn long_lines_are_cut_around_what_is_at_fault() {

@@ -1,7 +1,7 @@
 //! The numbers of a scene: what can be known of it without solving.
 
 use super::schema::UnitsSection;
-use super::{Inclusion, Mechanics, Scene, TissueVariant, polyline_length};
+use super::{Inclusion, Mechanics, Scene, Snapped, TissueVariant, polyline_length};
 use crate::discretization::nodes::lattice::{lattice_nodes, lattice_nodes_on_interfaces};
 use crate::discretization::{Integration, Resolution};
 use crate::geometry::{Point2, distance_to_polyline, distance_to_segment, shared_area};
@@ -38,6 +38,8 @@ pub struct SceneFacts {
     pub spacing: Option<f64>,
     /// Nodes at this spacing; none where that is not known at once.
     pub nodes: Option<usize>,
+    /// What was beside the boundary in the file, and was put onto it.
+    pub snapped: Vec<Snapped>,
 }
 
 /// The body.
@@ -167,6 +169,7 @@ impl Scene {
             paddles: (0..self.paddles.len()).map(|i| self.paddle_facts(i)).collect(),
             spacing,
             nodes: spacing.and_then(|spacing| self.nodes_at(spacing)),
+            snapped: self.snapped.clone(),
         }
     }
 

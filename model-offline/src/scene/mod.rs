@@ -59,8 +59,8 @@ fn all_bundled() -> impl Iterator<Item = &'static (&'static str, &'static str)> 
     BUNDLED.iter().chain(&BUNDLED_IN_SPACE)
 }
 
-/// Letters in which a name may differ from the one that it was meant for.
-const LETTERS: usize = 2;
+/// Files of a folder that are looked at for one that was meant.
+const MOST_FILES: usize = 10_000;
 
 /// A validated scene.
 ///
@@ -107,6 +107,17 @@ pub struct Scene {
     pub discretization: Discretization,
     /// What else a fit to a tolerance has chosen; not part of the tissue.
     pub fit: Option<FitSection>,
+    /// What the file has beside the boundary, and was put onto it.
+    pub snapped: Vec<Snapped>,
+}
+
+/// Something that must lie on the boundary, and was put there.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Snapped {
+    /// What it is.
+    pub what: String,
+    /// How far it was off, length.
+    pub by: f64,
 }
 
 /// A region of another stiffness or material.
@@ -219,9 +230,17 @@ impl Scene {
     /// The bundled scene that a name was meant for: a letter or two differ, or it has a folder or an ending too many.
     fn nearly_bundled(path: &Path) -> Option<&'static str> {
         let word = path.file_stem()?.to_str()?.to_lowercase();
-        let distance = |name: &str| strsim::osa_distance(&word, name);
-        let (distance, name) = all_bundled().map(|(name, _)| (distance(name), *name)).min_by_key(|near| near.0)?;
-        (distance <= LETTERS && 3 * distance <= word.chars().count()).then_some(name)
+        error::nearest(&word, all_bundled().map(|(name, _)| *name))
+    }
+
+    /// The file beside it that a path was meant for.
+    fn nearly_there(path: &Path) -> Option<String> {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let beside = std::fs::read_dir(folder).ok()?.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
+        let beside: Vec<String> = beside.take(MOST_FILES).filter(|name| name.ends_with(".toml")).collect();
+        let word = path.file_name()?.to_str()?;
+        let meant = error::nearest(word, beside.iter().map(String::as_str))?;
+        Some(path.with_file_name(meant).display().to_string())
     }
 
     /// The text of a scene file, or of a bundled scene, not yet parsed.
@@ -235,7 +254,8 @@ impl Scene {
         let file = path.display().to_string();
         let bytes = reading::read(path, reading::TEXT).map_err(|error| {
             let known: Vec<&str> = all_bundled().map(|b| b.0).collect();
-            let meant = Self::nearly_bundled(path).map_or_else(String::new, |name| format!("did you mean `{name}`? "));
+            let meant = Self::nearly_bundled(path).map(str::to_owned).or_else(|| Self::nearly_there(path));
+            let meant = meant.map_or_else(String::new, |name| format!("did you mean `{name}`? "));
             error::Source { file: &file, text: "" }.error(
                 0..0,
                 format!("cannot read the scene: {error}"),

@@ -33,6 +33,9 @@ const PADDLES: usize = 5;
 /// A needle's contact as part of the edge that it enters.
 const CONTACT: f64 = 0.3;
 
+/// Depth of the insertion, part of the body's size: deeper, a soft block may give way beside a paddle that follows.
+const DEPTH: f64 = 0.035;
+
 /// The text of a valid, commented scene. Without an import: a block of 100 by 60 mm with one inclusion, in units that are not
 /// known of 100 by 60.
 ///
@@ -150,7 +153,7 @@ impl Layout {
         };
         Self {
             immobile,
-            depth: imported.depth.unwrap_or_else(|| rounded(0.05 * size).min(rounded_down(needle.most))),
+            depth: imported.depth.unwrap_or_else(|| rounded(DEPTH * size).min(rounded_down(needle.most))),
             target: imported.target.unwrap_or_else(|| innermost(outline, &needle.contact)),
             contact: needle.contact,
             axis: needle.axis,
@@ -352,7 +355,12 @@ fn polygon(polygon: &Polygon) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::placement::workflow::model_with_paddle;
     use crate::scene::import::{ImportOptions, svg};
+    use crate::solver::equilibrium::NewtonSettings;
+    use crate::table::{TableOptions, build};
+    use firmware::contract::Knot;
+    use nalgebra::Vector2;
 
     fn names() -> StarterNames {
         StarterNames { name: "mine".into(), length: "mm".into(), stress: "kPa".into() }
@@ -362,6 +370,29 @@ mod tests {
     fn the_starter_is_a_valid_scene() {
         let scene = Scene::parse(&starter(&names(), None), "starter").unwrap();
         assert_eq!((scene.paddles.len(), scene.inclusions.len(), scene.length_unit.as_str()), (4, 1, "mm"));
+    }
+
+    /// At a depth of 5.8 mm the homogeneous block gives way beside the paddle before its end, and the target comes back a part of its way.
+    #[test]
+    fn the_starters_tissue_bears_what_its_best_paddle_does() {
+        let starter = Scene::parse(&starter(&names(), None), "starter").unwrap();
+        for scene in [starter.without_inclusions(), starter] {
+            let (model, paddle) = model_with_paddle(&scene, None).unwrap();
+            let table = build(&model, paddle, &TableOptions::default()).unwrap();
+            let mut body = model.body(model.paddle_position(paddle), NewtonSettings::default()).unwrap();
+            let pairs = table.knots.windows(2).map(|knots| [&knots[0], &knots[1]]);
+            let mut last = 0.0;
+            for (k, share) in pairs.flat_map(|[from, to]| (1..=4).map(move |k| ([from, to], 0.25 * f64::from(k)))) {
+                let [depth, x, y] = [0, 1, 2].map(|i| {
+                    let of = |knot: &Knot<f64, 2>| [knot.depth, knot.paddle_path.x, knot.paddle_path.y][i];
+                    of(k[0]) + share * (of(k[1]) - of(k[0]))
+                });
+                body.drive(depth, Vector2::new(x, y)).unwrap();
+                let along = body.target_displacement().dot(&scene.needle.axis);
+                assert!(along > last, "{} at {depth}: {along} after {last}", scene.tissue());
+                last = along;
+            }
+        }
     }
 
     #[test]

@@ -82,7 +82,7 @@ fn error_panel(run: &RunResult, case: &CaseResult) -> Panel {
     let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));
     panel.description = format!("Orthogonal error along the insertion, {}", case_name(case));
     panel.lines.push(zero());
-    for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
+    for (strategy, result) in run.shown(case) {
         let name = strategy.title();
         let name = result.paddle.map_or_else(|| name.to_owned(), |paddle| format!("{name}, paddle {paddle}"));
         let (colour, dash) = look(strategy);

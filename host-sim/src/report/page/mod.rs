@@ -62,7 +62,7 @@ fn head(run: &RunResult) -> Markup {
             } }
             tbody { @for case in &run.cases { tr {
                 td { (case.tissue) }
-                td { (largest(without_paddle(run, case))) }
+                td { (largest(run.without_paddle(case))) }
                 td.best[!moving_pays(case)] { (largest(case.strategies.static_paddle.as_ref())) }
                 td.best[moving_pays(case)] { (largest(case.strategies.controlled())) }
                 td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
@@ -84,11 +84,6 @@ fn head(run: &RunResult) -> Markup {
         }
         nav { ol { @for (id, title) in PARTS { li { a href=(format!("#{id}")) { (title) } } } } }
     }
-}
-
-/// The insertion without a paddle: what a table knows makes no difference to it.
-fn without_paddle<'r>(run: &'r RunResult, case: &CaseResult) -> Option<&'r StrategyResult> {
-    run.cases.iter().filter(|other| other.tissue == case.tissue).find_map(|other| other.strategies.none.as_ref())
 }
 
 /// Whether the controlled paddle leaves less than the one that is held, as far as both are known.
@@ -131,7 +126,7 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
         p.quiet {
             @if frames > 1 { "Between " (frames) " solved states per strategy the slider interpolates. " }
             span.needs-script { "Values appear under the pointer. " }
-            "A strategy that would repeat another case is left out."
+            "Without a paddle, what the table knows makes no difference."
         }
     }
 }

@@ -252,7 +252,7 @@ impl Surface {
 pub(super) fn bodies(run: &RunResult, surface: &Surface, case_number: usize, case: &CaseResult) -> Markup {
     html! {
         div.bodies {
-            @for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
+            @for (strategy, result) in run.shown(case) {
                 figure {
                     (inline(&surface.body(run, case.tissue, (body_id(case_number, strategy), strategy.title()), result)))
                     figcaption {

@@ -86,7 +86,7 @@ fn body<'a>(run: &RunResult, surface: &Surface, id: String, strategy: &'a Strate
 pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) -> String {
     let mut bodies = Vec::new();
     for (number, case) in run.cases.iter().enumerate() {
-        for (strategy, result) in case.strategies.iter().filter(|shown| shown.0.is_reproducible()) {
+        for (strategy, result) in run.shown(case) {
             bodies.push(body(run, surface, body_id(number, strategy), result));
         }
     }

@@ -68,7 +68,7 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     let results = run.cases.iter().flat_map(|case| case.strategies.iter());
     let digits = decimals(smallest_told(results.map(|(_, result)| result.max_orthogonal_error)), 6);
     for case in &run.cases {
-        write_case(text, case, digits)?;
+        write_case(text, run, case, digits)?;
     }
     if let Some(why) = below_noise(run) {
         writeln!(text, "  {why}")?;
@@ -123,7 +123,7 @@ fn error(strategy: Option<&StrategyResult>, digits: usize) -> String {
     format!("{:.digits$}{paddle}", strategy.max_orthogonal_error)
 }
 
-fn write_case(text: &mut String, case: &CaseResult, digits: usize) -> std::fmt::Result {
+fn write_case(text: &mut String, run: &RunResult, case: &CaseResult, digits: usize) -> std::fmt::Result {
     let strategies = &case.strategies;
     let dynamic = strategies.controlled();
     write!(
@@ -131,7 +131,7 @@ fn write_case(text: &mut String, case: &CaseResult, digits: usize) -> std::fmt::
         "  {:<13} {:<13} {:>12} {:>16} {:>16}",
         case.tissue.name(),
         case.table_tissue,
-        error(strategies.none.as_ref(), digits),
+        error(run.without_paddle(case), digits),
         error(strategies.static_paddle.as_ref(), digits),
         error(dynamic, digits),
     )?;

@@ -161,7 +161,7 @@ mod tests {
         for (unit, stress) in [("mm", "kPa"), ("1", "1")] {
             let (scene, _) = scene(&"\n".repeat(12), unit, stress);
             assert!(scene.warnings().is_empty(), "{:?}", scene.told_warnings());
-            assert_eq!((scene.inclusions.len(), scene.needle.depth), (1, 5.8));
+            assert_eq!((scene.inclusions.len(), scene.needle.depth), (1, 4.1));
         }
     }
 

@@ -92,7 +92,7 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
         }
         Some(path) => {
             output::write_whole(path, text.as_bytes())?;
-            say!("{summary}{}\nnext: model-offline place {0}", path.display());
+            say!("{summary}{}\nnext: model-offline check {0}, draw it, then model-offline place {0}", path.display());
         }
     }
     Ok(())

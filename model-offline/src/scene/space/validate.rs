@@ -28,13 +28,8 @@ const DIGITS: f64 = 1e-5;
 
 /// A scene whose files are relative to `folder`.
 pub(super) fn parse(source: Source<'_>, folder: &Path) -> Checked<SpaceScene> {
-    let file: SpaceSceneFile = toml::from_str(source.text).map_err(|error| {
-        source.error(
-            error.span().unwrap_or(0..0),
-            error.message().to_owned(),
-            "see `model-offline schema --dimension 3` for every key, its type and its meaning",
-        )
-    })?;
+    let file: SpaceSceneFile =
+        toml::from_str(source.text).map_err(|error| source.refused(&error, "model-offline schema --dimension 3"))?;
     let bodies = Bodies::new(source, folder, &file.scene.units.length);
     Validator { source, file: &file }.scene(bodies)
 }

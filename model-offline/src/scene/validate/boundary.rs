@@ -3,9 +3,11 @@
 use super::{Checked, Validator};
 use crate::geometry::{Location, Nearest, Point2, Polygon, nearest_on_loop};
 use crate::number::{coordinate, in_unit, short};
+use crate::scene::Snapped;
 use crate::scene::boundary::{EdgePart, OnBoundary};
 use crate::scene::exactly::Coordinates;
 use crate::scene::schema::Located;
+use std::cell::RefCell;
 use std::ops::Range;
 
 /// Points that touch are at most this far apart, part of the body's size.
@@ -27,18 +29,39 @@ pub(super) struct Boundary<'a> {
     snap: f64,
     /// Label of the length unit.
     unit: &'a str,
+    /// What was put onto it.
+    moved: RefCell<Vec<Snapped>>,
 }
 
 impl<'a> Boundary<'a> {
     pub(super) fn new(outline: &'a Polygon, vertices: &[Coordinates<2>], unit: &'a str) -> Self {
         let size = outline.size();
         let vertices = vertices.iter().map(|v| Point2::from(v.0)).collect();
-        Self { outline, vertices, tolerance: TOUCHING * size, snap: SNAP * size, unit }
+        Self { outline, vertices, tolerance: TOUCHING * size, snap: SNAP * size, unit, moved: RefCell::default() }
+    }
+
+    /// What was put onto the boundary so far, and how far it was off.
+    pub(super) fn moved(&self) -> Vec<Snapped> {
+        self.moved.borrow().clone()
+    }
+
+    /// Notes that points were put elsewhere.
+    fn note(&self, what: &str, given: &[Point2], put: &[Point2]) {
+        let by = given.iter().zip(put).map(|(given, put)| (put - given).norm()).fold(0.0, f64::max);
+        if by > 0.0 {
+            self.moved.borrow_mut().push(Snapped { what: what.to_owned(), by });
+        }
     }
 
     /// The point, or where it is on the boundary if it is meant to lie there: at a corner that is near enough, else at the
     /// nearest point. What touches the boundary already keeps its digits.
-    pub(super) fn snapped(&self, p: Point2) -> Point2 {
+    pub(super) fn snapped(&self, p: Point2, what: &str) -> Point2 {
+        let put = self.on_boundary(p);
+        self.note(what, &[p], &[put]);
+        put
+    }
+
+    fn on_boundary(&self, p: Point2) -> Point2 {
         self.snapped_within(p, self.snap)
     }
 
@@ -108,7 +131,9 @@ impl Validator<'_> {
         if let OnBoundary::Points(points) = located.get() {
             let path = self.polyline(points, located.span(), what)?;
             if path.iter().all(|p| boundary.holds(*p)) {
-                return Ok(path.iter().map(|p| boundary.without_film(*p)).collect());
+                let put: Vec<Point2> = path.iter().map(|p| boundary.without_film(*p)).collect();
+                boundary.note(what, &path, &put);
+                return Ok(put);
             }
         }
         let path = self.points_on(located, boundary, what)?;
@@ -133,9 +158,12 @@ impl Validator<'_> {
             OnBoundary::Edge(part) => self.edge_part(part, located.span(), boundary, what),
             OnBoundary::Points(points) => {
                 let path = self.polyline(points.as_ref(), located.span(), what)?;
-                let snapped: Vec<Point2> = path.iter().map(|p| boundary.snapped(*p)).collect();
+                let snapped: Vec<Point2> = path.iter().map(|p| boundary.on_boundary(*p)).collect();
                 match snapped.windows(2).position(|s| s[0] == s[1]) {
-                    None => Ok(snapped),
+                    None => {
+                        boundary.note(what, &path, &snapped);
+                        Ok(snapped)
+                    }
                     Some(i) => Err(self.error(
                         located.span(),
                         format!(

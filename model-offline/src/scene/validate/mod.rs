@@ -36,13 +36,8 @@ pub(super) fn parse(source: Source<'_>) -> Checked<Scene> {
             "use dimension = 2 (plane strain); scenes with dimension = 3 are for all commands but `sweep` and `compare`",
         ));
     }
-    let file: SceneFile = toml::from_str(source.text).map_err(|error| {
-        source.error(
-            error.span().unwrap_or(0..0),
-            error.message().to_owned(),
-            "see `model-offline schema` for every key, its type and its meaning",
-        )
-    })?;
+    let file: SceneFile =
+        toml::from_str(source.text).map_err(|error| source.refused(&error, "model-offline schema"))?;
     Validator { source, file: &file }.scene()
 }
 
@@ -88,6 +83,7 @@ impl Validator<'_> {
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, &outline)?,
             sensor: self.sensor(needle.depth)?,
+            snapped: boundary.moved(),
             motion: self.motion()?,
             fit: file.fit.as_ref().map(|fit| fit.get().clone()),
             needle,

@@ -46,7 +46,7 @@ impl Validator<'_> {
             None => needle.entry(),
             Some(entry) => {
                 let point = self.point(entry.get(), entry.span(), "entry")?;
-                let point = if boundary.holds(point) { point } else { boundary.snapped(point) };
+                let point = if boundary.holds(point) { point } else { boundary.snapped(point, "needle entry") };
                 if !boundary.holds(point) {
                     return Err(self.error(
                         entry.span(),

@@ -1,6 +1,6 @@
 //! Every rule by which a scene is unusual, in the order of the file.
 
-use super::SceneWarning;
+use super::{SceneWarning, Small};
 use crate::discretization::Resolution;
 use crate::geometry::{Point2, cross, distance_to_polyline, distance_to_segment, segments_meet, shared_area};
 use crate::material::Material;
@@ -28,6 +28,8 @@ const SHORT_OVERLAP: f64 = 0.02;
 /// Part of the depth that a paddle is away from the needle's contact at least: found by trial, insertions with paddles nearer than half
 /// of that stopped before their first increment on some meshes.
 const BESIDE_NEEDLE: f64 = 0.01;
+/// Part of the body's size below which a length is hardly meant.
+const TINY: f64 = 1e-3;
 /// Part of the body's size within which what cannot move holds a target as well.
 const HELD: f64 = 0.01;
 
@@ -95,6 +97,12 @@ impl Rules<'_> {
         self.spacing.filter(|spacing| length < spacing * (1.0 - SAME))
     }
 
+    /// What is so small that no spacing is needed to say so.
+    fn tiny(&self, what: Small, length: f64) -> Option<SceneWarning> {
+        let is_tiny = self.spacing.is_none() && length < TINY * self.size;
+        is_tiny.then_some(SceneWarning::Tiny { what, length, size: self.size })
+    }
+
     fn inclusions(&self) -> Vec<SceneWarning> {
         let (mut found, mut overlaps) = (Vec::new(), Vec::new());
         for (i, region) in self.scene.inclusions.iter().map(|inclusion| &inclusion.outline).enumerate() {
@@ -107,6 +115,7 @@ impl Rules<'_> {
             if let Some(spacing) = self.longer_spacing(width) {
                 found.push(SceneWarning::InclusionNarrow { inclusion, width, spacing });
             }
+            found.extend(self.tiny(Small::Inclusion(inclusion), width));
             let more = MOST_OVERLAPS - overlaps.len();
             overlaps.extend((0..i).filter_map(|first| self.overlap(first, i)).take(more));
         }
@@ -188,7 +197,8 @@ impl Rules<'_> {
 
     fn contact(&self) -> Option<SceneWarning> {
         let length = self.scene.needle.contact_length();
-        self.longer_spacing(length).map(|spacing| SceneWarning::ContactShort { length, spacing })
+        let short = self.longer_spacing(length).map(|spacing| SceneWarning::ContactShort { length, spacing });
+        short.or_else(|| self.tiny(Small::Contact, length))
     }
 
     fn friction(&self) -> Vec<SceneWarning> {
@@ -240,7 +250,8 @@ impl Rules<'_> {
             return Some(SceneWarning::TargetNearImmobile { distance: from_immobile });
         }
         let distance = self.scene.outline.distance_to_boundary(self.scene.target);
-        self.longer_spacing(distance).map(|spacing| SceneWarning::TargetNearBoundary { distance, spacing })
+        let near = self.longer_spacing(distance).map(|spacing| SceneWarning::TargetNearBoundary { distance, spacing });
+        near.or_else(|| self.tiny(Small::TargetsDistance, distance))
     }
 
     fn paddles(&self) -> Vec<SceneWarning> {
@@ -251,6 +262,7 @@ impl Rules<'_> {
             if let Some(spacing) = self.longer_spacing(length) {
                 found.push(SceneWarning::PaddleShort { index: paddle.index, length, spacing });
             }
+            found.extend(self.tiny(Small::Paddle(paddle.index), length));
             let (gap, depth) = (self.scene.paddle_facts(i).from_contact, self.scene.needle.depth);
             if self.scene.needle.shaft.is_none() && gap < BESIDE_NEEDLE * depth {
                 found.push(SceneWarning::PaddleBesideNeedle { index: paddle.index, gap, depth });

@@ -81,6 +81,15 @@ pub enum SceneWarning {
         /// Length from which on tissue bears it.
         least: f64,
     },
+    /// Something is so small beside the body that its unit may be another one.
+    Tiny {
+        /// What it is.
+        what: Small,
+        /// Its length or width, or the distance from the boundary.
+        length: f64,
+        /// The body's size: the diagonal of its bounding box.
+        size: f64,
+    },
     /// The target is next to the boundary.
     TargetNearBoundary {
         /// Its distance from the boundary.
@@ -163,6 +172,30 @@ pub enum SceneWarning {
     },
 }
 
+/// What is so small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Small {
+    /// The needle's contact.
+    Contact,
+    /// What is between target and boundary.
+    TargetsDistance,
+    /// The width of an inclusion, counted from 1.
+    Inclusion(usize),
+    /// The paddle of this index.
+    Paddle(u32),
+}
+
+impl Small {
+    fn told(self, length: &str) -> String {
+        match self {
+            Self::Contact => format!("the needle contact is {length} long"),
+            Self::TargetsDistance => format!("the target is {length} from the boundary"),
+            Self::Inclusion(number) => format!("inclusion {number} is {length} wide"),
+            Self::Paddle(index) => format!("paddle {index} is {length} long"),
+        }
+    }
+}
+
 impl SceneWarning {
     /// What is unusual, with lengths in this unit (`1`: none).
     pub fn message(&self, unit: &str) -> String {
@@ -206,6 +239,9 @@ impl SceneWarning {
                 let (whose, on, from) = (whose(inclusion), long(tip_length), long(least));
                 format!("the tip is {on} long, and tissue bears the cutting force of {whose} from {from} on")
             }
+            Self::Tiny { what, length, size } => {
+                format!("{}, in a body of {}", what.told(&long(length)), long(size))
+            }
             Self::TargetNearBoundary { distance, spacing } => {
                 let [at, nodes] = [distance, spacing].map(long);
                 format!("the target is nearer to the boundary than the nodes are to each other: {at} of {nodes}")
@@ -222,12 +258,9 @@ impl SceneWarning {
             Self::InclusionCovered { inclusion, by } => {
                 format!("inclusion {inclusion} does nothing: inclusion {by} covers it, and the later one counts")
             }
-            Self::InclusionsOverlap { first, second, area, share } => format!(
-                "inclusions {first} and {second} overlap: an area of {}, {} of the smaller one, is taken to be of inclusion {second}, \
-                 which comes later",
-                number::area(area, unit),
-                percent(share)
-            ),
+            Self::InclusionsOverlap { first, second, area, share } => {
+                overlap([first, second], &number::area(area, unit), share)
+            }
             Self::PaddlesOverlap { first, second, length } => {
                 format!("paddles {first} and {second} overlap by {}", long(length))
             }
@@ -257,6 +290,9 @@ impl SceneWarning {
             Self::NeedleLeavesBody { .. } => "insert less deep, or check the units of the depth",
             Self::NeedleMeetsImmobile { .. } => "insert less deep, or turn the axis: what cannot move stops a needle",
             Self::ContactShort { .. } | Self::PaddleShort { .. } => "lengthen it, or take a smaller spacing",
+            Self::Tiny { .. } => {
+                "check the numbers and their unit; where it is meant so, a tolerance takes many nodes there"
+            }
             Self::FrictionOnlySticks { .. } => "give kinetic_friction too",
             Self::TipTooShort { .. } => {
                 "give a longer tip_length, or a spacing in place of the tolerance: on fine nodes there may be no equilibrium"
@@ -297,6 +333,15 @@ impl fmt::Display for SceneWarning {
 /// What resists: an inclusion, or everything that the needle goes through.
 fn whose(inclusion: Option<usize>) -> String {
     inclusion.map_or("the needle".to_owned(), |number| format!("inclusion {number}"))
+}
+
+/// Two inclusions that share an area, of which they say whose it is.
+fn overlap([first, second]: [usize; 2], area: &str, share: f64) -> String {
+    format!(
+        "inclusions {first} and {second} overlap: an area of {area}, {} of the smaller one, is taken to be of inclusion {second}, \
+         which comes later",
+        percent(share)
+    )
 }
 
 /// A part of something, never 0 and never all of it.

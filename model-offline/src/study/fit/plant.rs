@@ -61,7 +61,7 @@ pub(super) fn plant(
         return Ok((condensed(model, paddle)?, Vec::new()));
     }
     let mut rejected = vec![Rejected::new(Alternative::LinearLaw, RejectionReason::LinearLaw(law_error))];
-    let options = TrainingOptions { tolerance, threads, ..TrainingOptions::default() };
+    let options = TrainingOptions { threads, ..TrainingOptions::to(tolerance) };
     let plant = match train(model, paddle, &options) {
         Ok((trained, report)) => reduced(model, &trained, report.domain.depth, paddle),
         Err(error) => {

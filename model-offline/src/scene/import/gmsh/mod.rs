@@ -68,6 +68,16 @@ impl Shapes<'_> {
             self.surfaces()?
         }
         let has_surfaces = !self.mesh.elements[2].is_empty();
+        // A mesh whose lines have no names at all has them of its curves.
+        let is_named = |group: &&Group| matches!(group, Group::Named(_));
+        let unnamed = self.mesh.elements[1].keys().filter(|group| !is_named(group)).count();
+        if has_surfaces && unnamed > 0 && self.mesh.elements[1].keys().any(|group| is_named(&group)) {
+            let told = if unnamed == 1 { "a line".to_owned() } else { format!("{unnamed} lines") };
+            self.summary.leave(
+                &format!("{told} without a name"),
+                "a line has the role that the name of its physical group says",
+            );
+        }
         for (group, lines) in &self.mesh.elements[1] {
             let (told, meaning) = named(group, "lines");
             match meaning.role {

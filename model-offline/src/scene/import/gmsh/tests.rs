@@ -209,6 +209,20 @@ fn all_formats_give_the_same_scene() {
     assert_eq!((scene.needle.axis, scene.needle.entry()), (Point2::new(0.0, -1.0), Point2::new(25.0, 40.0)));
 }
 
+/// Who names lines means all that matter; a mesh without names has lines of its curves.
+#[test]
+fn a_line_without_a_name_among_others_is_told() {
+    let text = String::from_utf8(Example::ascii_2()).unwrap();
+    let count = |names: usize| format!("$PhysicalNames\n{names}\n");
+    let unnamed: String =
+        text.lines().filter(|line| !line.contains("free surface")).map(|line| format!("{line}\n")).collect();
+    let unnamed = unnamed.replace(&count(GROUPS.len()), &count(GROUPS.len() - 1));
+    let read = read(unnamed.as_bytes(), &ImportOptions::default()).unwrap();
+    let left: Vec<&str> = read.summary.left_out.iter().map(|left| left.what.as_str()).collect();
+    assert_eq!(left, ["a line without a name"]);
+    assert!(read.summary.left_out[0].why.contains("physical group"), "{:?}", read.summary);
+}
+
 #[test]
 fn binary_files_that_are_cut_off_or_turned_round_are_refused() {
     let is_typed = |bytes: &[u8]| match read(bytes, &ImportOptions::default()) {

@@ -100,8 +100,11 @@ impl<'a, 'input> Reader<'a, 'input> {
         }
         let name = node.tag_name().name();
         let hidden = property(node, "display") == Some("none");
+        let opacity =
+            property(node, "opacity").and_then(|value| value.trim_end_matches('%').trim().parse::<f64>().ok());
         let why = match name {
             _ if hidden => Some("it is hidden (display: none)"),
+            _ if opacity.is_some_and(|opacity| opacity <= 0.0) => Some("it cannot be seen (opacity: 0)"),
             "svg" => Some("a drawing within the drawing is not read; ungroup it"),
             "switch" => Some("alternatives are not read; keep one of them, without <switch>"),
             _ if NO_SHAPES.contains(&name) => Some("what is in it is not drawn by itself"),

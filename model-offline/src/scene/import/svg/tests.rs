@@ -213,6 +213,8 @@ fn hidden_and_undrawn_shapes_are_left_out_and_say_so() {
         ),
         (format!("<g display='none'><g>{circle}</g></g>"), "with 1 shape"),
         ("<circle cx='30' cy='30' r='5' visibility='hidden'/>".into(), "visibility"),
+        ("<circle cx='30' cy='30' r='5' opacity='0'/>".into(), "opacity"),
+        (format!("<g style='opacity:0%'>{circle}{circle}</g>"), "opacity: 0), with 2 shapes"),
         (format!("<g style='visibility:hidden'>{circle}</g>"), "visibility"),
         (format!("<defs>{circle}</defs>"), "not drawn by itself"),
         (format!("<symbol>{circle}</symbol>"), "not drawn by itself"),
