@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use model_offline::output::chart::number::{in_unit, number};
 use model_offline::output::chart::style::band;
-use model_offline::output::chart::{Anchor, Drawing, Px, colour_bar};
+use model_offline::output::chart::{Anchor, Drawing, Names, Px, colour_bar};
 use model_offline::output::surface;
 use model_offline::output::surface::Interpolated;
 use model_offline::scene::TissueVariant;
@@ -20,6 +20,13 @@ use crate::bench::strategy::Strategy;
 /// Width of the scene and of a body, px.
 const SCENE_WIDTH: f64 = 420.0;
 const BODY_WIDTH: f64 = 300.0;
+/// Radius of a node, px.
+const NODE: f64 = 0.9;
+/// Half the widths of what names keep clear of, px.
+const TARGET: f64 = 12.0;
+const NUMBER: f64 = 9.0;
+/// Where the strokes of what is held are, over the distance of a paddle's number.
+const STROKES: f64 = 0.4;
 
 /// The immobile boundary, its outer side with strokes.
 fn held(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry, part: &[[f64; 2]]) {
@@ -52,7 +59,7 @@ pub(super) fn at_rest(run: &RunResult) -> Drawing {
     for inclusion in &geometry.inclusions {
         drawing.polygon("inclusion", &view.path(inclusion));
     }
-    geometry.nodes.iter().for_each(|node| drawing.circle("node", view.at(*node), 1.7));
+    geometry.nodes.iter().for_each(|node| drawing.circle("node", view.at(*node), NODE));
     geometry.immobile.iter().for_each(|part| held(&mut drawing, &view, geometry, part));
     drawing.polyline("contact", &view.path(&geometry.needle_contact));
     needle(&mut drawing, &view, geometry, 0.0);
@@ -80,22 +87,33 @@ fn sub(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// Names of the parts, beside them.
+/// Names of the parts, where nothing else is drawn.
 fn words(drawing: &mut Drawing, view: &PlaneView, geometry: &Geometry) {
-    let [x, y] = view.at(geometry.target);
-    drawing.text("tick halo", [x - 12.0, y - 12.0], Anchor::End, "target");
-    let [needle, _] = view.needle(geometry, 0.0);
-    drawing.text("tick halo", [needle[0] + 9.0, needle[1] + 12.0], Anchor::Start, "needle");
-    if let Some(inclusion) = geometry.inclusions.first() {
-        let low = view.path(inclusion).iter().map(|point| point[1]).fold(f64::NEG_INFINITY, f64::max);
-        let [x, _] = view.at(middle(inclusion));
-        drawing.text("tick halo", [x, low + 14.0], Anchor::Middle, "inclusion");
+    let mut names = Names::default();
+    let closed = |path: Vec<Px>| -> Vec<Px> { path.iter().chain(path.first()).copied().collect() };
+    let shapes = std::iter::once(&geometry.outline).chain(&geometry.inclusions);
+    shapes.for_each(|shape| names.avoid(&closed(view.path(shape))));
+    for [from, to] in geometry.immobile.iter().flat_map(|part| part.windows(2)).map(|pair| [pair[0], pair[1]]) {
+        names.avoid(&view.path(&[from, to]));
+        // Its strokes are outside.
+        let outwards = sub(beside(geometry, view.extent, &[from, to]), middle(&[from, to]));
+        names.avoid(&view.path(&[from, to].map(|end| along(end, outwards, STROKES))));
     }
-    if let Some(part) = geometry.immobile.first() {
-        let [x, y] = view.at(middle(part));
-        let (anchor, shift) = if x > 0.5 * view.size()[0] { (Anchor::End, -10.0) } else { (Anchor::Start, 10.0) };
-        drawing.text("tick halo", [x + shift, y + 4.0], anchor, "immobile");
+    for paddle in &geometry.paddles {
+        names.avoid(&view.path(&paddle.segment));
+        names.avoid_around(view.at(beside(geometry, view.extent, &paddle.segment)), NUMBER);
     }
+    let [outside, entry] = view.needle(geometry, 0.0);
+    names.avoid(&view.path(&geometry.needle_contact));
+    names.avoid(&[outside, entry]);
+    let target = view.at(geometry.target);
+    names.avoid_around(target, TARGET);
+    names.add(target, "target", None);
+    names.add(outside, "needle", None);
+    let inclusion = geometry.inclusions.first().map(|inclusion| ("inclusion", middle(inclusion)));
+    let immobile = geometry.immobile.first().map(|part| ("immobile", middle(part)));
+    inclusion.into_iter().chain(immobile).for_each(|(name, at)| names.add(view.at(at), name, None));
+    names.draw(drawing, [0.0; 2], view.size());
 }
 
 /// The nodes of a frame in a drawing, px, with their displacement from rest, px.
