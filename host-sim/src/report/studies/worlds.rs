@@ -20,12 +20,12 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
     let Worlds { scene, length_unit, seeds, paddles: [fixture, dynamic], rows, waiting, other_tissue } = worlds;
     writeln!(
         text,
-        "Scene {scene}: target displacement orthogonal to the needle, peak / RMS in {length_unit}; fixture: paddle {fixture}, \
+        "Scene {scene}: target displacement orthogonal to the needle, peak / RMS in {length_unit}; static: paddle {fixture}, \
          Stillpoint: paddle {dynamic}, medians of {seeds} seeds (peaks of nine in ten)\n"
     )?;
     writeln!(
         text,
-        "| needle | tissue | patient | sensor | no paddle | fixture | Stillpoint, table knows | table does not |"
+        "| needle | tissue | patient | sensor | no paddle | static paddle | Stillpoint, table knows | table does not |"
     )?;
     writeln!(text, "|---|---|---|---|---|---|---|---|")?;
     for row in rows {
@@ -48,7 +48,7 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
         "\nThe same where the needle waits for some breaths at the skin, the table knowing all but the breath: followed by the \
          observer, foretold by the harmonic predictor. From the needle's first motion on.\n"
     )?;
-    writeln!(text, "| needle | tissue | breaths | waits | sensor | no paddle | fixture | followed | foretold |")?;
+    writeln!(text, "| needle | tissue | breaths | waits | sensor | no paddle | static paddle | followed | foretold |")?;
     writeln!(text, "|---|---|---|---|---|---|---|---|---|")?;
     for row in waiting {
         for sensor in &row.sensors {
@@ -76,7 +76,7 @@ fn write(text: &mut String, worlds: &Worlds) -> std::fmt::Result {
         text,
         "\n(−): a larger peak than without a paddle. ±: how far the simulated tissue, the neighbourhood of each insertion, was from \
          the full model in half of its steps along the first seed's insertion, where that is more than a tenth of the peak, but for \
-         the moment when the skin gives way; at most {} {length_unit}. Fixture: the best one of the simplest world.",
+         the moment when the skin gives way; at most {} {length_unit}. Static paddle: the best one of the simplest world.",
         length(found)
     )?;
     for row in rows.iter().filter(|row| row.no_table.is_some()) {
@@ -95,7 +95,7 @@ fn write_other_tissue(text: &mut String, other: &OtherTissue, simplest: &WorldRo
     )?;
     writeln!(
         text,
-        "| sensor | no paddle | fixture | feed-forward alone | Stillpoint, table does not know | table knows |"
+        "| sensor | no paddle | static paddle | feed-forward alone | Stillpoint, table does not know | table knows |"
     )?;
     writeln!(text, "|---|---|---|---|---|---|")?;
     for OtherTissueRow { sensor, homogeneous, known } in &other.sensors {

@@ -6,7 +6,7 @@ use model_offline::scene::Effect;
 use super::worlds::in_words;
 use crate::bench::worlds::{Controlled, SensorRow, WorldRow, Worlds};
 
-/// A panel per patient and sensor: peaks without a paddle, with the best fixture, and with both tables.
+/// A panel per patient and sensor: peaks without a paddle, with the best static paddle, and with both tables.
 pub fn figure(worlds: &Worlds) -> Figure {
     let peaks = || worlds.rows.iter().flat_map(peaks_of);
     let [mut known, mut simple, mut cells] = [0, 0, 0];
@@ -26,12 +26,12 @@ pub fn figure(worlds: &Worlds) -> Figure {
     }
     Figure {
         title: format!(
-            "{}: with a table that knows the world the target is held better than by the best fixture in {known} of {cells} worlds, \
+            "{}: with a table that knows the world the target is held better than by the best static paddle in {known} of {cells} worlds, \
              with one that does not in {simple}",
             worlds.scene
         ),
         caption: format!(
-            "Largest displacement of the target orthogonal to the needle, medians of {} seeds; stems: nine in ten. Fixture: paddle \
+            "Largest displacement of the target orthogonal to the needle, medians of {} seeds; stems: nine in ten. Static: paddle \
              {}, Stillpoint: paddle {}. Logarithmic: bars begin at the lower end of the axis.",
             worlds.seeds, worlds.paddles[0], worlds.paddles[1]
         ),
@@ -69,7 +69,7 @@ fn panel(patient: &str, found: &[(&WorldRow, &SensorRow)], unit: &str, all: Vec<
         panel.bars.push(Bars { label: label.to_owned(), colour, bars });
     };
     bars("no paddle", Colour::Quiet, -0.42, &|row| row.none.peak);
-    bars("fixture", Colour::Vermillion, -0.2, &|row| row.fixture.peak);
+    bars("static paddle", Colour::Vermillion, -0.2, &|row| row.fixture.peak);
     let knows: Vec<(f64, &Controlled)> =
         places().filter_map(|(x, _, sensor)| Some((x + 0.14, sensor.known.as_ref()?))).collect();
     let not: Vec<(f64, &Controlled)> = places().map(|(x, _, sensor)| (x + 0.32, &sensor.simple)).collect();
@@ -121,7 +121,7 @@ mod tests {
             other_tissue: None,
         };
         let figure = figure(&worlds);
-        let told = "breast: with a table that knows the world the target is held better than by the best fixture in 2 of 3 worlds, \
+        let told = "breast: with a table that knows the world the target is held better than by the best static paddle in 2 of 3 worlds, \
                     with one that does not in 1";
         assert_eq!(figure.title, told);
         let [still, breathing] = &figure.panels[..] else { panic!("{} panels", figure.panels.len()) };
