@@ -32,10 +32,10 @@ pub enum WorldError {
     /// The tissue's step takes longer than the loop has time for.
     #[error(
         "the simulated tissue takes {step_us:.0} µs a step and cannot keep a period of {period_us:.0} µs: at most \
-         {rate_hz:.0} Hz"
+         {rate_hz:.0} Hz{}", instead.as_ref().map_or_else(String::new, |why| format!("; no reduced tissue takes its place: {why}"))
     )]
     #[diagnostic(help(
-        "lower --rate to that, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
+        "lower --rate to that, insert less deep, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
          depths --plant condensed, which is linear, or --mode lockstep, which has no clock"
     ))]
     TooSlow {
@@ -45,6 +45,8 @@ pub enum WorldError {
         period_us: f64,
         /// Highest rate that this tissue keeps, Hz.
         rate_hz: f64,
+        /// Why there is no reduced tissue in its place, where one was tried.
+        instead: Option<Box<WorldError>>,
     },
     /// Needle and tissue cannot go on.
     #[error("the simulated needle cannot go on: {0}")]

@@ -79,6 +79,7 @@ impl<'m> World<TissuePlant<'m>> {
     ) -> Result<Self, WorldError> {
         let place = |index: u32| model.paddle_position(index).ok_or(WorldError::NoPaddle { index });
         let attachment = paddle.attachment(paddle.index().map(place).transpose()?);
+        let attachment = attachment.at_rate(simulation.loop_settings.rate);
         let tissue = match model.scene().has_a_past() {
             true => {
                 let insertion = Insertion {

@@ -40,10 +40,17 @@ pub(crate) fn nearest<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) 
 
 /// What the parser says, in words of people, and what to do: with the key or the word that was meant, where one is near.
 fn parsed(message: &str, schema: &str) -> (String, String) {
-    let told = message.replace("expected u32", "expected a whole number, 0 or more");
-    let told = told
-        .replace("expected usize", "expected a whole number, 0 or more")
-        .replace("expected f64", "expected a number");
+    let words = [
+        ("expected u32", "expected a whole number from 0 to 4294967295"),
+        ("expected usize", "expected a whole number, 0 or more"),
+        ("expected i32", "expected a whole number"),
+        ("expected f64", "expected a number"),
+    ];
+    let told = words.iter().fold(message.to_owned(), |told, (from, to)| told.replace(from, to));
+    let told = match told.split_once("expected struct ") {
+        Some((before, _)) => format!("{before}expected a table"),
+        None => told,
+    };
     let mut names = message.split('`').skip(1).step_by(2);
     let is_unknown = message.starts_with("unknown ");
     let meant = names.next().filter(|_| is_unknown).and_then(|word| nearest(word, names));
@@ -149,7 +156,7 @@ mod tests {
         for text in ["spacing = 1", "id = 1", "index = -1", "tolerance = \"index\""] {
             assert!(refused(text).1.starts_with("see `schema`"), "{:?}", refused(text));
         }
-        assert!(refused("index = -1").0.contains("expected a whole number, 0 or more"), "{:?}", refused("index = -1"));
+        assert!(refused("index = -1").0.contains("expected a whole number from 0 to"), "{:?}", refused("index = -1"));
         assert!(refused("tolerance = \"a\"").0.contains("expected a number"), "{:?}", refused("tolerance = \"a\""));
     }
 

@@ -255,6 +255,7 @@ impl Scene {
         let bytes = reading::read(path, reading::TEXT).map_err(|error| {
             let known: Vec<&str> = all_bundled().map(|b| b.0).collect();
             let meant = Self::nearly_bundled(path).map(str::to_owned).or_else(|| Self::nearly_there(path));
+            let meant = meant.filter(|_| !path.exists());
             let meant = meant.map_or_else(String::new, |name| format!("did you mean `{name}`? "));
             error::Source { file: &file, text: "" }.error(
                 0..0,

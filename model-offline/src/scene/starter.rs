@@ -35,6 +35,8 @@ const CONTACT: f64 = 0.3;
 
 /// Depth of the insertion, part of the body's size: deeper, a soft block may give way beside a paddle that follows.
 const DEPTH: f64 = 0.035;
+/// And part of its width: thin bodies bend.
+const ACROSS: f64 = 0.07;
 
 /// The text of a valid, commented scene. Without an import: a block of 100 by 60 mm with one inclusion, in units that are not
 /// known of 100 by 60.
@@ -153,7 +155,9 @@ impl Layout {
         };
         Self {
             immobile,
-            depth: imported.depth.unwrap_or_else(|| rounded(DEPTH * size).min(rounded_down(needle.most))),
+            depth: imported.depth.unwrap_or_else(|| {
+                rounded(DEPTH * size).min(rounded(ACROSS * outline.width())).min(rounded_down(needle.most))
+            }),
             target: imported.target.unwrap_or_else(|| innermost(outline, &needle.contact)),
             contact: needle.contact,
             axis: needle.axis,

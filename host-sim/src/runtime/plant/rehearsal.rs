@@ -37,8 +37,18 @@ impl Rehearsal {
 
     /// Why there is no run.
     pub fn too_slow(&self) -> WorldError {
+        self.too_slow_without(None)
+    }
+
+    /// The same, and why no reduced tissue takes its place.
+    fn too_slow_without(&self, reduced: Option<WorldError>) -> WorldError {
         let Self { step_us, period_us } = *self;
-        WorldError::TooSlow { step_us, period_us, rate_hz: (PART_OF_PERIOD * 1e6 / step_us).floor() }
+        WorldError::TooSlow {
+            step_us,
+            period_us,
+            rate_hz: (PART_OF_PERIOD * 1e6 / step_us).floor(),
+            instead: reduced.map(Box::new),
+        }
     }
 }
 
@@ -64,7 +74,7 @@ pub fn world_in_time<'m>(
         return Err(full.too_slow());
     }
     let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..simulation.clone() };
-    let Ok(mut world) = at_rest(&reduced) else { return Err(full.too_slow()) };
+    let mut world = at_rest(&reduced).map_err(|why| full.too_slow_without(Some(why)))?;
     let rehearsed = rehearse(&mut world.tissue, simulation)?;
     if !rehearsed.keeps_the_period() {
         return Err(rehearsed.too_slow());

@@ -15,22 +15,33 @@ pub struct Attachment {
     pub paddle: Option<usize>,
     /// Whether it stays where it rests. A reduced model needs to know nothing else then.
     pub held: bool,
+    /// Whether a loop so fast asks for it that a step must take no longer than its accuracy needs.
+    pub fast: bool,
 }
+
+/// From this rate on a loop is fast, Hz: a reduced model of as many modes as there may be takes up to 65 µs a step.
+const FAST: f64 = 5000.0;
 
 impl Attachment {
     /// A paddle that moves.
     pub const fn moved(paddle: Option<usize>) -> Self {
-        Self { paddle, held: false }
+        Self { paddle, held: false, fast: false }
     }
 
     /// A paddle that does not.
     pub const fn held(paddle: Option<usize>) -> Self {
-        Self { paddle, held: true }
+        Self { paddle, held: true, fast: false }
     }
 
-    /// To the scene's own accuracy, on all threads: the result does not depend on how many there are.
+    /// The same for a loop of this rate, Hz.
+    pub(in crate::world) fn at_rate(self, rate: f64) -> Self {
+        Self { fast: rate > FAST, ..self }
+    }
+
+    /// To the scene's own accuracy, or better where there is time for it, on all threads: the result does not depend on how many there are.
     pub(super) fn training(self, model: &TissueModel) -> TrainingOptions {
         let options = TrainingOptions { threads: parallel::available(), ..TrainingOptions::of(model.scene()) };
+        let options = if self.fast { TrainingOptions { aim: options.tolerance, ..options } } else { options };
         if self.held { TrainingOptions { paddle: Some(0.0), ..options } } else { options }
     }
 }

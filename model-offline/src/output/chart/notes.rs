@@ -90,11 +90,15 @@ pub(super) struct Name<'a> {
     pub(super) towards: Option<Px>,
 }
 
-/// Draws each text in the first place that is free; those that find none are left out, and counted.
+/// Draws each text in the first place that is free; those that find none, or whose point is nowhere, are left out, and counted.
 pub(super) fn draw(drawing: &mut Drawing, notes: &[Name<'_>], mut taken: Vec<Box2>, within: Box2) -> usize {
     let mut left_out = 0;
     let mut texts: Vec<Box2> = Vec::new();
     for Name { at, text, towards } in notes {
+        if !at.iter().all(|v| v.is_finite()) {
+            left_out += 1;
+            continue;
+        }
         let own = Box2::around(*at, MARKER);
         let directions = directions(*towards);
         let places = DISTANCES.iter().flat_map(|distance| directions.iter().map(move |way| (*distance, *way)));
@@ -156,6 +160,22 @@ impl Names {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A result may say anything.
+    #[test]
+    fn what_is_nowhere_has_no_name() {
+        for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let mut drawing = Drawing::new([100.0, 100.0], "names".to_owned());
+            let mut names = Names::default();
+            names.avoid(&[[wrong, 1.0], [2.0, wrong]]);
+            names.avoid_around([1.0, wrong], 5.0);
+            for at in [[wrong, 50.0], [50.0, wrong], [50.0, 50.0]] {
+                names.add(at, "name", Some([wrong, 1.0]));
+                names.add(at, "name", None);
+            }
+            assert!(names.draw(&mut drawing, [0.0; 2], [100.0; 2]) >= 4, "{wrong}");
+        }
+    }
 
     #[test]
     fn a_name_lies_on_the_side_that_it_is_meant_for() {

@@ -15,6 +15,9 @@ const TOUCHING: f64 = 1e-9;
 /// Points this near to the boundary are meant to lie on it, part of the body's size: three digits by hand.
 const SNAP: f64 = 1e-3;
 
+/// What is put onto it from nearer than this is a file's rounding, and not told, part of the body's size.
+const DIGITS: f64 = 5e-7;
+
 /// A contact inside that is this near to the boundary is on it, part of the body's size.
 const FILM: f64 = 1e-5;
 
@@ -48,7 +51,7 @@ impl<'a> Boundary<'a> {
     /// Notes that points were put elsewhere.
     fn note(&self, what: &str, given: &[Point2], put: &[Point2]) {
         let by = given.iter().zip(put).map(|(given, put)| (put - given).norm()).fold(0.0, f64::max);
-        if by > 0.0 {
+        if by > DIGITS / SNAP * self.snap {
             self.moved.borrow_mut().push(Snapped { what: what.to_owned(), by });
         }
     }

@@ -99,7 +99,8 @@ impl Rules<'_> {
 
     /// What is so small that no spacing is needed to say so.
     fn tiny(&self, what: Small, length: f64) -> Option<SceneWarning> {
-        let is_tiny = self.spacing.is_none() && length < TINY * self.size;
+        let has_tolerance = matches!(self.scene.discretization.resolution, Resolution::Tolerance(_));
+        let is_tiny = has_tolerance && length < TINY * self.size;
         is_tiny.then_some(SceneWarning::Tiny { what, length, size: self.size })
     }
 
