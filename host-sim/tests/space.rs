@@ -316,13 +316,17 @@ fn by_hand(directory: &Path, scene: &Path, recording: &Recording) {
         let mut controller = host_sim();
         controller.args(["controller", "--link", &link]).args(PATIENT).arg("--table").arg(&table);
         controller.arg("--record").arg(&record);
-        let controller = controller.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let mut controller = controller.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let options = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--paddle", paddles, "--link", &link];
         let options = [&options[..], &PATIENT].concat();
         let mut plant = host_sim();
         plant.args(["plant", "--scene"]).arg(scene).args(options).arg("--json").arg(&json);
         let plant = plant.output().unwrap();
-        let controller = { controller }.wait().unwrap();
+        if refused.is_some() {
+            // A plant that came and went between two looks was never there: it would wait for another one, with all its patience.
+            controller.kill().unwrap();
+        }
+        let controller = controller.wait().unwrap();
         let said = String::from_utf8_lossy(&plant.stderr).replace(['\n', '│'], " ");
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         let Some(refused) = refused else {

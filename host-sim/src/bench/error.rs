@@ -184,7 +184,7 @@ pub enum SimError {
     /// A report is written, of all but what was to run on the machine's clock.
     #[error("the report has no free-run: {source}")]
     #[diagnostic(help(
-        "lower --rate to that, insert less deep, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
+        "lower --rate to that, take --plant reduced in place of full, insert less deep, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
          depths --plant condensed, which is linear, or leave it out with --mode lockstep"
     ))]
     NotKept {

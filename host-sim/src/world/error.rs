@@ -35,7 +35,7 @@ pub enum WorldError {
          {rate_hz:.0} Hz{}", instead.as_ref().map_or_else(String::new, |why| format!("; no reduced tissue takes its place: {why}"))
     )]
     #[diagnostic(help(
-        "lower --rate to that, insert less deep, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
+        "lower --rate to that, take --plant reduced in place of full, insert less deep, take fewer nodes (a larger spacing or tolerance, or what `model-offline fit` finds), for small \
          depths --plant condensed, which is linear, or --mode lockstep, which has no clock"
     ))]
     TooSlow {
