@@ -68,7 +68,9 @@ fn what_is_no_result_or_not_in_it_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let result = solved(folder.path(), &[]);
     assert!(refused(&result, &["--case", "2"]).contains("has one state"));
-    assert!(refused(&result, &["--field", "temperature"]).contains("one of size, orthogonal, strain, von-mises"));
+    assert!(
+        refused(&result, &["--field", "temperature"]).contains("possible values: size, orthogonal, strain, von-mises")
+    );
     assert!(refused(Path::new(&folder.path().join("absent.json")), &[]).contains("cannot read"));
     let value: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&result).unwrap()).unwrap();
     let with = |change: &dyn Fn(&mut serde_json::Value)| {

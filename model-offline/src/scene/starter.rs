@@ -38,6 +38,11 @@ const DEPTH: f64 = 0.035;
 /// And part of its width: thin bodies bend.
 const ACROSS: f64 = 0.07;
 
+/// Depth that is suggested for a body of this size and width, which its tissue bears with a paddle that follows.
+pub fn depth_for(size: f64, width: f64) -> f64 {
+    rounded(DEPTH * size).min(rounded(ACROSS * width))
+}
+
 /// The text of a valid, commented scene. Without an import: a block of 100 by 60 mm with one inclusion, in units that are not
 /// known of 100 by 60.
 ///
@@ -155,9 +160,7 @@ impl Layout {
         };
         Self {
             immobile,
-            depth: imported.depth.unwrap_or_else(|| {
-                rounded(DEPTH * size).min(rounded(ACROSS * outline.width())).min(rounded_down(needle.most))
-            }),
+            depth: imported.depth.unwrap_or_else(|| depth_for(size, outline.width()).min(rounded_down(needle.most))),
             target: imported.target.unwrap_or_else(|| innermost(outline, &needle.contact)),
             contact: needle.contact,
             axis: needle.axis,

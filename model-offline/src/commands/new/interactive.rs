@@ -3,7 +3,7 @@
 use model_offline::geometry::{Point2, Polygon};
 use model_offline::material::Preset;
 use model_offline::scene::import::{Imported, ImportedInclusion};
-use model_offline::scene::starter::StarterNames;
+use model_offline::scene::starter::{StarterNames, depth_for};
 use std::f64::consts::TAU;
 use std::io::{self, BufRead, Write};
 use strum::VariantArray as _;
@@ -55,7 +55,11 @@ pub(super) fn ask(input: impl BufRead, screen: impl Write, names: &StarterNames)
             .then(|| format!("it must be from 0 (none) to below {room}, the way to the boundary"))
     };
     let radius = asked.number("radius of a stiffer inclusion around it, 0 for none", rounded(0.5 * room), fits)?;
-    let depth = asked.number("depth of the needle", rounded(0.05 * width.hypot(height)), within(0.5 * height))?;
+    let depth = asked.number(
+        "depth of the needle",
+        rounded(depth_for(width.hypot(height), width.min(height))),
+        within(0.5 * height),
+    )?;
     let inclusions = if radius > 0.0 { vec![circle(target, radius)] } else { Vec::new() };
     let inclusions = inclusions.into_iter().map(|outline| ImportedInclusion { outline, material: None }).collect();
     Ok(Imported { inclusions, material, target: Some(target), depth: Some(depth), ..Imported::of(outline, Vec::new()) })
