@@ -366,8 +366,6 @@ mod tests {
     use crate::scene::import::{ImportOptions, svg};
     use crate::solver::equilibrium::NewtonSettings;
     use crate::table::{TableOptions, build};
-    use firmware::contract::Knot;
-    use nalgebra::Vector2;
 
     fn names() -> StarterNames {
         StarterNames { name: "mine".into(), length: "mm".into(), stress: "kPa".into() }
@@ -387,14 +385,14 @@ mod tests {
             let (model, paddle) = model_with_paddle(&scene, None).unwrap();
             let table = build(&model, paddle, &TableOptions::default()).unwrap();
             let mut body = model.body(model.paddle_position(paddle), NewtonSettings::default()).unwrap();
-            let pairs = table.knots.windows(2).map(|knots| [&knots[0], &knots[1]]);
             let mut last = 0.0;
-            for (k, share) in pairs.flat_map(|[from, to]| (1..=4).map(move |k| ([from, to], 0.25 * f64::from(k)))) {
-                let [depth, x, y] = [0, 1, 2].map(|i| {
-                    let of = |knot: &Knot<f64, 2>| [knot.depth, knot.paddle_path.x, knot.paddle_path.y][i];
-                    of(k[0]) + share * (of(k[1]) - of(k[0]))
-                });
-                body.drive(depth, Vector2::new(x, y)).unwrap();
+            for (knots, quarter) in
+                table.knots.windows(2).flat_map(|knots| (1..=4).map(move |quarter| (knots, quarter)))
+            {
+                let [from, to] = [&knots[0], &knots[1]];
+                let share = 0.25 * f64::from(quarter);
+                let depth = from.depth + (to.depth - from.depth) * share;
+                body.drive(depth, from.paddle_path + (to.paddle_path - from.paddle_path) * share).unwrap();
                 let along = body.target_displacement().dot(&scene.needle.axis);
                 assert!(along > last, "{} at {depth}: {along} after {last}", scene.tissue());
                 last = along;
