@@ -39,11 +39,11 @@ fn result(directory: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(directory.join("result.json")).unwrap()).unwrap()
 }
 
-/// The target leaves its line by 5 mm without help; the controlled pair is held against the best fixture of the table's tissue.
+/// The target leaves its line by 5 mm without help; the dynamic pair is held against the best static one of the table's tissue.
 #[test]
 fn a_controlled_pair_is_ten_times_better_than_the_best_fixture() {
     let directory = tempfile::tempdir().unwrap();
-    // Of all fifteen pairs the best to control is 5 + 6 in both tissues, the best fixture that or 3 + 4.
+    // Of all fifteen pairs the best to control is 5 + 6 in both tissues, the best static pair that or 3 + 4.
     let scene = with_pairs(directory.path(), "[[3, 4], [5, 6]]");
     let output = run_scene(&scene, directory.path(), &["--sensor", "camera", "--mode", "lockstep"]);
     assert!(output.status.success(), "{output:?}");

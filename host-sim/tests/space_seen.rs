@@ -357,7 +357,7 @@ fn the_report_is_made_again(directory: &Path, report: &Path) {
     let output = again();
     assert!(output.status.success(), "{output:?}");
     assert!(std::fs::read_to_string(&page).unwrap() == text, "not the same page");
-    for name in ["error", "no-paddle", "best-fixture", "controlled"] {
+    for name in ["error", "no-paddle", "static", "dynamic"] {
         let svg = std::fs::read_to_string(pictures.join(format!("inclusion-{name}.svg"))).unwrap();
         assert!(roxmltree::Document::parse(&svg).is_ok(), "{name}");
     }

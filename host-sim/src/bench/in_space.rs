@@ -1,4 +1,4 @@
-//! Strategies compared on a body in space: no paddle, the best fixture, and the paddles that control the target best.
+//! Strategies compared on a body in space: no paddle, the best static paddles, and the paddles that control the target best.
 //!
 //! The controller is a process of its own, as in the plane; a [table of states](model_offline::reduction::tabulated) is the tissue.
 
@@ -113,7 +113,7 @@ pub struct SpaceCase {
     pub table: SpaceTableResult,
     /// No paddle.
     pub none: SpaceStrategyResult,
-    /// The fixture that is best in the table's tissue.
+    /// The static paddles that are best in the table's tissue.
     #[serde(rename = "static")]
     pub fixture: SpaceStrategyResult,
     /// The table's paddles, controlled.

@@ -14,7 +14,7 @@ const ON_THE_WAY: usize = 5;
 pub struct SpaceBodies {
     /// At rest, with the scene's inclusions.
     pub geometry: SpaceGeometry,
-    /// Per case: no paddle, fixture, controlled. Without inclusions where the case has homogeneous tissue.
+    /// Per case: no paddle, static, dynamic. Without inclusions where the case has homogeneous tissue.
     pub cases: Vec<CaseBodies>,
 }
 
@@ -34,7 +34,7 @@ impl SpaceBodies {
     }
 }
 
-/// Bodies of a case: no paddle, fixture, controlled. Why there is none where the model did not get there.
+/// Bodies of a case: no paddle, static, dynamic. Why there is none where the model did not get there.
 pub type CaseBodies = [Result<SpaceState, String>; 3];
 
 /// The body at the end of an insertion with these paddles (indices in the scene): needle depths and the paddles'

@@ -1,5 +1,5 @@
 //! What a richer world than the table's leaves of a compensation: every combination of effects, every sensor, no paddle,
-//! the best fixture, and the controller with a table that knows the world and with one that does not.
+//! the best static paddles, and the controller with a table that knows the world and with one that does not.
 //!
 //! The loop is the firmware's own controller in this process and in simulated time; the tissue is the neighbourhood of each
 //! insertion in its world, whose error against the full model is part of the result.
@@ -66,7 +66,7 @@ pub struct WorldRow {
     pub effects: Vec<Effect>,
     /// Without a paddle.
     pub none: Errors,
-    /// With the best fixture.
+    /// With the best static paddle.
     pub fixture: Errors,
     /// The controller, sensor by sensor.
     pub sensors: Vec<SensorRow>,
@@ -96,7 +96,7 @@ pub struct WaitingRow {
     pub varies: [f64; 2],
     /// Without a paddle.
     pub none: Errors,
-    /// With the best fixture.
+    /// With the best static paddle.
     pub fixture: Errors,
     /// The controller with a table that knows the world, but for its breath, sensor by sensor.
     pub sensors: Vec<BreathRow>,
@@ -131,7 +131,7 @@ pub struct Worlds {
     pub length_unit: String,
     /// Seeds of the sensors' noise, from 1.
     pub seeds: u64,
-    /// Paddles: best fixture, best to control.
+    /// Paddles: the best static one, the best dynamic one.
     pub paddles: [u32; 2],
     /// The worlds, from the simplest.
     pub rows: Vec<WorldRow>,

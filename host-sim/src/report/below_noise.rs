@@ -3,6 +3,7 @@
 use model_offline::output::chart::number::number;
 
 use crate::bench::result::RunResult;
+use crate::bench::strategy::Strategy;
 
 /// Says so where the target leaves the needle's line by less than a measurement of it is off; none where it moves further, or
 /// where no insertion without a paddle was simulated.
@@ -12,10 +13,12 @@ pub(super) fn below_noise(run: &RunResult) -> Option<String> {
     let noise = run.settings.noise;
     let unit = &run.units[0];
     let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
-    let held_is_better = run.cases.iter().any(|case| case.improvement.is_some_and(|factor| factor < 1.0));
-    let advice = match held_is_better {
-        true => "the best static paddle, which needs no sensor, leaves less",
-        false => "what the dynamic paddle brings is the table's doing",
+    let is = |strategy: Strategy| run.cases.iter().filter(|case| case.stillest() == strategy).count();
+    let advice = match (is(Strategy::None), is(Strategy::Static), run.cases.len()) {
+        (0, 0, _) => "what the dynamic paddle brings is the table's doing".to_owned(),
+        (0, _, _) => "the best static paddle, which needs no sensor, leaves less".to_owned(),
+        (none, _, all) if none == all => "the target is stillest without any paddle".to_owned(),
+        (none, _, all) => format!("the target is stillest without any paddle in {none} of {all} cases"),
     };
     // Not where one of them is no number.
     (moved < noise).then(|| {

@@ -3,6 +3,7 @@
 use super::dense::{NotPositiveDefinite, shared_by};
 use super::memory::{self, NotEnoughMemory};
 use super::ordering::nested_dissections;
+use super::packing;
 use super::pattern::Pattern;
 use crate::geometry::Point;
 use crate::parallel;
@@ -66,7 +67,7 @@ impl SymbolicFactor {
     }
 
     fn of(pattern: &Pattern, symbolic: Result<SymbolicCholesky<u32>, FaerError>, condensed: usize) -> Self {
-        let too_many = |_| NotEnoughMemory { unknowns: pattern.unknowns(), needed: None };
+        let too_many = |_| NotEnoughMemory { unknowns: pattern.unknowns(), needed: None, fixed: 0 };
         Self { symbolic: symbolic.map(Arc::new).map_err(too_many), beside: pattern.entries() + condensed }
     }
 
@@ -266,6 +267,7 @@ impl SparseCholesky {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
         let threads = if self.shareable { parallel::here() } else { 1 };
         self.reserve_threads(threads);
+        packing::multiplied();
         self.symbolic
             .factorize_numeric_llt(
                 &mut self.factor,

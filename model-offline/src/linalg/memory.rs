@@ -1,8 +1,10 @@
 //! Whether a factor fits into the memory that the process may have: of the machine, of the control groups that it runs in
 //! (containers, batch jobs), and of its own limits (`ulimit`). A process that takes more gets killed without a word.
 
+use super::packing;
 use std::path::Path;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
 
 /// A factor that there is no memory for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -11,12 +13,25 @@ pub struct NotEnoughMemory {
     pub unknowns: usize,
     /// Bytes that it takes to factorise, and that are free; none where the factor has more entries than can be numbered.
     pub needed: Option<(u64, u64)>,
+    /// Bytes of these that a process whose addresses are limited needs whatever it factorises.
+    pub fixed: u64,
 }
 
 impl std::fmt::Display for NotEnoughMemory {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "to factorise {} unknowns would take ", self.unknowns)?;
         match self.needed {
+            Some((needed, free)) if self.fixed > needed / 2 => {
+                return write!(
+                    f,
+                    "{} of addresses, and {} are left to this process: {} of it are set aside whatever the mesh, for each \
+                     thread as much as the caches of this machine are large; allow it more (ulimit -v), or take fewer \
+                     threads (--threads 1)",
+                    in_words(needed),
+                    in_words(free),
+                    in_words(self.fixed)
+                );
+            }
             Some((needed, free)) => write!(f, "{}, and {} of memory are free", in_words(needed), in_words(free))?,
             None => write!(f, "more than {}, which is not tried", in_words(MOST_ENTRIES * BYTES))?,
         }
@@ -36,6 +51,12 @@ const BYTES: u64 = size_of::<f64>() as u64;
 /// Entries that signed numbers of 32 bits count.
 const MOST_ENTRIES: u64 = i32::MAX as u64;
 
+/// What is computed beside a factor takes so much where a process's addresses are limited: stacks, results.
+const BESIDE: u64 = 1 << 25;
+
+/// How often it is asked again, a millisecond later, where a process's addresses are limited.
+const PATIENCE: usize = 100;
+
 /// What takes less is not asked for: a few pages are there, or nothing is.
 const LITTLE: u64 = 1 << 24;
 
@@ -44,20 +65,45 @@ static TAKING: Mutex<()> = Mutex::new(());
 
 /// Takes memory to factorise so many unknowns, which `allocate` must write to, or refuses where there are not so many bytes.
 pub(super) fn take<T>(unknowns: usize, bytes: u64, allocate: impl FnOnce() -> T) -> Result<T, NotEnoughMemory> {
-    if bytes < LITTLE {
+    let fixed = if is_limited() { BESIDE + packing::outstanding() } else { 0 };
+    if bytes < LITTLE && fixed == 0 {
         return Ok(allocate());
     }
     // It guards nothing that a panic could leave half done.
     let _others_wait = TAKING.lock().unwrap_or_else(PoisonError::into_inner);
-    room_for(unknowns, bytes, available())?;
-    Ok(allocate())
+    // Threads that have ended give back what was theirs a moment later.
+    let mut refused = room_for(unknowns, bytes, fixed, available());
+    for _ in 0..if fixed > 0 { PATIENCE } else { 0 } {
+        if refused.is_ok() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+        refused = room_for(unknowns, bytes, BESIDE + packing::outstanding(), available());
+    }
+    refused.map(|()| allocate())
 }
 
-fn room_for(unknowns: usize, bytes: u64, free: Option<u64>) -> Result<(), NotEnoughMemory> {
+/// Refuses so many unknowns where there are not so many bytes for what comes before the factor.
+///
+/// # Errors
+/// [`NotEnoughMemory`].
+pub(crate) fn room(unknowns: usize, bytes: u64) -> Result<(), NotEnoughMemory> {
+    take(unknowns, bytes, || ())
+}
+
+fn room_for(unknowns: usize, bytes: u64, fixed: u64, free: Option<u64>) -> Result<(), NotEnoughMemory> {
+    let needed = bytes.saturating_add(fixed);
     match free {
-        Some(free) if bytes > free => Err(NotEnoughMemory { unknowns, needed: Some((bytes, free)) }),
+        Some(free) if needed > free => Err(NotEnoughMemory { unknowns, needed: Some((needed, free)), fixed }),
         _ => Ok(()),
     }
+}
+
+/// Whether the process's own limits may end it, rather than the machine's memory.
+fn is_limited() -> bool {
+    static IS_LIMITED: OnceLock<bool> = OnceLock::new();
+    let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
+    *IS_LIMITED.get_or_init(|| of_limits(&read("/proc/self/limits"), &read("/proc/self/status")).is_some())
 }
 
 /// Bytes of memory that this process can take without pushing anything out, as Linux tells it; none elsewhere.
@@ -154,12 +200,14 @@ mod tests {
         let told = refused.unwrap_err().to_string();
         assert!(told.starts_with("to factorise 9000000 unknowns would take 72057594.0 GB, and "), "{told}");
         assert!(told.contains("B of memory are free: take a coarser mesh"), "{told}");
-        let told = |bytes: u64, free: u64| room_for(300, bytes, Some(free)).map_err(|refused| refused.to_string());
+        let told = |bytes: u64, free: u64| room_for(300, bytes, 0, Some(free)).map_err(|refused| refused.to_string());
         assert_eq!(told(41_400_000, 41_400_000), Ok(()));
         let small = told(41_400_000, 2_000_000).unwrap_err();
         assert!(small.contains("41 MB, and 2 MB of memory are free"), "{small}");
-        assert_eq!(room_for(300, u64::MAX, None), Ok(()));
-        let uncounted = NotEnoughMemory { unknowns: 1, needed: None };
+        assert_eq!(room_for(300, u64::MAX, 1, None), Ok(()));
+        let fixed = room_for(300, 1_000, 2_000_000_000, Some(900_000_000)).unwrap_err().to_string();
+        assert!(fixed.contains("2.0 GB of addresses, and 900 MB are left") && fixed.contains("--threads 1"), "{fixed}");
+        let uncounted = NotEnoughMemory { unknowns: 1, needed: None, fixed: 0 };
         assert!(
             uncounted
                 .to_string()

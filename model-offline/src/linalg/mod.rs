@@ -5,6 +5,7 @@ pub mod condensation;
 pub mod dense;
 pub mod memory;
 mod ordering;
+mod packing;
 pub mod pattern;
 pub mod singular;
 
@@ -12,5 +13,6 @@ pub use cholesky::{SparseCholesky, SymbolicFactor};
 pub use condensation::CondensedFactor;
 pub use dense::{DenseCholesky, NotPositiveDefinite};
 pub use memory::NotEnoughMemory;
+pub(crate) use memory::room;
 pub use pattern::Pattern;
 pub use singular::SingularValues;

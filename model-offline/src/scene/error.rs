@@ -38,6 +38,17 @@ pub(crate) fn nearest<'n>(word: &str, names: impl IntoIterator<Item = &'n str>) 
     (distance <= LETTERS && 3 * distance <= word.chars().count()).then_some(name)
 }
 
+/// Sections without which there is no scene, and what they say at least.
+const SECTIONS: [(&str, &str); 7] = [
+    ("scene", "with a `name`"),
+    ("domain", "with the `outline` of the body (in space a `box`, a `solid` or a file)"),
+    ("material", "with a `model` and its moduli (`model-offline materials` lists some)"),
+    ("immobile", "with what holds the body"),
+    ("needle", "with the tissue that it moves, its `axis` and its `depth`"),
+    ("target", "with a `position`"),
+    ("discretization", "e.g. with `tolerance = 0.02`"),
+];
+
 /// What the parser says, in words of people, and what to do: with the key or the word that was meant, where one is near.
 fn parsed(message: &str, schema: &str) -> (String, String) {
     let words = [
@@ -51,6 +62,15 @@ fn parsed(message: &str, schema: &str) -> (String, String) {
         Some((before, _)) => format!("{before}expected a table"),
         None => told,
     };
+    let mut names = message.split('`').skip(1).step_by(2);
+    if message.starts_with("missing field")
+        && let Some(section) = names.next()
+        && let Some((_, example)) = SECTIONS.iter().find(|(name, _)| *name == section)
+    {
+        let help =
+            format!("add it, {example}; `{schema}` has every key, and `model-offline new` a scene to start from");
+        return (format!("the section [{section}] is missing"), help);
+    }
     let mut names = message.split('`').skip(1).step_by(2);
     let is_unknown = message.starts_with("unknown ");
     let meant = names.next().filter(|_| is_unknown).and_then(|word| nearest(word, names));
@@ -156,6 +176,12 @@ mod tests {
         for text in ["spacing = 1", "id = 1", "index = -1", "tolerance = \"index\""] {
             assert!(refused(text).1.starts_with("see `schema`"), "{:?}", refused(text));
         }
+        for section in SECTIONS {
+            let (message, help) = parsed(&format!("missing field `{}`", section.0), "schema");
+            assert_eq!(message, format!("the section [{}] is missing", section.0));
+            assert!(help.contains(section.1) && help.contains("`schema`"), "{help}");
+        }
+        assert_eq!(parsed("missing field `depth`", "schema").0, "missing field `depth`");
         assert!(refused("index = -1").0.contains("expected a whole number from 0 to"), "{:?}", refused("index = -1"));
         assert!(refused("tolerance = \"a\"").0.contains("expected a number"), "{:?}", refused("tolerance = \"a\""));
     }

@@ -4,6 +4,7 @@ use firmware::Mode;
 use model_offline::output::chart::number::{number, plain};
 
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+use crate::bench::strategy::Strategy;
 use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
 
@@ -40,9 +41,14 @@ fn reduction(run: &RunResult) -> Option<String> {
     let held = factors(run, |case| case.improvement).map(|times| format!("{times} than the best static paddle's"));
     let both: Vec<String> = [none, held].into_iter().flatten().collect();
     let why = below_noise(run).map_or_else(String::new, |why| format!("; {why}"));
-    let factors = || run.cases.iter().filter_map(|case| case.improvement);
-    let still = factors().next().is_some() && factors().all(|factor| factor < 1.0);
-    let advice = if still { ": hold it still here" } else { "" };
+    let always = |strategy| run.cases.iter().all(|case| case.stillest() == strategy);
+    let advice = match () {
+        () if always(Strategy::None) => ": leave the paddle away here",
+        () if run.cases.iter().all(|case| case.improvement.is_some_and(|factor| factor < 1.0)) => {
+            ": hold it still here"
+        }
+        () => "",
+    };
     (!both.is_empty()).then(|| format!("The dynamic paddle's largest error is {}{why}{advice}.", both.join(" and ")))
 }
 

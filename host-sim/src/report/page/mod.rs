@@ -31,6 +31,7 @@ use self::embed::{charts, head_of, inline, panels};
 use self::insertion::{CaseCharts, case_charts, case_name, cause_panel, error_panels, needle_panels};
 use super::paper::is_paper;
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
+use crate::bench::strategy::Strategy;
 
 const SCRIPT: &str = concat!(include_str!("common.js"), include_str!("page.js"), include_str!("charts.js"));
 
@@ -62,9 +63,9 @@ fn head(run: &RunResult) -> Markup {
             } }
             tbody { @for case in &run.cases { tr {
                 td { (case.tissue) }
-                td { (largest(run.without_paddle(case))) }
-                td.best[!moving_pays(case)] { (largest(case.strategies.static_paddle.as_ref())) }
-                td.best[moving_pays(case)] { (largest(case.strategies.controlled())) }
+                td.best[case.stillest() == Strategy::None] { (largest(run.without_paddle(case))) }
+                td.best[case.stillest() == Strategy::Static] { (largest(case.strategies.static_paddle.as_ref())) }
+                td.best[case.stillest() == Strategy::Dynamic] { (largest(case.strategies.controlled())) }
                 td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td { (case.improvement_over_none.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
                 td.left { (case.table_tissue) }
@@ -84,11 +85,6 @@ fn head(run: &RunResult) -> Markup {
         }
         nav { ol { @for (id, title) in PARTS { li { a href=(format!("#{id}")) { (title) } } } } }
     }
-}
-
-/// Whether the controlled paddle leaves less than the one that is held, as far as both are known.
-fn moving_pays(case: &CaseResult) -> bool {
-    case.improvement.is_none_or(|factor| factor >= 1.0)
 }
 
 fn largest(strategy: Option<&StrategyResult>) -> String {

@@ -6,6 +6,7 @@ use model_offline::output::chart::number::number;
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Panel, Place, ReferenceLine, Series};
 
 use super::attachments::Attachments;
+use super::conclusion::change;
 use super::embed::{head_of, panels};
 use super::space_view::{self, STRATEGIES};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
@@ -57,9 +58,9 @@ pub(in crate::report) fn pictures(run: &SpaceRun) -> Vec<(String, String)> {
             true => case.tissue.to_string(),
             false => format!("{}-with-{}-table", case.tissue, case.table_tissue),
         };
-        let factor = number(case.improvement, 2);
+        let factor = change(&[case.improvement]);
         let title =
-            format!("Tissue {}: controlled paddles leave {factor} times less than the best fixture", case.tissue);
+            format!("Tissue {}: the dynamic paddles' error is {factor} than the best static paddles'", case.tissue);
         let panels = charts_of(run, case).to_vec();
         let errors = Figure { title, caption: String::new(), panels, columns: 3 }.svg();
         pictures.push((format!("{name}-error.svg"), errors));
@@ -82,8 +83,8 @@ fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
         section {
             h2 { "Tissue " (case.tissue.name()) ", table of tissue " (case.table_tissue.name()) }
             p {
-                "Controlled paddles leave " (number(case.improvement, 2)) " times less than the best fixture, and "
-                (number(case.improvement_over_none, 2)) " times less than no paddle."
+                "The dynamic paddles' largest error is " (change(&[case.improvement])) " than the best static paddles', and "
+                (change(&[case.improvement_over_none])) " than without any."
             }
             div.scroll { table {
                 thead {
@@ -128,30 +129,30 @@ fn error_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
     panel.description = format!("Orthogonal error along the insertion, tissue {}", case.tissue.name());
     for (name, colour, dash, result) in [
         ("no paddle", Colour::Quiet, Dash::Dotted, &case.none),
-        ("fixture", Colour::Vermillion, Dash::Dashed, &case.fixture),
-        ("controlled", Colour::Blue, Dash::Solid, &case.dynamic),
+        ("static", Colour::Vermillion, Dash::Dashed, &case.fixture),
+        ("dynamic", Colour::Blue, Dash::Solid, &case.dynamic),
     ] {
         panel.series.push(Series::curve(name, colour, dash, errors(result)));
     }
     panel
 }
 
-/// The controlled error alone, beside the sensor's noise.
+/// The dynamic paddles' error alone, beside the sensor's noise.
 fn enlarged_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
-    let title = format!("Controlled alone: at most {}", number(case.dynamic.max_orthogonal_error, 2));
+    let title = format!("Dynamic alone: at most {}", number(case.dynamic.max_orthogonal_error, 2));
     let mut panel = Panel::new(&title, depth_axis(run), Axis::linear("orthogonal error", &run.units[0]));
-    panel.description = format!("Orthogonal error of the controlled paddles, tissue {}", case.tissue.name());
+    panel.description = format!("Orthogonal error of the dynamic paddles, tissue {}", case.tissue.name());
     if run.noise > 0.0 {
         panel.lines.push(ReferenceLine::new("1 σ of the sensor's noise", Place::Y(run.noise), Dash::DashDot));
     }
-    panel.series.push(Series::curve("controlled", Colour::Blue, Dash::Solid, errors(&case.dynamic)));
+    panel.series.push(Series::curve("dynamic", Colour::Blue, Dash::Solid, errors(&case.dynamic)));
     panel
 }
 
-/// How far the controlled paddles are displaced.
+/// How far the dynamic paddles are displaced.
 fn paddle_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
     let mut panel = Panel::new("Paddles", depth_axis(run), Axis::linear("displacement", &run.units[0]));
-    panel.description = "Length of the controlled paddles' displacements along the insertion".to_owned();
+    panel.description = "Length of the dynamic paddles' displacements along the insertion".to_owned();
     let looks = [(Colour::Blue, Dash::Solid), (Colour::Green, Dash::DashDot)];
     for ((place, index), (colour, dash)) in case.dynamic.paddles.iter().enumerate().zip(looks) {
         let norm = |p: &[f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();

@@ -25,7 +25,7 @@ const THREE_LICENCE: &str = include_str!("three/LICENSE");
 const SCRIPT: &str = include_str!("space_view.js");
 
 /// Names of a case's strategies, in the order of its bodies.
-pub(super) const STRATEGIES: [&str; 3] = ["no paddle", "best fixture", "controlled"];
+pub(super) const STRATEGIES: [&str; 3] = ["no paddle", "static", "dynamic"];
 /// The field of the pictures without script, which the view begins with as well.
 const FIELD: Field = Field::Orthogonal;
 /// Steps of a displacement in the page, over the largest one.

@@ -408,14 +408,20 @@ fn the_conclusion_says_what_spoils_it() {
         (case.improvement, case.improvement_over_none) = (Some(0.5), Some(0.2));
     }
     assert!(said(&run).contains("5.0 times larger than without a paddle"), "{}", said(&run));
-    // Whoever reads that is told what to do, and what is best is marked: the paddle that is held.
-    assert!(said(&run).contains("hold it still here") && !said(&good).contains("hold it still"), "{}", said(&run));
+    // Whoever reads that is told what to do, and what is best is marked.
+    assert!(said(&run).contains(": leave the paddle away here"), "{}", said(&run));
+    let mut still = run.clone();
+    still.cases.iter_mut().for_each(|case| case.improvement_over_none = Some(3.0));
+    assert!(said(&still).contains("hold it still here") && !said(&good).contains("still here"), "{}", said(&still));
+    assert!(!said(&good).contains("away"), "{}", said(&good));
     let marked = |run: &RunResult, column: usize| {
         let page = render(run);
         let rows = page.split("<tbody>").nth(1).unwrap().split("</tbody>").next().unwrap().to_owned();
         rows.split("<tr>").skip(1).all(|row| row.split("<td").nth(column).unwrap().starts_with(" class=\"best\""))
     };
-    assert!(marked(&good, 4) && !marked(&good, 3) && marked(&run, 3) && !marked(&run, 4));
+    for (run, best) in [(&good, 4), (&still, 3), (&run, 2)] {
+        assert!((2..5).all(|column| marked(run, column) == (column == best)), "{best}");
+    }
     // Without a paddle it makes no difference what a table knows.
     let page = render(&good);
     let rows = page.split("<tbody>").nth(1).unwrap().split("</tbody>").next().unwrap();
@@ -443,6 +449,11 @@ fn feedback_below_the_noise_is_told() {
     );
     let better = said(&with(1.1, 2.0));
     assert!(better.contains(told) && better.contains("is the table's doing"), "{better}");
+    for (beaten, told) in [(usize::MAX, "stillest without any paddle"), (1, "stillest without any paddle in 1 of ")] {
+        let mut run = with(1.1, 0.5);
+        run.cases.iter_mut().take(beaten).for_each(|case| case.improvement_over_none = Some(0.3));
+        assert!(said(&run).contains(told) && !said(&run).contains("what the dynamic"), "{}", said(&run));
+    }
     let on_screen = |run: &RunResult| crate::report::terminal::summary::summary(run, "there".as_ref());
     assert!(on_screen(&with(1.1, 0.5)).contains(told) && !on_screen(&with(0.9, 0.5)).contains(told));
     // Without an insertion that has no paddle there is nothing to hold it against.

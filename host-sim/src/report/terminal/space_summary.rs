@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::summary::{FreeRun, write_free_runs, write_ledgers};
+use super::summary::{FreeRun, share, write_free_runs, write_ledgers};
 use crate::bench::in_space::{SpaceRun, SpaceStrategyResult};
 use crate::runtime::time::mode::RunMode;
 use model_offline::number::{in_unit, length};
@@ -42,8 +42,9 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
         }
         let _ = writeln!(
             out,
-            "  dynamic is {:.1} times better than the best fixture, {:.1} times better than nothing",
-            case.improvement, case.improvement_over_none
+            "  dynamic: {}, {}",
+            share(case.improvement, "the best static paddles' error"),
+            share(case.improvement_over_none, "that of none")
         );
         let plant = &case.dynamic.plant;
         let checked = plant.largest_error.map_or_else(|| "not checked".to_owned(), length);

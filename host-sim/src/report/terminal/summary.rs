@@ -166,7 +166,7 @@ fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::
 }
 
 /// An error over another one, of which it is this many times smaller; a digit more where that is few.
-fn share(factor: f64, other: &str) -> String {
+pub(super) fn share(factor: f64, other: &str) -> String {
     if factor < 1.0 {
         format!("{:.1} times {other}", 1.0 / factor)
     } else if factor < 10.0 {
@@ -186,8 +186,10 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
                 writeln!(
                     text,
                     "  {}, {}: tissue solved for {solves} times, extrapolated between, {error:.1e} off at most where it \
-                     was solved for next",
-                    case.tissue, strategy.mode
+                     was solved for next{}",
+                    case.tissue,
+                    strategy.mode,
+                    telling(error, strategy.max_orthogonal_error)
                 )?;
             }
             if plant.fallbacks == 0 && plant.first_fallback.is_none() && plant.model == PlantModel::Full {
@@ -214,9 +216,10 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
     Ok(())
 }
 
-/// How far a reduced model was off: along the whole way where the full one went it again, else at its end.
+/// How far a reduced model was off, where the full one went its way again.
 fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fmt::Result {
-    let off = match (&plant.not_verified, plant.path_knots, plant.extrapolation_error, plant.error_at_end) {
+    let (states, largest) = (plant.states_verified, plant.largest_error);
+    let off = match (&plant.not_verified, plant.path_knots, plant.extrapolation_error, largest) {
         (Some(why), _, _, _) => {
             write!(text, ", NOT VERIFIED: the full model cannot go the same way ({why})")?;
             if let Some(estimate) = plant.largest_estimate {
@@ -236,15 +239,18 @@ fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fm
             Some(error)
         }
         (_, _, _, Some(error)) => {
-            write!(text, ", {error:.1e} from the full model at the end")?;
+            let (states, s) = (states.unwrap_or(1), if states == Some(1) { "" } else { "s" });
+            write!(text, ", at most {error:.1e} from the full model in {states} state{s} of its way")?;
             Some(error)
         }
         _ => None,
     };
-    match off {
-        Some(off) if off > TELLING * peak => write!(text, " ({:.0} % of the largest error)", 100.0 * off / peak),
-        _ => Ok(()),
-    }
+    text.write_str(&off.map_or_else(String::new, |off| telling(off, peak)))
+}
+
+/// What an error of the tissue is of the largest error that a run found with it, where that is worth telling.
+fn telling(off: f64, peak: f64) -> String {
+    if off > TELLING * peak { format!(" ({:.0} % of the largest error)", 100.0 * off / peak) } else { String::new() }
 }
 
 /// A loop on the machine's clock.
@@ -355,7 +361,9 @@ mod tests {
         let unknown = PlantAccount { not_verified: Some("no way".to_owned()), extrapolation_error: None, ..path };
         let words = said(unknown);
         assert!(words.contains("NOT VERIFIED") && words.contains("no way") && words.contains("60 %"), "{words}");
-        let trained = PlantAccount { error_at_end: Some(0.01), ..PlantAccount::default() };
-        assert_eq!(said(trained), ", 1.0e-2 from the full model at the end");
+        let trained = PlantAccount { states_verified: Some(7), largest_error: Some(0.01), ..PlantAccount::default() };
+        assert_eq!(said(trained), ", at most 1.0e-2 from the full model in 7 states of its way");
+        // Where it answered nothing itself, nothing is told of it.
+        assert_eq!(said(PlantAccount { fallbacks: 5567, ..PlantAccount::default() }), "");
     }
 }

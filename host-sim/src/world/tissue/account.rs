@@ -4,7 +4,7 @@ use model_offline::scene::PlantModel;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Which model answered, how often it could not, and how far off it was in the end.
+/// Which model answered, how often it could not, and how far off it was.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PlantAccount {
     /// The model.
@@ -46,9 +46,16 @@ pub struct PlantAccount {
     /// Why the full model could not be taken the same way, where it could not: then nothing is known of how far off this was.
     #[serde(default)]
     pub not_verified: Option<String>,
-    /// Distance from the full model's target displacement at the end of the run, length; computed after it.
+    /// Distance from the full model's target displacement at the end of the learnt insertion, length; computed after it.
     #[serde(default)]
     pub error_at_end: Option<f64>,
+    /// States, spread over those that a model which stands in for the full one answered itself, that the full one was asked for
+    /// after the run.
+    #[serde(default)]
+    pub states_verified: Option<usize>,
+    /// Largest distance from the full model's target displacement in these, length.
+    #[serde(default)]
+    pub largest_error: Option<f64>,
 }
 
 impl Default for PlantAccount {
@@ -69,6 +76,8 @@ impl Default for PlantAccount {
             puncture_apart_error: None,
             not_verified: None,
             error_at_end: None,
+            states_verified: None,
+            largest_error: None,
         }
     }
 }

@@ -23,10 +23,12 @@ use super::needle::NeedleTrajectory;
 use super::truth::NeedleMoment;
 
 mod account;
+mod answered;
 mod attachment;
 mod reductions;
 
 pub use account::PlantAccount;
+use answered::{Answer, Answered};
 pub use attachment::{AttachedPaddle, Attachment, Insertion, PaddlePlan};
 pub use reductions::Reductions;
 
@@ -83,6 +85,8 @@ pub struct TissuePlant<'m> {
     kind: Kind<'m>,
     at: (f64, Vector2<f64>),
     account: PlantAccount,
+    /// What a model that stands in for the full one answered itself.
+    answered: Answered,
     needle: Vec<NeedleMoment>,
 }
 
@@ -217,7 +221,15 @@ impl<'m> TissuePlant<'m> {
                 Err(error) => return Err(WorldError::Training(error)),
             },
         };
-        Ok(Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account, needle: Vec::new() })
+        Ok(Self {
+            model,
+            paddle,
+            kind,
+            at: (0.0, Vector2::zeros()),
+            account,
+            answered: Answered::default(),
+            needle: Vec::new(),
+        })
     }
 
     /// The full model of tissue that has a past: at every step it is taken on in time.
@@ -233,6 +245,7 @@ impl<'m> TissuePlant<'m> {
             kind,
             at: (0.0, Vector2::zeros()),
             account: PlantAccount::default(),
+            answered: Answered::default(),
             needle: Vec::new(),
         })
     }
@@ -275,7 +288,15 @@ impl<'m> TissuePlant<'m> {
     pub fn reduced(model: &'m TissueModel, paddle: Option<usize>, trained: &Arc<ReducedModel>) -> Self {
         let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
         let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
-        Self { model, paddle, kind, at: (0.0, Vector2::zeros()), account, needle: Vec::new() }
+        Self {
+            model,
+            paddle,
+            kind,
+            at: (0.0, Vector2::zeros()),
+            account,
+            answered: Answered::default(),
+            needle: Vec::new(),
+        }
     }
 
     /// Largest error of the target displacement so far that the model estimated of itself, length.
@@ -311,7 +332,7 @@ impl<'m> TissuePlant<'m> {
     /// # Errors
     /// [`WorldError::Tissue`].
     pub fn aside<R>(&mut self, act: impl FnOnce(&mut Self) -> Result<R, WorldError>) -> Result<R, WorldError> {
-        let account = self.account.clone();
+        let (account, answered) = (self.account.clone(), self.answered.clone());
         let past = match &self.kind {
             Kind::Course { course, since_start_s } => {
                 Some(Kind::Course { course: course.clone(), since_start_s: *since_start_s })
@@ -327,7 +348,7 @@ impl<'m> TissuePlant<'m> {
             }
             None => drop(self.step(0.0, &[Vector2::zeros()])?),
         }
-        self.account = account;
+        (self.account, self.answered) = (account, answered);
         Ok(outcome)
     }
 
@@ -375,8 +396,8 @@ impl<'m> TissuePlant<'m> {
         Some(NodalFields::new(self.model, &self.picture()?))
     }
 
-    /// The account, with the distance from the full model at the present state. A full model that was extrapolated to
-    /// there is solved for it: it is the state of a picture, too.
+    /// The account, with the distance from the full model in some of the states that another one answered. A full model that was
+    /// extrapolated is solved where it is: that is the state of a picture, too.
     pub fn account(&mut self) -> PlantAccount {
         let mut account = self.account.clone();
         if let Kind::Extrapolated(body) = &mut self.kind {
@@ -398,13 +419,29 @@ impl<'m> TissuePlant<'m> {
                 Err(error) => account.not_verified = Some(error.to_string()),
             }
         } else if !matches!(self.kind, Kind::Full(_) | Kind::Course { .. }) {
-            let (depth, paddle) = self.at;
-            let full = self.solved_in_full().map(|body| body.target_displacement());
-            if let (Ok(full), Ok(own)) = (full, self.step(depth, &[paddle])) {
-                account.error_at_end = Some((own - full).norm());
-            }
+            (account.states_verified, account.largest_error) = match self.answered_against_full() {
+                Ok((_, 0)) => (None, None),
+                Ok((largest, states)) => (Some(states), Some(largest)),
+                Err(error) => {
+                    account.not_verified = Some(error.to_string());
+                    (None, None)
+                }
+            };
         }
         account
+    }
+
+    /// The largest distance from the full model in the states that were kept of those that another one answered, and how many
+    /// these are. The full one goes from each to the next, as the other did.
+    fn answered_against_full(&self) -> Result<(f64, usize), WorldError> {
+        let mut body = full(self.model, self.paddle)?;
+        let (mut largest, mut states) = (0.0_f64, 0);
+        for answer in self.answered.states() {
+            let truth = drive(&mut body, answer.depth, answer.paddle)?;
+            largest = largest.max((answer.target - truth).norm());
+            states += 1;
+        }
+        Ok((largest, states))
     }
 
     fn solved_in_full(&self) -> Result<Box<Body<'m>>, WorldError> {
@@ -462,7 +499,11 @@ impl TissueResponse for TissuePlant<'_> {
                 driven.map_err(|source| WorldError::Tissue { depth: body.depth(), source })?;
                 Ok(body.target_displacement())
             }
-            Kind::Condensed(condensed) => Ok(condensed.target_displacement(depth, paddle)),
+            Kind::Condensed(condensed) => {
+                let target = condensed.target_displacement(depth, paddle);
+                self.answered.take_in(Answer { depth, paddle, target });
+                Ok(target)
+            }
             Kind::Course { since_start_s, .. } => {
                 let now_s = *since_start_s;
                 self.step_at(now_s, depth, paddles)
@@ -476,7 +517,9 @@ impl TissueResponse for TissuePlant<'_> {
                     *full_answers = false;
                     let largest = self.account.largest_estimate.get_or_insert(0.0);
                     *largest = largest.max(body.error_estimate());
-                    Ok(body.target_displacement())
+                    let target = body.target_displacement();
+                    self.answered.take_in(Answer { depth, paddle, target });
+                    Ok(target)
                 }
                 Err(invalid) => {
                     self.account.fallbacks += 1;
@@ -536,14 +579,18 @@ mod tests {
         let mut exact = TissuePlant::new(&model, Some(2), WantedPlant::Full).unwrap();
         let inside = (0.05, Vector2::new(0.001, -0.002));
         let far = (0.05, Vector2::new(0.04, 0.0));
-        for (depth, paddle) in [inside, far, inside] {
+        for (depth, paddle) in [inside, far] {
             let (r, e) = (reduced.step(depth, &[paddle]).unwrap(), exact.step(depth, &[paddle]).unwrap());
             assert!((r - e).norm() < 0.01 * e.norm(), "{r} {e}");
         }
         let account = reduced.account();
         assert_eq!((account.model, account.fallbacks), (PlantModel::Reduced, 1));
-        assert!(account.first_fallback.unwrap().contains("outside the trained range"));
-        assert!(account.error_at_end.unwrap() < 0.01 * exact.step(inside.0, &[inside.1]).unwrap().norm());
+        assert!(account.first_fallback.as_ref().unwrap().contains("outside the trained range"));
+        // The end, which the full one answered, is none of the states in which the reduced one is held against it.
+        let off = (reduced.step(inside.0, &[inside.1]).unwrap() - exact.step(inside.0, &[inside.1]).unwrap()).norm();
+        assert_eq!(account.states_verified, Some(1));
+        assert!((account.largest_error.unwrap() / off - 1.0).abs() < 1e-3, "{account:?} {off}");
+        reduced.step(far.0, &[far.1]).unwrap();
         assert_eq!(reduced.deformed_nodes().len(), model.nodes());
     }
 
@@ -590,9 +637,12 @@ mod tests {
         let model = TissueModel::new(&Scene::bundled("paper").unwrap()).unwrap();
         let mut condensed = TissuePlant::new(&model, Some(2), WantedPlant::Condensed).unwrap();
         let shallow = condensed.step(1e-4, &[]).unwrap();
-        assert!(condensed.account().error_at_end.unwrap() < 1e-3 * shallow.norm());
+        assert!(condensed.account().largest_error.unwrap() < 1e-3 * shallow.norm());
         let deep = condensed.step(0.1, &[]).unwrap();
-        assert!(condensed.account().error_at_end.unwrap() > 1e-2 * deep.norm());
+        assert!(condensed.account().largest_error.unwrap() > 1e-2 * deep.norm());
+        // Back at the skin both are at rest: what was off on the way stays told.
+        condensed.step(0.0, &[]).unwrap();
+        assert!(condensed.account().largest_error.unwrap() > 1e-2 * deep.norm());
     }
 
     #[test]

@@ -12,8 +12,9 @@ use self::patches::{Surface, loose, nodes_of, overlap};
 use super::condensing::Condensing;
 use super::error::{BoundaryPart, ModelError};
 use super::tissue::{Mixing, Phase, mixture};
-use crate::discretization::{Spatial, Stencil, TetMesh};
+use crate::discretization::{Integration, Spatial, Stencil, TetMesh};
 use crate::geometry::{Implicit, Point};
+use crate::linalg::room;
 use crate::material::{Law, Material};
 use crate::mechanics::{ConstrainedRows, Constraints, Tissue};
 use crate::scene::space::SpaceScene;
@@ -77,6 +78,15 @@ impl HeldRows {
     }
 }
 
+/// Bytes of a rule in space for each tetrahedron of its mesh, as seen on `block`: stencils of nodal rules reach a hundred nodes.
+fn bytes_of(integration: Integration) -> u64 {
+    match integration {
+        Integration::FemT4 => 500,
+        Integration::FemT10 => 2_500,
+        _ => 24_000,
+    }
+}
+
 impl SpaceModel {
     /// The model of a scene on a mesh whose surface follows the rims of the scene's patches, and whose faces follow its
     /// inclusions.
@@ -93,6 +103,8 @@ impl SpaceModel {
         let rimmed: Vec<(Vec<[u32; 3]>, &dyn Implicit)> = regions.map(|region| (patch_of(region), region)).collect();
         let inclusions: Vec<&dyn Implicit> = scene.inclusions.iter().map(|i| i.region.as_ref()).collect();
         let middles = Middles::new(mesh, &surface, scene.body.as_ref(), &rimmed, &inclusions);
+        room(3 * mesh.nodes.len(), bytes_of(scene.discretization.method.integration) * mesh.tetrahedra.len() as u64)
+            .map_err(Failure::from)?;
         let spatial = Spatial::new(mesh, scene.discretization.method, |a, b| middles.place(a, b))?;
         let held = HeldNodes::new(&spatial, scene, &patches)?;
         let typical = spatial.volumes().iter().copied().fold(f64::INFINITY, f64::min).cbrt();

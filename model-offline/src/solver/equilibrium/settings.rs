@@ -129,8 +129,11 @@ mod tests {
 
     #[test]
     fn a_model_that_is_too_large_says_so() {
-        let failure =
-            Failure::from(NotEnoughMemory { unknowns: 300_000, needed: Some((30_000_000_000, 4_000_000_000)) });
+        let failure = Failure::from(NotEnoughMemory {
+            unknowns: 300_000,
+            needed: Some((30_000_000_000, 4_000_000_000)),
+            fixed: 0,
+        });
         let told = failure.to_string();
         assert!(told.starts_with("too-large: to factorise 300000 unknowns would take 30.0 GB, and 4.0 GB"), "{told}");
     }

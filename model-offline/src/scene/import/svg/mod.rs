@@ -95,16 +95,20 @@ impl<'a, 'input> Reader<'a, 'input> {
         if let Some(visibility) = property(node, "visibility") {
             context.is_visible = !matches!(visibility, "hidden" | "collapse");
         }
-        if is_root || context.absent.is_some() {
+        if context.absent.is_some() {
             return Ok(context);
         }
         let name = node.tag_name().name();
-        let hidden = property(node, "display") == Some("none");
-        let opacity =
-            property(node, "opacity").and_then(|value| value.trim_end_matches('%').trim().parse::<f64>().ok());
+        let unseen = unseen(node);
+        if is_root {
+            // Nothing would be left of the drawing, which somebody has asked to be read.
+            if let Some(why) = unseen {
+                self.summary.note(format!("the whole drawing: {why}; it was read all the same"));
+            }
+            return Ok(context);
+        }
         let why = match name {
-            _ if hidden => Some("it is hidden (display: none)"),
-            _ if opacity.is_some_and(|opacity| opacity <= 0.0) => Some("it cannot be seen (opacity: 0)"),
+            _ if unseen.is_some() => unseen,
             "svg" => Some("a drawing within the drawing is not read; ungroup it"),
             "switch" => Some("alternatives are not read; keep one of them, without <switch>"),
             _ if NO_SHAPES.contains(&name) => Some("what is in it is not drawn by itself"),
@@ -136,7 +140,7 @@ impl<'a, 'input> Reader<'a, 'input> {
             "image" => Some("an image has no outline; draw a path along it"),
             "style" => {
                 let rules = node.text().unwrap_or("");
-                let hides = rules.contains("display") || rules.contains("visibility");
+                let hides = ["display", "visibility", "opacity"].iter().any(|property| rules.contains(property));
                 hides.then_some("style sheets are not read: what they hide is taken; hide it by its own style")
             }
             _ => None,
@@ -213,6 +217,15 @@ fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
         (key.trim() == name).then(|| value.trim().trim_end_matches("!important").trim())
     });
     styled.or(node.attribute(name).map(str::trim))
+}
+
+/// Why an element and all that is within it cannot be seen.
+fn unseen(node: Node<'_, '_>) -> Option<&'static str> {
+    if property(node, "display") == Some("none") {
+        return Some("it is hidden (display: none)");
+    }
+    let opacity = property(node, "opacity")?.trim_end_matches('%').trim().parse::<f64>().ok()?;
+    (opacity <= 0.0).then_some("it cannot be seen (opacity: 0)")
 }
 
 #[cfg(test)]

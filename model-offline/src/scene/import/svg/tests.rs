@@ -228,10 +228,17 @@ fn hidden_and_undrawn_shapes_are_left_out_and_say_so() {
         ("<text>tumour</text>".into(), "text is no shape"),
         ("<image/>".into(), "image"),
         ("<style>.a { display: none }</style>".into(), "style sheets"),
+        ("<style>.a { opacity: 0 }</style>".into(), "style sheets"),
     ] {
         let said = left(&with_body(&shape));
         assert!(said.contains(why), "{shape}: {said}");
         assert!(drawn(&with_body(&shape)).inclusions.is_empty(), "{shape}");
+    }
+    // A drawing that is hidden as a whole is read, and says so.
+    for hidden in ["opacity='0'", "display='none'"] {
+        let text = format!("<svg {hidden}><rect id='body' width='100' height='60'/></svg>");
+        let notes = read(&text, &IN_MM).unwrap().summary.notes;
+        assert!(notes.iter().any(|note| note.contains("the whole drawing: it")), "{hidden}: {notes:?}");
     }
     // What is shown again within what is hidden is drawn.
     let again = with_body("<g visibility='hidden'><circle cx='30' cy='30' r='5' visibility='visible'/></g>");
