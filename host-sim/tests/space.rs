@@ -68,6 +68,9 @@ fn a_controlled_pair_is_ten_times_better_than_the_best_fixture() {
     }
     let page = std::fs::read_to_string(directory.path().join("report/report.html")).unwrap();
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    for told in ["best dynamic paddles 5 + 6", "times smaller than without paddles", "in RUN all the time; no tick"] {
+        assert!(page.contains(told), "{told}");
+    }
     the_page_loads_nothing(&page);
     // Three sections of each strategy of each case, and what stands in the view's place.
     assert_eq!(page.matches("aria-label=\"Section ").count(), 27);

@@ -33,8 +33,9 @@ pub(crate) struct TimingArgs {
     /// Period of the loop in place of its rate, µs
     #[arg(short, long, value_name = "US", conflicts_with = "rate")]
     pub(crate) interval: Option<f64>,
-    /// Duration of the periodic measurement, s: a third each for an empty loop, the controller's loop and the exchange
-    #[arg(short = 'D', long, visible_alias = "duration", default_value_t = 10.0, value_name = "S")]
+    /// Duration of the periodic measurement, s, or with m, h or d for minutes, hours or days: a third each for an empty loop, the
+    /// controller's loop and the exchange
+    #[arg(short = 'D', long, visible_alias = "duration", default_value_t = 10.0, value_name = "S", value_parser = duration)]
     pub(crate) seconds: f64,
     /// Processor of the loop; the controller process stays on the next one [default: left to the kernel]
     #[arg(short = 'a', long, value_name = "N")]
@@ -57,6 +58,14 @@ pub(crate) struct TimingArgs {
     /// Write timing.json and histograms into this directory
     #[arg(long, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
+}
+
+/// Seconds behind "90", "90s", "1.5m", "2h" or "1d", as cyclictest takes them.
+fn duration(text: &str) -> Result<f64, std::num::ParseFloatError> {
+    let units = [('s', 1.0), ('m', 60.0), ('h', 3_600.0), ('d', 86_400.0)];
+    let given = units.into_iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)));
+    let (number, seconds) = given.unwrap_or((text, 1.0));
+    Ok(seconds * number.parse::<f64>()?)
 }
 
 /// Measures and prints.
@@ -131,4 +140,19 @@ fn write(args: &TimingArgs, result: &TimingResult) -> Result<(), SimError> {
         write_bytes(path, histogram_file(&loops).as_bytes())?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::duration;
+
+    #[test]
+    fn durations_are_taken_as_cyclictest_takes_them() {
+        for (text, seconds) in [("90", 90.0), ("90s", 90.0), ("1.5m", 90.0), ("2h", 7_200.0), ("1d", 86_400.0)] {
+            assert_eq!(duration(text), Ok(seconds), "{text}");
+        }
+        for text in ["", "m", "1w", "1 m", "m1", "1mm"] {
+            assert!(duration(text).is_err(), "{text}");
+        }
+    }
 }

@@ -1,16 +1,22 @@
 //! What to conclude from a run, in three sentences: where the paddle belongs, what it brings, and whether to believe it.
 
-use firmware::Mode;
+use firmware::{Faults, Mode};
 use model_offline::output::chart::number::{number, plain};
 
+use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
 use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
+use crate::runtime::accounting::ledger::LedgerResult;
+use crate::runtime::time::durations::LoopTiming;
+use crate::runtime::time::mode::RunMode;
 
 /// The three sentences; those that a result has nothing for are left out.
 pub(super) fn sentences(run: &RunResult) -> Vec<String> {
-    [placement(run), reduction(run), trust(run)].into_iter().flatten().collect()
+    let controlled: Vec<_> = run.results().filter_map(Controlled::in_plane).collect();
+    let trust = trust(&controlled, run.settings.rate_hz);
+    [placement(run), reduction(run), trust].into_iter().flatten().collect()
 }
 
 /// The best paddles, held and controlled.
@@ -77,44 +83,119 @@ pub(super) fn change(factors: &[f64]) -> String {
     }
 }
 
-/// Whether the controller controlled, whether the loop held its period, and whether anything was lost.
-fn trust(run: &RunResult) -> Option<String> {
-    let controlled = || run.results().filter(|strategy| strategy.ledger.is_some());
-    controlled().next()?;
-    let unaccounted: u64 =
-        controlled().filter_map(|strategy| strategy.ledger.as_ref()).map(|ledger| ledger.unaccounted).sum();
-    let ledger = match unaccounted {
-        0 => "no tick or sample is unaccounted for".to_owned(),
-        lost => format!("{lost} ticks or samples are UNACCOUNTED for"),
-    };
-    let said: Vec<String> = [Some(state(controlled())), punctuality(run), Some(ledger)].into_iter().flatten().collect();
-    Some(format!("{}.", said.join("; ")))
+/// The same of a body in space.
+pub(super) fn sentences_in_space(run: &SpaceRun) -> Vec<String> {
+    let controlled: Vec<_> = run
+        .cases
+        .iter()
+        .flat_map(|case| [Some(&case.dynamic), case.dynamic_free_run.as_ref()])
+        .flatten()
+        .filter_map(Controlled::in_space)
+        .collect();
+    let trust = trust(&controlled, run.rate_hz);
+    [placement_in_space(run), reduction_in_space(run), trust].into_iter().flatten().collect()
 }
 
-/// How much of the insertions the controller was in RUN, the worst one's.
-fn state<'a>(controlled: impl Iterator<Item = &'a StrategyResult>) -> String {
-    let in_run = |strategy: &StrategyResult| {
-        strategy.run_share.unwrap_or(if strategy.final_state == Some(Mode::Run) { 1.0 } else { 0.0 })
+fn placement_in_space(run: &SpaceRun) -> Option<String> {
+    let known = run.cases.iter().filter(|case| case.tissue == case.table_tissue);
+    let names = |paddles: &[u32]| paddles.iter().map(u32::to_string).collect::<Vec<_>>().join(" + ");
+    let found = known.map(|case| {
+        let (held, controlled) = (names(&case.fixture.paddles), names(&case.dynamic.paddles));
+        format!("tissue {}: best static paddles {held}, best dynamic paddles {controlled}", case.tissue)
+    });
+    let found = found.collect::<Vec<_>>().join("; ");
+    (!found.is_empty()).then(|| format!("{found}.").replacen("tissue", "Tissue", 1))
+}
+
+fn reduction_in_space(run: &SpaceRun) -> Option<String> {
+    let factors = |of: fn(&SpaceCase) -> f64| -> Option<Vec<f64>> {
+        let all: Vec<f64> = run.cases.iter().map(of).collect();
+        (!all.is_empty() && all.iter().all(|factor| factor.is_finite())).then_some(all)
     };
-    match controlled.min_by(|a, b| in_run(a).total_cmp(&in_run(b))) {
-        Some(worst) if in_run(worst) < 1.0 => format!(
-            "The controller was in RUN for only {:.0} % of an insertion ({}, {})",
-            (100.0 * in_run(worst)).floor(),
-            worst.mode,
-            worst.outside_run_for
-        ),
-        _ => "The controller was in RUN all the time".to_owned(),
+    let (none, held) = (factors(|case| case.improvement_over_none)?, factors(|case| case.improvement)?);
+    let advice = match () {
+        () if none.iter().zip(&held).all(|(none, held)| *none < held.min(1.0)) => ": leave the paddles away here",
+        () if held.iter().all(|held| *held < 1.0) => ": hold them still here",
+        () => "",
+    };
+    let (none, held) = (change(&none), change(&held));
+    Some(format!(
+        "The dynamic paddles' largest error is {none} than without paddles and {held} than the best static ones'{advice}."
+    ))
+}
+
+/// An insertion with a controller, in either dimension.
+struct Controlled<'r> {
+    mode: RunMode,
+    /// Part of it that the controller was in RUN.
+    in_run: f64,
+    outside_run_for: Faults,
+    ledger: &'r LedgerResult,
+    /// Of the controller's loop and the plant's.
+    timing: [Option<&'r LoopTiming>; 2],
+}
+
+impl<'r> Controlled<'r> {
+    fn in_plane(result: &'r StrategyResult) -> Option<Self> {
+        Some(Self {
+            mode: result.mode,
+            in_run: share_in_run(result.run_share, result.final_state),
+            outside_run_for: result.outside_run_for,
+            ledger: result.ledger.as_ref()?,
+            timing: [result.timing.as_ref(), result.plant_timing.as_ref()],
+        })
+    }
+
+    fn in_space(result: &'r SpaceStrategyResult) -> Option<Self> {
+        Some(Self {
+            mode: result.mode,
+            in_run: share_in_run(result.run_share, result.final_state),
+            outside_run_for: result.outside_run_for,
+            ledger: result.ledger.as_ref()?,
+            timing: [result.timing.as_ref(), result.plant_timing.as_ref()],
+        })
     }
 }
 
+fn share_in_run(share: Option<f64>, final_state: Option<Mode>) -> f64 {
+    share.unwrap_or(if final_state == Some(Mode::Run) { 1.0 } else { 0.0 })
+}
+
+/// Whether the controller controlled, whether the loop held its period, and whether anything was lost.
+fn trust(controlled: &[Controlled<'_>], rate_hz: f64) -> Option<String> {
+    let state = state(controlled)?;
+    let ledger = match controlled.iter().map(|insertion| insertion.ledger.unaccounted).sum::<u64>() {
+        0 => "no tick or sample is unaccounted for".to_owned(),
+        lost => format!("{lost} ticks or samples are UNACCOUNTED for"),
+    };
+    let said: Vec<String> =
+        [Some(state), punctuality(controlled, rate_hz), Some(ledger)].into_iter().flatten().collect();
+    Some(format!("{}.", said.join("; ")))
+}
+
+/// How much of the insertions the controller was in RUN, the worst one's; none where it was in none.
+fn state(controlled: &[Controlled<'_>]) -> Option<String> {
+    let worst = controlled.iter().min_by(|a, b| a.in_run.total_cmp(&b.in_run))?;
+    Some(if worst.in_run < 1.0 {
+        format!(
+            "The controller was in RUN for only {:.0} % of an insertion ({}, {})",
+            (100.0 * worst.in_run).floor(),
+            worst.mode,
+            worst.outside_run_for
+        )
+    } else {
+        "The controller was in RUN all the time".to_owned()
+    })
+}
+
 /// Deadlines missed on the machine's clock, of both sides of the loop.
-fn punctuality(run: &RunResult) -> Option<String> {
-    let loops = || run.results().flat_map(|strategy| [&strategy.timing, &strategy.plant_timing]).flatten();
+fn punctuality(controlled: &[Controlled<'_>], rate_hz: f64) -> Option<String> {
+    let loops = || controlled.iter().flat_map(|insertion| insertion.timing).flatten();
     let due: u64 = loops().map(|timing| timing.ticks + timing.skipped).sum();
     let missed: u64 = loops().map(|timing| timing.deadline_misses).sum();
     let worst = loops().map(|timing| timing.release_lateness.max_ns).max()?;
     let late = number(worst as f64 * 1e-6, 2);
-    let rate = plain(run.settings.rate_hz);
+    let rate = plain(rate_hz);
     Some(match missed {
         0 => format!("at {rate} Hz none of {due} deadlines was missed (largest lateness {late} ms)"),
         _ => format!("at {rate} Hz {missed} of {due} deadlines were MISSED (largest lateness {late} ms)"),

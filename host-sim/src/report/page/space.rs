@@ -6,7 +6,7 @@ use model_offline::output::chart::number::number;
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Panel, Place, ReferenceLine, Series};
 
 use super::attachments::Attachments;
-use super::conclusion::change;
+use super::conclusion::{self, change};
 use super::embed::{head_of, panels};
 use super::space_view::{self, STRATEGIES};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
@@ -25,7 +25,8 @@ pub(in crate::report) fn render(run: &SpaceRun, attachments: &Attachments) -> St
             body {
                 main {
                     h1 { "Stillpoint: " (run.scene) ", in space" }
-                    p {
+                    @for sentence in conclusion::sentences_in_space(run) { p.lead { (sentence) } }
+                    p.quiet {
                         "Insertion to " (in_unit(run.depth, unit)) " in " (run.insertion_s) " s. Loop " (run.rate_hz)
                         " Hz; target seen at " (run.target_rate_hz) " Hz, " (run.target_latency_ms) " ms late, noise "
                         (in_unit(run.noise, unit)) " per component; seed " (run.seed) ". Tissue: linear tetrahedra, "

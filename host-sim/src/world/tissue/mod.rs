@@ -221,15 +221,12 @@ impl<'m> TissuePlant<'m> {
                 Err(error) => return Err(WorldError::Training(error)),
             },
         };
-        Ok(Self {
-            model,
-            paddle,
-            kind,
-            at: (0.0, Vector2::zeros()),
-            account,
-            answered: Answered::default(),
-            needle: Vec::new(),
-        })
+        Ok(Self::at_rest(model, paddle, kind, account))
+    }
+
+    fn at_rest(model: &'m TissueModel, paddle: Option<usize>, kind: Kind<'m>, account: PlantAccount) -> Self {
+        let (at, answered) = ((0.0, Vector2::zeros()), Answered::default());
+        Self { model, paddle, kind, at, account, answered, needle: Vec::new() }
     }
 
     /// The full model of tissue that has a past: at every step it is taken on in time.
@@ -239,15 +236,7 @@ impl<'m> TissuePlant<'m> {
     fn on_course(model: &'m TissueModel, paddle: Option<usize>) -> Result<Self, WorldError> {
         let course = Course::in_small_steps(model, paddle).map_err(WorldError::Needle)?;
         let kind = Kind::Course { course: Box::new(course), since_start_s: 0.0 };
-        Ok(Self {
-            model,
-            paddle,
-            kind,
-            at: (0.0, Vector2::zeros()),
-            account: PlantAccount::default(),
-            answered: Answered::default(),
-            needle: Vec::new(),
-        })
+        Ok(Self::at_rest(model, paddle, kind, PlantAccount::default()))
     }
 
     /// Tissue that has a past, as a scene has it, along one insertion: by the neighbourhood of it, which is learnt unless the full model is
@@ -288,15 +277,7 @@ impl<'m> TissuePlant<'m> {
     pub fn reduced(model: &'m TissueModel, paddle: Option<usize>, trained: &Arc<ReducedModel>) -> Self {
         let kind = Kind::Reduced { body: Box::new(trained.body()), full: None, full_answers: false };
         let account = PlantAccount { model: PlantModel::Reduced, ..PlantAccount::default() };
-        Self {
-            model,
-            paddle,
-            kind,
-            at: (0.0, Vector2::zeros()),
-            account,
-            answered: Answered::default(),
-            needle: Vec::new(),
-        }
+        Self::at_rest(model, paddle, kind, account)
     }
 
     /// Largest error of the target displacement so far that the model estimated of itself, length.

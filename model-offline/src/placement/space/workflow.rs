@@ -14,6 +14,7 @@ use crate::model::space::meshing::{MeshSize, even_mesh, mesh};
 use crate::model::{DecidedBy, ModelError};
 use crate::parallel;
 use crate::scene::space::SpaceScene;
+use crate::solver::equilibrium::{Failure, FailureReason};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -269,7 +270,10 @@ impl Reference {
             Some((reached, decided_by)) => {
                 ModelError::ToleranceNotReached { tolerance: open, reached, decided_by, memory }
             }
-            None => failed.unwrap_or(ModelError::NothingToCompare),
+            None => match memory {
+                Some(detail) => Failure { reason: FailureReason::TooLarge, reached: 0.0, detail }.into(),
+                None => failed.unwrap_or(ModelError::NothingToCompare),
+            },
         })
     }
 }
