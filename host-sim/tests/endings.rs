@@ -76,8 +76,14 @@ fn catches_term(process: u32) -> bool {
     u64::from_str_radix(caught, 16).unwrap() & (1 << 14) != 0
 }
 
-/// SIGTERM after `after`: exit code 1 with a word, soon.
+/// SIGTERM after `after`: exit code 1 with a word, soon. A machine that stood still for a second is asked once more.
 fn obeys(arguments: &[&str], after: Duration) {
+    let is_soon = (0..2).any(|_| ends_after_term(arguments, after) < ENDS_WITHIN);
+    assert!(is_soon, "{arguments:?}: twice not within {ENDS_WITHIN:?}");
+}
+
+/// How long a process takes to its end after SIGTERM.
+fn ends_after_term(arguments: &[&str], after: Duration) -> Duration {
     let mut child = start(arguments);
     std::thread::sleep(after);
     // A busy machine may not have come to `main` by then, and nothing can be asked of a program before.
@@ -90,7 +96,7 @@ fn obeys(arguments: &[&str], after: Duration) {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{arguments:?}: {}", message(&output));
     assert!(message(&output).contains("SIGTERM"), "{arguments:?}: {}", message(&output));
-    assert!(took < ENDS_WITHIN, "{arguments:?}: {took:?}");
+    took
 }
 
 /// One at a time: who polls with real-time priority takes a processor from all others for as long as it does, and a neighbour that is
