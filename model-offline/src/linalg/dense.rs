@@ -1,6 +1,7 @@
 //! Dense symmetric work on what is left when a body is condensed. All of it is done on as many threads as it is called
 //! [within](crate::parallel::within), and with the same result.
 
+use super::packing;
 use crate::parallel;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::{factor, solve};
@@ -97,6 +98,10 @@ const PANEL: usize = 96;
 /// Works on panels of columns, given the first column of each; threads share them. Panels are the same for any number of threads,
 /// and so are the results.
 fn by_panels(mut matrix: MatMut<'_, f64>, work: impl Fn(usize, MatMut<'_, f64>) + Sync) {
+    let work = |first: usize, panel: MatMut<'_, f64>| {
+        packing::multiplied();
+        work(first, panel);
+    };
     if shared(matrix.nrows()) == Par::Seq {
         for first in (0..matrix.ncols()).step_by(PANEL) {
             let count = PANEL.min(matrix.ncols() - first);

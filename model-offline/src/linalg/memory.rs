@@ -65,22 +65,40 @@ static TAKING: Mutex<()> = Mutex::new(());
 
 /// Takes memory to factorise so many unknowns, which `allocate` must write to, or refuses where there are not so many bytes.
 pub(super) fn take<T>(unknowns: usize, bytes: u64, allocate: impl FnOnce() -> T) -> Result<T, NotEnoughMemory> {
-    let fixed = if is_limited() { BESIDE + packing::outstanding() } else { 0 };
-    if bytes < LITTLE && fixed == 0 {
+    let is_limited = is_limited();
+    if bytes < LITTLE && !is_limited {
         return Ok(allocate());
+    }
+    let fixed = || BESIDE + packing::outstanding();
+    if is_limited {
+        // Threads that have ended give back what was theirs a moment later.
+        for _ in 0..PATIENCE {
+            if room_for(unknowns, bytes, fixed(), addresses()).is_ok() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
     // It guards nothing that a panic could leave half done.
     let _others_wait = TAKING.lock().unwrap_or_else(PoisonError::into_inner);
-    // Threads that have ended give back what was theirs a moment later.
-    let mut refused = room_for(unknowns, bytes, fixed, available());
-    for _ in 0..if fixed > 0 { PATIENCE } else { 0 } {
-        if refused.is_ok() {
-            break;
-        }
-        std::thread::sleep(Duration::from_millis(1));
-        refused = room_for(unknowns, bytes, BESIDE + packing::outstanding(), available());
+    let addresses = is_limited.then(addresses).flatten().map(|left| (fixed(), left));
+    let memory = (bytes >= LITTLE).then(available).flatten();
+    room_in(unknowns, bytes, addresses, memory)?;
+    Ok(allocate())
+}
+
+/// Addresses are set aside that are never written to: they count against the process's own limits, and take no memory. `addresses`:
+/// how many are set aside, and left.
+fn room_in(
+    unknowns: usize,
+    bytes: u64,
+    addresses: Option<(u64, u64)>,
+    memory: Option<u64>,
+) -> Result<(), NotEnoughMemory> {
+    if let Some((fixed, left)) = addresses {
+        room_for(unknowns, bytes, fixed, Some(left))?;
     }
-    refused.map(|()| allocate())
+    room_for(unknowns, bytes, 0, memory)
 }
 
 /// Refuses so many unknowns where there are not so many bytes for what comes before the factor.
@@ -102,8 +120,13 @@ fn room_for(unknowns: usize, bytes: u64, fixed: u64, free: Option<u64>) -> Resul
 /// Whether the process's own limits may end it, rather than the machine's memory.
 fn is_limited() -> bool {
     static IS_LIMITED: OnceLock<bool> = OnceLock::new();
+    *IS_LIMITED.get_or_init(|| addresses().is_some())
+}
+
+/// Bytes of addresses that the process's own limits leave it; none where it has none.
+fn addresses() -> Option<u64> {
     let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
-    *IS_LIMITED.get_or_init(|| of_limits(&read("/proc/self/limits"), &read("/proc/self/status")).is_some())
+    of_limits(&read("/proc/self/limits"), &read("/proc/self/status"))
 }
 
 /// Bytes of memory that this process can take without pushing anything out, as Linux tells it; none elsewhere.
@@ -111,8 +134,7 @@ fn available() -> Option<u64> {
     let read = |file: &str| std::fs::read_to_string(file).unwrap_or_default();
     let machine = kilobytes(&read("/proc/meminfo"), "MemAvailable:");
     let groups = of_control_groups(&read("/proc/self/cgroup"), Path::new("/sys/fs/cgroup"));
-    let own = of_limits(&read("/proc/self/limits"), &read("/proc/self/status"));
-    [machine, groups, own].into_iter().flatten().min()
+    [machine, groups].into_iter().flatten().min()
 }
 
 /// The value in a line such as `VmSize:  123 kB`, in bytes.
@@ -207,6 +229,13 @@ mod tests {
         assert_eq!(room_for(300, u64::MAX, 1, None), Ok(()));
         let fixed = room_for(300, 1_000, 2_000_000_000, Some(900_000_000)).unwrap_err().to_string();
         assert!(fixed.contains("2.0 GB of addresses, and 900 MB are left") && fixed.contains("--threads 1"), "{fixed}");
+        // A large limit in a small container, which the model fits into and what is only set aside does not.
+        let (gigabyte, model) = (1 << 30, 1 << 26);
+        assert_eq!(room_in(300, model, Some((5 * gigabyte, 64 * gigabyte)), Some(4 * gigabyte)), Ok(()));
+        let narrow = room_in(300, model, Some((5 * gigabyte, 4 * gigabyte)), Some(64 * gigabyte)).unwrap_err();
+        assert!(narrow.to_string().contains("ulimit -v"), "{narrow}");
+        let full = room_in(300, model, Some((5 * gigabyte, 64 * gigabyte)), Some(model / 2)).unwrap_err();
+        assert!(!full.to_string().contains("ulimit -v"), "{full}");
         let uncounted = NotEnoughMemory { unknowns: 1, needed: None, fixed: 0 };
         assert!(
             uncounted
