@@ -102,7 +102,8 @@ impl<'a, 'input> Reader<'a, 'input> {
         let unseen = unseen(node);
         if is_root {
             // Nothing would be left of the drawing, which somebody has asked to be read.
-            if let Some(why) = unseen {
+            let is_hidden = !std::mem::replace(&mut context.is_visible, true);
+            if let Some(why) = unseen.or_else(|| is_hidden.then_some("it is hidden (visibility: hidden)")) {
                 self.summary.note(format!("the whole drawing: {why}; it was read all the same"));
             }
             return Ok(context);
@@ -140,7 +141,8 @@ impl<'a, 'input> Reader<'a, 'input> {
             "image" => Some("an image has no outline; draw a path along it"),
             "style" => {
                 let rules = node.text().unwrap_or("");
-                let hides = ["display", "visibility", "opacity"].iter().any(|property| rules.contains(property));
+                let mut words = rules.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
+                let hides = words.any(|word| ["display", "visibility", "opacity"].contains(&word));
                 hides.then_some("style sheets are not read: what they hide is taken; hide it by its own style")
             }
             _ => None,

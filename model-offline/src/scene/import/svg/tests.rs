@@ -234,8 +234,10 @@ fn hidden_and_undrawn_shapes_are_left_out_and_say_so() {
         assert!(said.contains(why), "{shape}: {said}");
         assert!(drawn(&with_body(&shape)).inclusions.is_empty(), "{shape}");
     }
+    let pale = drawn(&with_body("<style>.a { fill-opacity: 0.5 }</style>"));
+    assert!(pale.summary.left_out.is_empty(), "{:?}", pale.summary.left_out);
     // A drawing that is hidden as a whole is read, and says so.
-    for hidden in ["opacity='0'", "display='none'"] {
+    for hidden in ["opacity='0'", "display='none'", "visibility='hidden'"] {
         let text = format!("<svg {hidden}><rect id='body' width='100' height='60'/></svg>");
         let notes = read(&text, &IN_MM).unwrap().summary.notes;
         assert!(notes.iter().any(|note| note.contains("the whole drawing: it")), "{hidden}: {notes:?}");
