@@ -248,10 +248,10 @@ pub struct CaseResult {
 impl CaseResult {
     /// Which of `none`, `static` and `dynamic` leaves the target stillest, as far as they are known; `dynamic` where all do.
     pub fn stillest(&self) -> Strategy {
-        let over_dynamic = |error: Option<f64>| error.unwrap_or(f64::INFINITY);
+        let over_dynamic = |error: Option<f64>| error.filter(|factor| !factor.is_nan()).unwrap_or(f64::INFINITY);
         let (held, none) = (over_dynamic(self.improvement), over_dynamic(self.improvement_over_none));
         match held.min(none) {
-            least if least.is_nan() || least >= 1.0 => Strategy::Dynamic,
+            least if least >= 1.0 => Strategy::Dynamic,
             _ if none < held => Strategy::None,
             _ => Strategy::Static,
         }

@@ -59,9 +59,12 @@ pub(in crate::report) fn pictures(run: &SpaceRun) -> Vec<(String, String)> {
             true => case.tissue.to_string(),
             false => format!("{}-with-{}-table", case.tissue, case.table_tissue),
         };
-        let factor = change(&[case.improvement]);
-        let title =
-            format!("Tissue {}: the dynamic paddles' error is {factor} than the best static paddles'", case.tissue);
+        let factor = case.improvement.is_finite().then(|| change(&[case.improvement]));
+        let told = factor.map_or_else(
+            || "errors along the insertion".to_owned(),
+            |factor| format!("the dynamic paddles' error is {factor} than the best static paddles'"),
+        );
+        let title = format!("Tissue {}: {told}", case.tissue);
         let panels = charts_of(run, case).to_vec();
         let errors = Figure { title, caption: String::new(), panels, columns: 3 }.svg();
         pictures.push((format!("{name}-error.svg"), errors));
@@ -83,10 +86,11 @@ fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
     html! {
         section {
             h2 { "Tissue " (case.tissue.name()) ", table of tissue " (case.table_tissue.name()) }
-            p {
+            // Factors that are no numbers are of targets that do not move.
+            @if case.improvement.is_finite() && case.improvement_over_none.is_finite() { p {
                 "The dynamic paddles' largest error is " (change(&[case.improvement])) " than the best static paddles', and "
                 (change(&[case.improvement_over_none])) " than without any."
-            }
+            } }
             div.scroll { table {
                 thead {
                     tr { th { "" } th { "paddles" } th { "largest error, " (unit) } th { "RMS, " (unit) } th { "travel, " (unit) } th { "state" } }

@@ -313,7 +313,7 @@ impl<'m> TissuePlant<'m> {
     /// # Errors
     /// [`WorldError::Tissue`].
     pub fn aside<R>(&mut self, act: impl FnOnce(&mut Self) -> Result<R, WorldError>) -> Result<R, WorldError> {
-        let (account, answered) = (self.account.clone(), self.answered.clone());
+        let (account, answered) = (self.account.clone(), std::mem::take(&mut self.answered));
         let past = match &self.kind {
             Kind::Course { course, since_start_s } => {
                 Some(Kind::Course { course: course.clone(), since_start_s: *since_start_s })
