@@ -13,7 +13,7 @@
 //! has gone farther than that since the pair of meshes before, that way is left open.
 
 use super::fields::{Fields, Loads};
-use super::hindrance::is_useless_within;
+use super::hindrance::{is_usable, is_useless_within};
 use super::rest::{RestResponse, for_each_paddle, response_of};
 use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::{Integration, Method, Planar};
@@ -225,7 +225,7 @@ impl Pair {
             let left = left_open(before, &found, earlier.map(|earlier| earlier.shares[paddle]));
             let jacobian = OPEN * (found.jacobian - before.jacobian).norm();
             let left_open = left.open.max(earlier.map_or(0.0, |earlier| went(&earlier.limit[paddle], &shifted)));
-            useless.push(is_useless_within(&shifted, jacobian));
+            useless.push(is_useless_within(&shifted, jacobian) || vanishes(before, &found));
             open_jacobian.push(jacobian / shifted.jacobian.norm().max(f64::MIN_POSITIVE));
             open.push(left_open);
             limit.push(shifted);
@@ -295,6 +295,13 @@ impl Pair {
             *part = part.max(own.abs());
         }
     }
+}
+
+/// Whether one mesh finds a paddle that the target hardly follows, and the other one none: it is on the border of what controls
+/// anything at all, and no mesh will find a measure of it.
+fn vanishes(coarse: &RestResponse, fine: &RestResponse) -> bool {
+    let one_alone = coarse.best_direction.is_some() != fine.best_direction.is_some();
+    one_alone && [coarse, fine].iter().all(|response| !is_usable(response))
 }
 
 /// Whose measures have to be known, of paddles that are useless or not and left open so far.
@@ -414,6 +421,20 @@ fn tangent_at_rest(tissue: &Tissue, cell: u32) -> Matrix4<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Beyond the limit of what controls anything one mesh finds a measure and the other one none; within it none vanishes.
+    #[test]
+    fn a_paddle_on_the_border_of_controlling_nothing_is_useless() {
+        let of = |least: f64, most: f64| {
+            RestResponse::new(Matrix2::new(most, 0.0, 0.0, least), Vector2::zeros(), Vector2::y())
+        };
+        let [here, gone] = [of(1.01e-6, 5e-4), of(0.99e-6, 5e-4)];
+        assert!(here.best_direction.is_some() && gone.best_direction.is_none());
+        assert!(vanishes(&here, &gone) && vanishes(&gone, &here));
+        assert!(!vanishes(&here, &here) && !vanishes(&gone, &gone));
+        // What a table can be made of does not vanish for another mesh's sake: that mesh is wrong, and has to be refined.
+        assert!(!vanishes(&of(0.1, 0.2), &gone));
+    }
 
     #[test]
     fn the_amplification_is_the_most_that_an_error_of_the_jacobian_can_do() {

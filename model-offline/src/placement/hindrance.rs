@@ -44,9 +44,14 @@ pub fn hindrance(rest: &RestResponse, scene: &Scene) -> Option<Hindrance> {
     (needed > available).then_some(Hindrance::OutOfReach { needed, available, condition })
 }
 
+/// The target follows a paddle that is of any use by more than this of its way: with less, it would go a metre where the target
+/// moves by a millimetre, and what is computed of it is little more than what a mesh leaves.
+const FAINTEST: f64 = 1e-3;
+
 /// Whether a table can be made of a paddle, as far as its Jacobian at rest tells.
 pub fn is_usable(rest: &RestResponse) -> bool {
-    rest.best_direction.is_some() && condition_number(&rest.jacobian) <= CONDITION_LIMIT
+    let is_felt = rest.jacobian.norm() >= FAINTEST;
+    is_felt && rest.best_direction.is_some() && condition_number(&rest.jacobian) <= CONDITION_LIMIT
 }
 
 /// The place of the paddle that controls the target best: the smallest measure of those that [a table can be made
@@ -63,10 +68,10 @@ pub fn best_to_control<'r>(responses: impl IntoIterator<Item = &'r RestResponse>
 }
 
 /// Whether no table can be made of a paddle whose Jacobian is within `open` of this one, in the Frobenius norm, whichever it
-/// is: condition numbers ‖J‖·‖J⁻¹‖ are at least (‖J‖ − open) / (σ_min + open) there.
+/// is: condition numbers ‖J‖·‖J⁻¹‖ are at least (‖J‖ − open) / (σ_min + open) there, and norms at most ‖J‖ + open.
 pub(super) fn is_useless_within(rest: &RestResponse, open: f64) -> bool {
-    let least = rest.jacobian.singular_values().min();
-    (least + open) * CONDITION_LIMIT < rest.jacobian.norm() - open
+    let (least, norm) = (rest.jacobian.singular_values().min(), rest.jacobian.norm());
+    (least + open) * CONDITION_LIMIT < norm - open || norm + open < FAINTEST
 }
 
 #[cfg(test)]
@@ -87,8 +92,12 @@ mod tests {
                 assert_eq!(is_useless_within(&of(jacobian), open), !is_usable(&of(best)), "{least} {open}");
             }
         }
-        // No length, no class.
-        assert!(!is_useless_within(&of(Matrix2::zeros()), 0.0));
+        // What the target hardly follows is useless however well it is conditioned, if that is certain.
+        for (size, open, expected) in [(0.0, 0.0, true), (6e-4, 0.0, true), (6e-4, 2e-4, false), (8e-4, 0.0, false)] {
+            let faint = of(turned * size);
+            assert_eq!(is_useless_within(&faint, open), expected, "{size} {open}");
+            assert!(open > 0.0 || is_usable(&faint) != expected);
+        }
     }
 
     #[test]

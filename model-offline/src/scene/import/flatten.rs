@@ -23,9 +23,8 @@ pub(super) fn under_paddles(outline: Polygon, shapes: &[Shape], rounded: impl Fn
     let mut flattened = Flattened { outline, under: Vec::new() };
     let mut ends: Vec<Point2> = Vec::new();
     for shape in shapes.iter().filter(|shape| matches!(shape.role, Some(Role::Paddle(_)))) {
-        let Some(Straight { outline, chord, by }) = straight_under(&flattened.outline, shape, &ends, &rounded) else {
-            continue;
-        };
+        let straight = shape.ends().and_then(|drawn| straight_under(&flattened.outline, drawn, &ends, &rounded));
+        let Some(Straight { outline, chord, by }) = straight else { continue };
         ends.extend(chord);
         flattened.outline = outline;
         flattened.under.push((shape, by));
@@ -33,24 +32,25 @@ pub(super) fn under_paddles(outline: Polygon, shapes: &[Shape], rounded: impl Fn
     flattened
 }
 
-struct Straight {
-    outline: Polygon,
+/// An outline with one edge under a paddle.
+pub(in crate::scene) struct Straight {
+    pub(in crate::scene) outline: Polygon,
     /// The new edge.
-    chord: [Point2; 2],
+    pub(in crate::scene) chord: [Point2; 2],
     /// How far the outline was off it, length.
-    by: f64,
+    pub(in crate::scene) by: f64,
 }
 
-/// The outline with one edge under a line along it; none where it has one, where the line is elsewhere or goes around a
-/// corner, and where ends of other paddles are under it.
-fn straight_under(
+/// The outline with one edge under a line along it, by its ends; none where it has one, where the line is elsewhere or goes
+/// around a corner, and where ends of other paddles are under it.
+pub(in crate::scene) fn straight_under(
     outline: &Polygon,
-    shape: &Shape,
+    drawn: [Point2; 2],
     taken: &[Point2],
     rounded: impl Fn(Point2) -> Point2,
 ) -> Option<Straight> {
     let along = Along::new(outline);
-    let [(from, off_from), (to, off_to)] = shape.ends()?.map(|end| along.station(end));
+    let [(from, off_from), (to, off_to)] = drawn.map(|end| along.station(end));
     if off_from.max(off_to) > OFF * along.size {
         return None;
     }

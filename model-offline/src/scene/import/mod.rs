@@ -14,6 +14,7 @@ mod shape;
 mod summary;
 pub mod svg;
 
+pub(super) use flatten::straight_under;
 pub use role::Role;
 pub use summary::{LeftOut, Summary, Taken};
 

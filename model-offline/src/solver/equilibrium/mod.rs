@@ -276,6 +276,8 @@ impl<const D: usize> Equilibrium<D> {
                 Attempt::Failed(reason, detail) => {
                     self.at = last;
                     self.factor_is_current = false;
+                    // A kept factor may be what led astray: the shorter way begins with one of its own.
+                    self.factor_exists &= !self.settings.reuse_tangent || self.tissue.is_linear();
                     if cuts >= self.settings.max_cutbacks {
                         return Err(self.failure(reason, reached, detail));
                     }

@@ -1,10 +1,15 @@
 //! A commented scene to start from, on a block of tissue or on an outline from elsewhere.
 
+mod layout;
+mod sides;
+
+use self::layout::Layout;
 use super::Scene;
-use super::import::{ImportError, Imported, ImportedNeedle, Role};
+use super::import::{ImportError, Imported, Role};
 use super::sensor::millimetres;
-use crate::geometry::{Point2, Polygon, distance_to_polyline, segments_meet};
+use crate::geometry::{Point2, Polygon};
 use crate::material::Preset;
+use crate::number::in_unit;
 use std::fmt::Write as _;
 
 /// What a starter scene is called and measured in.
@@ -28,11 +33,6 @@ impl StarterNames {
     }
 }
 
-/// Paddle positions that are suggested at most.
-const PADDLES: usize = 5;
-/// A needle's contact as part of the edge that it enters.
-const CONTACT: f64 = 0.3;
-
 /// Depth of the insertion, part of the body's size: deeper, a soft block may give way beside a paddle that follows.
 const DEPTH: f64 = 0.035;
 /// And part of its width: thin bodies bend.
@@ -47,8 +47,9 @@ pub fn depth_for(size: f64, width: f64) -> f64 {
 /// known of 100 by 60.
 ///
 /// What holds the body, where the needle goes in and where paddles may sit is a suggestion where the import does not
-/// give it: the lowest edge is immobile, the needle enters at the highest edge, paddles sit on the longest of the
-/// others, the target is the innermost point.
+/// give it: what faces down and is lowest is immobile, the needle enters what faces up and is highest, paddles sit on the longest
+/// of the other sides, the target is the innermost point ahead of the needle. A side is what lies between corners: a curve
+/// is one, however many edges it has, and becomes straight under a paddle.
 pub fn starter(names: &StarterNames, imported: Option<&Imported>) -> String {
     let block = || {
         let rectangle =
@@ -69,7 +70,8 @@ pub fn starter(names: &StarterNames, imported: Option<&Imported>) -> String {
 /// # Errors
 /// [`ImportError::NoScene`] says whose shape makes it invalid, and what to do.
 pub fn imported(names: &StarterNames, imported: &mut Imported) -> Result<String, ImportError> {
-    let text = starter(names, Some(imported));
+    let layout = Layout::of(imported);
+    let text = layout.text(names, imported);
     let parts = [
         (imported.immobile.is_empty(), "fixed"),
         (imported.needle.is_none(), "needle"),
@@ -79,6 +81,12 @@ pub fn imported(names: &StarterNames, imported: &mut Imported) -> Result<String,
         (imported.inclusions.iter().any(|inclusion| inclusion.material.is_none()), "stiffness of inclusions"),
         (imported.depth.is_none(), "depth of the needle"),
     ];
+    for (paddle, by) in &layout.straightened {
+        let by = in_unit(*by, &names.length);
+        let note =
+            format!("outline: straight under suggested paddle {paddle}, which is stiff; the curve was up to {by} off");
+        imported.summary.notes.push(note);
+    }
     imported.summary.suggested = parts.iter().filter(|part| part.0).map(|part| part.1).collect();
     match Scene::parse(&text, "<new scene>") {
         Ok(_) => Ok(text),
@@ -114,61 +122,7 @@ fn hint(role: Role) -> &'static str {
     }
 }
 
-/// Where things go on an outline.
-struct Layout {
-    immobile: Vec<Vec<Point2>>,
-    contact: Vec<Point2>,
-    axis: Point2,
-    depth: f64,
-    target: Point2,
-    paddles: Vec<(u32, [Point2; 2])>,
-    spacing: f64,
-}
-
 impl Layout {
-    /// What the import gives, and suggestions for the rest that keep clear of it.
-    fn of(imported: &Imported) -> Self {
-        let outline = &imported.outline;
-        let edges: Vec<[Point2; 2]> = outline.edges().map(|(a, b)| [a, b]).collect();
-        let size = outline.size();
-        let given: Vec<[Point2; 2]> = {
-            let contact = imported.needle.iter().map(|needle| &needle.contact);
-            let lines = imported.immobile.iter().chain(contact);
-            let pieces = lines.flat_map(|line| line.windows(2)).map(|piece| [piece[0], piece[1]]);
-            pieces.chain(imported.paddles.iter().map(|paddle| paddle.1)).collect()
-        };
-        let free = |piece: [Point2; 2]| is_free(piece, &given, size);
-        // Short edges are parts of curves: nothing sits on them where a longer one is nearly as good.
-        let score = |edge: &[Point2; 2], sign: f64| sign * 0.5 * (edge[0].y + edge[1].y) - 0.5 * length(edge);
-        let best = |sign: f64, candidates: &mut dyn Iterator<Item = usize>| {
-            candidates.min_by(|&a, &b| score(&edges[a], sign).total_cmp(&score(&edges[b], sign)))
-        };
-        let all = 0..edges.len();
-        let supported = best(1.0, &mut all.clone().filter(|i| free(edges[*i]))).unwrap_or(0);
-        let immobile =
-            if imported.immobile.is_empty() { vec![edges[supported].to_vec()] } else { imported.immobile.clone() };
-        let suggested = imported.immobile.is_empty();
-        let mut entries = all.clone().filter(|i| !(suggested && *i == supported) && free(middle_of(edges[*i])));
-        let entry = best(-1.0, &mut entries).unwrap_or_else(|| usize::from(suggested && supported == 0));
-        let needle = imported.needle.clone().unwrap_or_else(|| straight_in(outline, edges[entry]));
-        let paddles = if imported.paddles.is_empty() {
-            let held: Vec<[Point2; 2]> =
-                immobile.iter().chain([&needle.contact]).flat_map(|l| l.windows(2)).map(|p| [p[0], p[1]]).collect();
-            suggested_paddles(&edges, &held, size)
-        } else {
-            imported.paddles.clone()
-        };
-        Self {
-            immobile,
-            depth: imported.depth.unwrap_or_else(|| depth_for(size, outline.width()).min(rounded_down(needle.most))),
-            target: imported.target.unwrap_or_else(|| innermost(outline, &needle.contact)),
-            contact: needle.contact,
-            axis: needle.axis,
-            paddles,
-            spacing: rounded(size / 25.0),
-        }
-    }
-
     fn text(&self, names: &StarterNames, imported: &Imported) -> String {
         let StarterNames { name, length, stress } = names;
         let mut out = String::new();
@@ -183,7 +137,7 @@ impl Layout {
              [scene]\nname = {name:?}\ndimension = 2                       # plane strain\n\
              units = {{ length = {length:?}, stress = {stress:?} }}\n\n\
              [domain]                            # the body: a simple polygon\noutline = {}\n\n{}",
-            polygon(&imported.outline),
+            polygon(&self.outline),
             material(imported.material)
         );
         for inclusion in &imported.inclusions {
@@ -250,71 +204,6 @@ fn material(preset: Option<Preset>) -> String {
     )
 }
 
-fn length(edge: &[Point2; 2]) -> f64 {
-    (edge[1] - edge[0]).norm()
-}
-
-/// Whether a piece of the boundary touches none of others.
-fn is_free(piece: [Point2; 2], others: &[[Point2; 2]], size: f64) -> bool {
-    others.iter().all(|[a, b]| !segments_meet(piece[0], piece[1], *a, *b, 2e-3 * size))
-}
-
-/// The part of an edge that a needle's contact takes.
-fn middle_of(edge: [Point2; 2]) -> [Point2; 2] {
-    let along = edge[1] - edge[0];
-    let middle = edge[0] + along * 0.5;
-    [middle - along * (0.5 * CONTACT), middle + along * (0.5 * CONTACT)]
-}
-
-/// A needle straight into the middle of an edge.
-fn straight_in(outline: &Polygon, edge: [Point2; 2]) -> ImportedNeedle {
-    let along = edge[1] - edge[0];
-    let middle = edge[0] + along * 0.5;
-    let normal = Point2::new(-along.y, along.x).normalize();
-    let axis = if outline.contains(middle + normal * (1e-3 * outline.size())) { normal } else { -normal };
-    ImportedNeedle { contact: middle_of(edge).to_vec(), axis, most: f64::INFINITY }
-}
-
-/// Places on the longest edges that keep clear of what is held, numbered around the body.
-fn suggested_paddles(edges: &[[Point2; 2]], held: &[[Point2; 2]], size: f64) -> Vec<(u32, [Point2; 2])> {
-    let spans = edges.iter().enumerate().flat_map(|(i, [a, b])| {
-        // Long edges carry two paddles; none reaches a corner, where it could touch the immobile part.
-        let spans: &[(f64, f64)] =
-            if length(&[*a, *b]) > 0.25 * size { &[(0.15, 0.45), (0.55, 0.85)] } else { &[(0.2, 0.8)] };
-        spans.iter().map(move |(from, to)| (i, [a + (b - a) * *from, a + (b - a) * *to])).collect::<Vec<_>>()
-    });
-    let mut others: Vec<(usize, [Point2; 2])> = spans.filter(|(_, span)| is_free(*span, held, size)).collect();
-    if others.is_empty() {
-        // Beside the contact, near a corner.
-        let beside = edges.iter().enumerate().flat_map(|(i, [a, b])| {
-            [(0.02, 0.25), (0.75, 0.98)].map(|(from, to)| (i, [a + (b - a) * from, a + (b - a) * to]))
-        });
-        others = beside.filter(|(_, span)| is_free(*span, held, size)).take(1).collect();
-    }
-    others.sort_by(|a, b| length(&b.1).total_cmp(&length(&a.1)));
-    others.truncate(PADDLES);
-    // Around the body, so that neighbours have neighbouring numbers.
-    others.sort_by_key(|(edge, _)| *edge);
-    (1..).zip(others).map(|(index, (_, span))| (index, span)).collect()
-}
-
-/// The point of a grid that is farthest from the boundary and from the needle's contact.
-fn innermost(outline: &Polygon, contact: &[Point2]) -> Point2 {
-    let (low, high) = outline.bounds();
-    let steps = 40;
-    let grid = (0..=steps * steps).map(|n| {
-        let share = Point2::new(f64::from(n % steps) / f64::from(steps), f64::from(n / steps) / f64::from(steps));
-        low + (high - low).component_mul(&share)
-    });
-    let room = |p: &Point2| {
-        if outline.contains(*p) { outline.distance_to_boundary(*p).min(distance_to_polyline(*p, contact)) } else { 0.0 }
-    };
-    let best = grid.max_by(|a, b| room(a).total_cmp(&room(b))).unwrap_or(low);
-    // Off the middle: on a line of symmetry a target does not move sideways, and there would be nothing to see.
-    let aside = best + Point2::new(0.35, 0.0) * room(&best);
-    Point2::new(rounded3(aside.x, high.x - low.x), rounded3(aside.y, high.y - low.y))
-}
-
 /// Two significant digits.
 fn rounded(value: f64) -> f64 {
     let step = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
@@ -325,12 +214,6 @@ fn rounded(value: f64) -> f64 {
 fn rounded_down(value: f64) -> f64 {
     let step = 10f64.powf(value.abs().max(f64::MIN_POSITIVE).log10().floor() - 1.0);
     if value.is_finite() { (value / step).floor() * step } else { value }
-}
-
-/// A thousandth of `scale`.
-fn rounded3(value: f64, scale: f64) -> f64 {
-    let step = 10f64.powf(scale.log10().floor() - 2.0);
-    (value / step).round() * step
 }
 
 /// At most twelve significant digits, always with a point or an exponent, so that TOML reads a float.
