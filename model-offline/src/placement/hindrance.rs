@@ -33,7 +33,7 @@ pub enum Hindrance {
 /// What keeps a paddle from holding the target; none when nothing does.
 pub fn hindrance(rest: &RestResponse, scene: &Scene) -> Option<Hindrance> {
     let condition = condition_number(&rest.jacobian);
-    if rest.best_direction.is_none() {
+    if rest.best_direction.is_none() || rest.jacobian.norm() < FAINTEST {
         return Some(Hindrance::Uncontrollable { condition });
     }
     if condition > CONDITION_LIMIT {

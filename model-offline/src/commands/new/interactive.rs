@@ -2,7 +2,7 @@
 
 use model_offline::geometry::{Point2, Polygon};
 use model_offline::material::Preset;
-use model_offline::scene::import::{Imported, ImportedInclusion};
+use model_offline::scene::import::{Imported, ImportedInclusion, ImportedNeedle};
 use model_offline::scene::starter::{StarterNames, depth_for};
 use std::f64::consts::TAU;
 use std::io::{self, BufRead, Write};
@@ -62,7 +62,14 @@ pub(super) fn ask(input: impl BufRead, screen: impl Write, names: &StarterNames)
     )?;
     let inclusions = if radius > 0.0 { vec![circle(target, radius)] } else { Vec::new() };
     let inclusions = inclusions.into_iter().map(|outline| ImportedInclusion { outline, material: None }).collect();
-    Ok(Imported { inclusions, material, target: Some(target), depth: Some(depth), ..Imported::of(outline, Vec::new()) })
+    Ok(Imported {
+        inclusions,
+        material,
+        needle: Some(ImportedNeedle::into_block(width, height)),
+        target: Some(target),
+        depth: Some(depth),
+        ..Imported::of(outline, Vec::new())
+    })
 }
 
 struct Questions<R, W> {

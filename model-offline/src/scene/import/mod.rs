@@ -99,6 +99,14 @@ pub struct ImportedNeedle {
     pub most: f64,
 }
 
+impl ImportedNeedle {
+    /// Straight into the middle of the upper side of a block that has a corner at the origin.
+    pub fn into_block(width: f64, height: f64) -> Self {
+        let contact = [0.65, 0.35].map(|share| Point2::new(share * width, height)).to_vec();
+        Self { contact, axis: -Point2::y(), most: height }
+    }
+}
+
 /// Why a file gives no scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ImportError {

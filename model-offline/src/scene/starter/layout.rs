@@ -14,6 +14,8 @@ const FEW: usize = 3;
 const CONTACT: f64 = 0.3;
 /// The shortest contact, part of the body's size: more than the distance of nodes of a starter scene.
 const SHORTEST_CONTACT: f64 = 0.06;
+/// How steep at most what faces up or down may be, as the cosine of its slope: below 45°, and where that is too little, more.
+const STEEP: [f64; 3] = [0.72, 0.5, 0.2];
 /// Depth as part of the tissue ahead of the needle: what is thin bends.
 const AHEAD: f64 = 0.07;
 /// And as part of its contact: a short one squeezes the tissue at its ends.
@@ -29,6 +31,8 @@ const ON_CURVE: f64 = 0.15;
 const BULGE: f64 = 0.08;
 /// How far ahead of a needle its target is at most, of its contact: farther away hardly anything moves.
 const FARTHEST: f64 = 1.5;
+/// Room that counts as much as a way across the needle's line.
+const NEXT: f64 = 0.02;
 /// How far beside the middle it is: on a line of symmetry a target does not move sideways, and there would be nothing to see.
 const ASIDE: f64 = 0.35;
 
@@ -58,10 +62,12 @@ impl Layout {
         let immobile = if imported.immobile.is_empty() { lowest(outline, &taken) } else { imported.immobile.clone() };
         immobile.iter().for_each(|path| taken.take(path));
         let needle = imported.needle.clone().unwrap_or_else(|| entry(outline, &taken, imported.target));
+        let deepest = imported.target.map(|target| (target - middle(&needle.contact)).dot(&needle.axis));
+        let deepest = deepest.filter(|way| *way > 0.0).map_or(f64::INFINITY, rounded_down);
         let mut layout = Self {
             outline: outline.clone(),
             straightened: Vec::new(),
-            depth: imported.depth.unwrap_or_else(|| depth(outline, &needle)),
+            depth: imported.depth.unwrap_or_else(|| depth(outline, &needle).min(deepest)),
             target: imported.target.unwrap_or_else(|| innermost(outline, &needle)),
             paddles: imported.paddles.clone(),
             contact: needle.contact,
@@ -71,22 +77,30 @@ impl Layout {
         };
         if layout.paddles.is_empty() {
             taken.take(&layout.contact);
-            layout.suggest_paddles(&taken);
+            // The needle comes from there.
+            let enters = middle(&layout.contact);
+            taken.take(&[enters, enters - layout.axis * size]);
+            layout.suggest_paddles(&taken, imported);
         }
         layout
     }
 
     /// Paddles on what is free, and the outline straight under them.
-    fn suggest_paddles(&mut self, taken: &Taken) {
+    fn suggest_paddles(&mut self, taken: &Taken, imported: &Imported) {
         // Coordinates that people can read.
         let step = 10f64.powf((2e-6 * taken.size).log10().floor());
         let on_grid = |p: Point2| p.map(|v| (v / step).round() * step);
+        // What the body loses where it becomes straight must be nothing that was drawn.
+        let drawn = imported.inclusions.iter().flat_map(|inclusion| inclusion.outline.vertices()).copied();
+        let drawn: Vec<Point2> = drawn.chain([self.target]).filter(|p| self.outline.contains(*p)).collect();
         let mut ends: Vec<Point2> = Vec::new();
         let mut index = 1;
         for place in self.places(taken) {
             let segment = if self.outline.segment_on_boundary(place[0], place[1], 1e-9 * taken.size) {
                 place
-            } else if let Some(straight) = straight_under(&self.outline, place, &ends, on_grid) {
+            } else if let Some(straight) = straight_under(&self.outline, place, &ends, on_grid)
+                && drawn.iter().all(|p| straight.outline.contains(*p))
+            {
                 self.outline = straight.outline;
                 self.straightened.push((index, straight.by));
                 straight.chord
@@ -111,7 +125,9 @@ impl Layout {
         let sides = sides(&self.outline, seam);
         let mut places: Vec<[Point2; 2]> = sides.iter().flat_map(on).filter(free).collect();
         if places.len() < FEW {
-            places.extend(sides.iter().flat_map(|side| beside_contact(side, taken)).filter(free));
+            let others = Taken { pieces: places.clone(), size: taken.size };
+            let beside = sides.iter().flat_map(|side| beside_contact(side, taken));
+            places.extend(beside.filter(|place| free(place) && others.leaves(*place)));
         }
         if places.is_empty() {
             // Beside the contact, near a corner.
@@ -163,59 +179,78 @@ fn best_edge(outline: &Polygon, up: f64, free: impl Fn([Point2; 2]) -> bool) -> 
 fn lowest(outline: &Polygon, taken: &Taken) -> Vec<Vec<Point2>> {
     let (low, high) = outline.bounds();
     let height = high.y - low.y;
-    let parts: Vec<Stretch> =
-        facing(outline, -1.0).iter().flat_map(|part| part.runs(|edge| taken.leaves(edge))).collect();
-    let Some(base) = parts.iter().min_by(|a, b| merit(a.ends(), -1.0).total_cmp(&merit(b.ends(), -1.0))) else {
-        // Nothing faces down: a body that stands on a corner lies on one side of it.
-        let edge = best_edge(outline, -1.0, |edge| taken.leaves(edge)).or_else(|| best_edge(outline, -1.0, |_| true));
-        return edge.iter().map(|edge| edge.to_vec()).collect();
-    };
-    let beside = parts.iter().filter(|part| part.lowest() <= base.lowest() + BESIDE * height);
-    let near = |part: &Stretch| part.runs(|[a, b]| a.y.min(b.y) <= part.lowest() + HELD * height);
-    beside.flat_map(near).map(|part| part.0).collect()
+    for steepest in STEEP {
+        let parts = facing(outline, -1.0, steepest);
+        let parts: Vec<Stretch> = parts.iter().flat_map(|part| part.runs(|edge| taken.leaves(edge))).collect();
+        let Some(base) = parts.iter().min_by(|a, b| merit(a.ends(), -1.0).total_cmp(&merit(b.ends(), -1.0))) else {
+            continue;
+        };
+        let beside = parts.iter().filter(|part| part.lowest() <= base.lowest() + BESIDE * height);
+        let near = |part: &Stretch| part.runs(|[a, b]| a.y.min(b.y) <= part.lowest() + HELD * height);
+        let held: Vec<Stretch> = beside.flat_map(near).collect();
+        if held.iter().map(Stretch::length).sum::<f64>() >= SHORTEST_CONTACT * taken.size {
+            return held.into_iter().map(|part| part.0).collect();
+        }
+    }
+    // A body that stands on a corner lies on one side of it.
+    let edge = best_edge(outline, -1.0, |edge| taken.leaves(edge)).or_else(|| best_edge(outline, -1.0, |_| true));
+    edge.iter().map(|edge| edge.to_vec()).collect()
 }
 
-/// A needle straight into what faces up and is highest; past a target that is given.
+/// A needle straight into what faces up and is highest, where it is free; towards a target that is given.
 fn entry(outline: &Polygon, taken: &Taken, target: Option<Point2>) -> ImportedNeedle {
     let free = |contact: &Stretch| contact.edges().all(|piece| taken.leaves(piece));
-    let mut parts = facing(outline, 1.0);
-    parts.sort_by(|a, b| merit(a.ends(), 1.0).total_cmp(&merit(b.ends(), 1.0)));
-    let contacts = parts.iter().filter_map(|part| contact_on(part, outline, target).filter(free));
+    let on = |steepest: f64| {
+        let mut parts = facing(outline, 1.0, steepest);
+        parts.sort_by(|a, b| merit(a.ends(), 1.0).total_cmp(&merit(b.ends(), 1.0)));
+        parts.iter().find_map(|part| contact_on(part, outline, target, free))
+    };
     let steep = || {
-        let whole = |edge: [Point2; 2]| Stretch(edge.to_vec());
         let middle = |edge: [Point2; 2]| {
             let [from, to] = [0.5 - 0.5 * CONTACT, 0.5 + 0.5 * CONTACT].map(|share| share * (edge[1] - edge[0]).norm());
-            whole(edge).between(from, to)
+            Stretch(edge.to_vec()).between(from, to)
         };
         let edge = best_edge(outline, 1.0, |edge| free(&middle(edge))).or_else(|| best_edge(outline, 1.0, |_| true));
         edge.map_or_else(|| Stretch(outline.vertices()[..2].to_vec()), middle)
     };
-    let contact = contacts.into_iter().next().unwrap_or_else(steep);
+    let contact = STEEP.into_iter().find_map(on).unwrap_or_else(steep);
     let [from, to] = contact.ends();
     // The interior is on the left of the boundary.
     let axis = Point2::new(from.y - to.y, to.x - from.x).normalize();
     ImportedNeedle { contact: contact.0, axis, most: f64::INFINITY }
 }
 
-/// The part of a stretch that a needle's contact takes: its middle, or from where the needle goes nearest to the target. None
-/// where it is too short for one.
-fn contact_on(part: &Stretch, outline: &Polygon, target: Option<Point2>) -> Option<Stretch> {
+/// The part of a stretch that a needle's contact takes, the longest that is free: as near to its middle as can be, or where
+/// the needle goes nearest to the target. None where it is too short for one, or taken.
+fn contact_on(
+    part: &Stretch,
+    outline: &Polygon,
+    target: Option<Point2>,
+    free: impl Fn(&Stretch) -> bool,
+) -> Option<Stretch> {
     let whole = part.length();
-    let length = (CONTACT * whole).min(outline.width()).max(SHORTEST_CONTACT * outline.size());
-    if length > 0.9 * whole {
-        return None;
+    let shortest = SHORTEST_CONTACT * outline.size();
+    let longest = (CONTACT * whole).min(outline.width()).max(shortest);
+    let lengths =
+        [longest, (0.5 * longest).max(shortest), shortest].into_iter().filter(|length| *length <= 0.9 * whole);
+    for length in lengths {
+        let least = 0.5 * length / whole;
+        let around = |share: f64| part.between(share * whole - 0.5 * length, share * whole + 0.5 * length);
+        // Where a body is long and thin, the middle is out of reach of whatever is on its ends.
+        let wanted = (outline.width() / whole).clamp(least, 0.5);
+        let shares = (0..=20).map(|k| 0.05 * f64::from(k)).chain([wanted]);
+        let contacts = shares.filter(|share| *share >= least && *share <= 1.0 - least);
+        let contacts = contacts.map(|share| (share, around(share))).filter(|(_, contact)| free(contact));
+        let past = |(share, contact): &(f64, Stretch)| {
+            let [from, to] = contact.ends();
+            let miss = |target: Point2| (target - (from + to) * 0.5).dot(&(to - from).normalize()).abs();
+            target.map_or((share - wanted).abs(), miss)
+        };
+        if let Some((_, contact)) = contacts.min_by(|a, b| past(a).total_cmp(&past(b))) {
+            return Some(contact);
+        }
     }
-    let around = |share: f64| part.between(share * whole - 0.5 * length, share * whole + 0.5 * length);
-    // Where a body is long and thin, the middle is out of reach of whatever is on its ends.
-    let reached = (outline.width() / whole).clamp(0.5 * length / whole, 0.5);
-    let Some(target) = target else { return Some(around(reached)) };
-    let past = |contact: &Stretch| {
-        let [from, to] = contact.ends();
-        ((target - (from + to) * 0.5).dot(&(to - from).normalize())).abs()
-    };
-    let least = 0.5 * length / whole;
-    let shares = (0..=20).map(|k| 0.05 * f64::from(k)).filter(|share| *share >= least && *share <= 1.0 - least);
-    shares.chain([0.5]).map(around).min_by(|a, b| past(a).total_cmp(&past(b)))
+    None
 }
 
 /// A depth that the tissue ahead of the needle bears with a paddle that follows.
@@ -292,7 +327,9 @@ fn innermost(outline: &Polygon, needle: &ImportedNeedle) -> Point2 {
         let depth = way.dot(&needle.axis);
         depth > 0.0 && depth <= FARTHEST * contact && way.dot(&across).abs() <= 0.5 * contact
     };
-    let farthest = |a: &Point2, b: &Point2| room(a).total_cmp(&room(b));
+    // Of points with as much room the one next to the needle's line.
+    let merit = |p: &Point2| room(p) - NEXT * (p - enters).dot(&across).abs();
+    let farthest = |a: &Point2, b: &Point2| merit(a).total_cmp(&merit(b));
     let before = grid.clone().filter(ahead).max_by(farthest).filter(|p| room(p) > 0.0);
     let best = before.or_else(|| grid.max_by(farthest)).unwrap_or(low);
     let aside = best + across * (ASIDE * room(&best).min(contact));
@@ -381,7 +418,41 @@ mod tests {
             let (way, wide) = (target - middle(&contact), length(&contact));
             let across = (way - axis * way.dot(&axis)).norm();
             assert!(way.dot(&axis) > 0.0 && way.dot(&axis) <= FARTHEST * wide, "{way} {wide}");
-            assert!(across > 1e-3 * size && across < wide, "{across} of {wide}");
+            assert!(across > 1e-3 * size && across < 0.5 * wide, "{across} of {wide}");
+        }
+    }
+
+    /// Where a paddle would cut off what is drawn there is none, and where something is in the middle the needle goes beside it.
+    #[test]
+    fn what_is_drawn_stays_and_is_kept_clear_of() {
+        for degrees in (0..180).step_by(4) {
+            let towards = f64::from(degrees).to_radians();
+            let mut imported = Imported::of(circle(90, 50.0), Vec::new());
+            imported.target = Some(Point2::new(towards.cos(), towards.sin()) * 49.4);
+            assert!(Layout::of(&imported).outline.contains(imported.target.unwrap()), "{degrees}");
+        }
+        let mut imported = Imported::of(polygon(&[[0.0, 0.0], [140.0, 0.0], [140.0, 60.0], [0.0, 60.0]]), Vec::new());
+        imported.paddles = vec![(1, [[90.0, 60.0], [50.0, 60.0]].map(Point2::from))];
+        let needle = Layout::of(&imported);
+        assert!(needle.axis.y == -1.0 && length(&needle.contact) > 20.0, "{:?}", needle.contact);
+        assert!(needle.contact.iter().all(|p| !(50.0..=90.0).contains(&p.x)));
+    }
+
+    /// Paddles of a block with round corners, of a polygon with few, and of a strip: enough, and none over another.
+    #[test]
+    fn round_corners_and_strips_have_paddles_as_well() {
+        let arc = |k: u32| (0..=6).map(move |i| std::f64::consts::FRAC_PI_2 * (f64::from(k) + f64::from(i) / 6.0));
+        let corner = |k: u32| [[60.0, 25.0], [-60.0, 25.0], [-60.0, -25.0], [60.0, -25.0]][k as usize];
+        let on = |k: u32| arc(k).map(move |a| [corner(k)[0] + 5.0 * a.cos(), corner(k)[1] + 5.0 * a.sin()]);
+        let rounded = polygon(&(0..4).flat_map(on).collect::<Vec<_>>());
+        let slanted = [[0.0, 0.0], [113.0, 113.0], [99.0, 127.0], [-14.0, 14.0]];
+        for outline in [rounded, circle(16, 80.0), circle(17, 80.0), polygon(&slanted)] {
+            let Layout { paddles, .. } = layout(outline);
+            assert!(paddles.len() >= 3, "{paddles:?}");
+            for (k, (_, one)) in paddles.iter().enumerate() {
+                let clear = |(_, other): &(u32, [Point2; 2])| !segments_meet(one[0], one[1], other[0], other[1], 1e-3);
+                assert!(paddles[k + 1..].iter().all(clear), "{paddles:?}");
+            }
         }
     }
 

@@ -5,7 +5,7 @@ mod sides;
 
 use self::layout::Layout;
 use super::Scene;
-use super::import::{ImportError, Imported, Role};
+use super::import::{ImportError, Imported, ImportedNeedle, Role};
 use super::sensor::millimetres;
 use crate::geometry::{Point2, Polygon};
 use crate::material::Preset;
@@ -57,7 +57,11 @@ pub fn starter(names: &StarterNames, imported: Option<&Imported>) -> String {
         let side = |part: f64| names.block() * part;
         let outline = rectangle([0.0, 0.0], [side(1.0), side(0.6)])?;
         let inclusion = rectangle([side(0.55), side(0.25)], [side(0.75), side(0.45)]);
-        Some(Imported::of(outline, inclusion.into_iter().collect()))
+        // Beside the needle's line, where it moves across it, and a paddle can reach it.
+        let target = Point2::new(side(0.81), side(0.3));
+        let needle = ImportedNeedle::into_block(side(1.0), side(0.6));
+        let body = Imported::of(outline, inclusion.into_iter().collect());
+        Some(Imported { target: Some(target), needle: Some(needle), ..body })
     };
     let Some(imported) = imported.cloned().or_else(block) else {
         return String::new();
