@@ -26,7 +26,7 @@ use sha2::{Digest, Sha256};
 use super::error::SimError;
 use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
 use super::insertion::{Extras, Label};
-use super::result::{FORMAT, RecordingResult};
+use super::result::{FORMAT, RecordingResult, stillest};
 use super::space_bodies::{self, CaseBodies, SpaceBodies};
 use super::strategy::Strategy;
 use crate::exchange::board::{Control, Image, Processor};
@@ -125,6 +125,13 @@ pub struct SpaceCase {
     pub improvement: f64,
     /// Largest error without a paddle over that of `dynamic`.
     pub improvement_over_none: f64,
+}
+
+impl SpaceCase {
+    /// Which of `none`, `static` and `dynamic` leaves the target stillest; `dynamic` where all do.
+    pub fn stillest(&self) -> Strategy {
+        stillest(Some(self.improvement), Some(self.improvement_over_none))
+    }
 }
 
 /// A table in short.

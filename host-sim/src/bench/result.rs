@@ -248,13 +248,19 @@ pub struct CaseResult {
 impl CaseResult {
     /// Which of `none`, `static` and `dynamic` leaves the target stillest, as far as they are known; `dynamic` where all do.
     pub fn stillest(&self) -> Strategy {
-        let over_dynamic = |error: Option<f64>| error.filter(|factor| !factor.is_nan()).unwrap_or(f64::INFINITY);
-        let (held, none) = (over_dynamic(self.improvement), over_dynamic(self.improvement_over_none));
-        match held.min(none) {
-            least if least >= 1.0 => Strategy::Dynamic,
-            _ if none < held => Strategy::None,
-            _ => Strategy::Static,
-        }
+        stillest(self.improvement, self.improvement_over_none)
+    }
+}
+
+/// Which of `none`, `static` and `dynamic` leaves the target stillest, by the largest errors of the static paddle and of none over
+/// that of the dynamic one.
+pub(super) fn stillest(held: Option<f64>, none: Option<f64>) -> Strategy {
+    let known = |factor: Option<f64>| factor.filter(|factor| !factor.is_nan()).unwrap_or(f64::INFINITY);
+    let (held, none) = (known(held), known(none));
+    match held.min(none) {
+        least if least >= 1.0 => Strategy::Dynamic,
+        _ if none < held => Strategy::None,
+        _ => Strategy::Static,
     }
 }
 

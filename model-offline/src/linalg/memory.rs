@@ -9,7 +9,7 @@ use std::time::Duration;
 /// A factor that there is no memory for.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub struct NotEnoughMemory {
-    /// Unknowns of the matrix.
+    /// Unknowns of the matrix; none for a mesh, of which they are not known yet.
     pub unknowns: usize,
     /// Bytes that it takes to factorise, and that are free; none where the factor has more entries than can be numbered.
     pub needed: Option<(u64, u64)>,
@@ -19,7 +19,10 @@ pub struct NotEnoughMemory {
 
 impl std::fmt::Display for NotEnoughMemory {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "to factorise {} unknowns would take ", self.unknowns)?;
+        match self.unknowns {
+            0 => write!(f, "to mesh the body would take ")?,
+            unknowns => write!(f, "to factorise {unknowns} unknowns would take ")?,
+        }
         match self.needed {
             Some((needed, free)) if self.fixed > needed / 2 => {
                 return write!(

@@ -6,7 +6,7 @@ use model_offline::output::chart::number::{number, plain};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
-use crate::report::below_noise::below_noise;
+use crate::report::below_noise::{below_noise, below_noise_in_space};
 use crate::report::paper::paper_optima;
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::time::durations::LoopTiming;
@@ -114,13 +114,14 @@ fn reduction_in_space(run: &SpaceRun) -> Option<String> {
     };
     let (none, held) = (factors(|case| case.improvement_over_none)?, factors(|case| case.improvement)?);
     let advice = match () {
-        () if none.iter().zip(&held).all(|(none, held)| *none < held.min(1.0)) => ": leave the paddles away here",
+        () if run.cases.iter().all(|case| case.stillest() == Strategy::None) => ": leave the paddles away here",
         () if held.iter().all(|held| *held < 1.0) => ": hold them still here",
         () => "",
     };
     let (none, held) = (change(&none), change(&held));
+    let why = below_noise_in_space(run).map_or_else(String::new, |why| format!("; {why}"));
     Some(format!(
-        "The dynamic paddles' largest error is {none} than without paddles and {held} than the best static ones'{advice}."
+        "The dynamic paddles' largest error is {none} than without paddles and {held} than the best static ones'{why}{advice}."
     ))
 }
 

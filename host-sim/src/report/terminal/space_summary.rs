@@ -5,6 +5,7 @@ use std::path::Path;
 
 use super::summary::{FreeRun, share, write_free_runs, write_ledgers};
 use crate::bench::in_space::{SpaceRun, SpaceStrategyResult};
+use crate::report::below_noise::below_noise_in_space;
 use crate::runtime::time::mode::RunMode;
 use model_offline::number::{in_unit, length};
 
@@ -47,15 +48,18 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
             share(case.improvement_over_none, "that of none")
         );
         let plant = &case.dynamic.plant;
-        let checked = plant.largest_error.map_or_else(|| "not checked".to_owned(), length);
+        let checked = plant.largest_error.map_or_else(|| "not checked".to_owned(), |error| in_unit(error, unit));
         let _ = writeln!(
             out,
             "  tissue: {} states, {:.1} µs a step, estimated within {}, {checked} found; {} steps by the full model",
             plant.tabulation.knots,
             plant.step_us,
-            length(plant.largest_estimate),
+            in_unit(plant.largest_estimate, unit),
             plant.fallbacks
         );
+    }
+    if let Some(why) = below_noise_in_space(run) {
+        let _ = writeln!(out, "\n{why}");
     }
     // A string takes everything.
     let _ = write_loop(&mut out, run);

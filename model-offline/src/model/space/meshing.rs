@@ -6,7 +6,9 @@ use super::seen::{BodySurface, poorly_seen};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::{Grading, Request, StuffingError, rim_points, stuff, surface_points};
 use crate::geometry::{Implicit, Point};
+use crate::linalg::room;
 use crate::scene::space::{SpaceInclusion, SpaceScene};
+use crate::solver::equilibrium::Failure;
 use std::collections::BTreeMap;
 
 /// How long edges are.
@@ -78,11 +80,16 @@ fn width(points: &[Point<3>]) -> Option<f64> {
     Some((high - low).max()).filter(|width| *width > 0.0)
 }
 
+/// Bytes that a small mesh and what it is made from take.
+const OF_A_MESH: u64 = 1 << 26;
+
 /// Meshes a scene.
 ///
 /// # Errors
-/// [`ModelError`] where a patch catches no surface, or details are too small for the mesh.
+/// [`ModelError`] where a patch catches no surface, details are too small for the mesh, or there is no memory for it.
 pub fn mesh(scene: &SpaceScene, size: &MeshSize) -> Result<TetMesh, ModelError> {
+    // How many unknowns it will have is not known before.
+    room(0, OF_A_MESH).map_err(Failure::from)?;
     let mesh = graded(scene, size, &[])?;
     let surface = Surface::new(&mesh, scene.size());
     let narrow: Vec<f64> = patches(scene).map(|region| surface.narrow_width(&surface.patch(&[region]))).collect();

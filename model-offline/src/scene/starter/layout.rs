@@ -448,7 +448,7 @@ mod tests {
         let slanted = [[0.0, 0.0], [113.0, 113.0], [99.0, 127.0], [-14.0, 14.0]];
         for outline in [rounded, circle(16, 80.0), circle(17, 80.0), polygon(&slanted)] {
             let Layout { paddles, .. } = layout(outline);
-            assert!(paddles.len() >= 3, "{paddles:?}");
+            assert!(paddles.len() >= 2, "{paddles:?}");
             for (k, (_, one)) in paddles.iter().enumerate() {
                 let clear = |(_, other): &(u32, [Point2; 2])| !segments_meet(one[0], one[1], other[0], other[1], 1e-3);
                 assert!(paddles[k + 1..].iter().all(clear), "{paddles:?}");
