@@ -438,7 +438,7 @@ mod tests {
         assert!(needle.contact.iter().all(|p| !(50.0..=90.0).contains(&p.x)));
     }
 
-    /// Paddles of a block with round corners, of a polygon with few, and of a strip: enough, and none over another.
+    /// Three at least on a block with round corners and on polygons with few, two on a slanted strip, and none over another.
     #[test]
     fn round_corners_and_strips_have_paddles_as_well() {
         let arc = |k: u32| (0..=6).map(move |i| std::f64::consts::FRAC_PI_2 * (f64::from(k) + f64::from(i) / 6.0));
@@ -446,9 +446,9 @@ mod tests {
         let on = |k: u32| arc(k).map(move |a| [corner(k)[0] + 5.0 * a.cos(), corner(k)[1] + 5.0 * a.sin()]);
         let rounded = polygon(&(0..4).flat_map(on).collect::<Vec<_>>());
         let slanted = [[0.0, 0.0], [113.0, 113.0], [99.0, 127.0], [-14.0, 14.0]];
-        for outline in [rounded, circle(16, 80.0), circle(17, 80.0), polygon(&slanted)] {
+        for (outline, least) in [(rounded, 3), (circle(16, 80.0), 3), (circle(17, 80.0), 3), (polygon(&slanted), 2)] {
             let Layout { paddles, .. } = layout(outline);
-            assert!(paddles.len() >= 2, "{paddles:?}");
+            assert!(paddles.len() >= least, "{paddles:?}");
             for (k, (_, one)) in paddles.iter().enumerate() {
                 let clear = |(_, other): &(u32, [Point2; 2])| !segments_meet(one[0], one[1], other[0], other[1], 1e-3);
                 assert!(paddles[k + 1..].iter().all(clear), "{paddles:?}");
