@@ -5,6 +5,7 @@ mod commands;
 use std::process::ExitCode;
 
 use model_offline::output::terminal::all_was_said;
+use model_offline::output::told;
 
 fn main() -> ExitCode {
     // Its warnings show whole data structures of a link whose other side has gone; what matters of that is an error of ours.
@@ -20,7 +21,7 @@ fn main() -> ExitCode {
             if is_controller {
                 eprintln!("controller process:");
             }
-            eprintln!("{:?}", miette::Report::new(error));
+            eprintln!("{}", told(error));
             ExitCode::from(code)
         }
     }

@@ -45,9 +45,17 @@ fn check_exports(folder: &Path, report: &Path) -> usize {
         export.arg("export").arg(&recording).arg("--mcap").arg(mcap).arg("--csv").arg(&csv).args(scene);
         export.assert()
     };
-    export(&["--scene", "paper"], &again).success();
+    let layout = folder.join("again.json");
+    export(&["--scene", "paper", "--layout", layout.to_str().unwrap()], &again).success();
     let whole = std::fs::read(&again).unwrap();
     assert!(whole == std::fs::read(report.join("inclusion-dynamic.mcap")).unwrap());
+    assert_eq!(std::fs::read(&layout).unwrap(), std::fs::read(report.join("inclusion-dynamic.foxglove.json")).unwrap());
+    // A layout is of what is to be seen: none without the scene, and not over the file that it is of.
+    let refused = export(&["--layout", layout.to_str().unwrap()], &folder.join("none.mcap")).code(2);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("--scene"));
+    let refused = export(&["--scene", "paper", "--layout", again.to_str().unwrap()], &again).code(2);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("same file"));
+    assert!(std::fs::read(&again).unwrap() == whole && !folder.join("none.mcap").exists());
     // Without the scene there is nothing to be seen, and all the rest; another scene is none.
     let blind = folder.join("blind.mcap");
     export(&[], &blind).success();

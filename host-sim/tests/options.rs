@@ -52,7 +52,7 @@ const HOST_SIM: [(&str, &str); 18] = [
     ("rearm", "1"),
     ("replay", "IN/paper.rec"),
     ("board", "IN/paper.rec"),
-    ("export", "IN/paper.rec --mcap OUT/a.mcap --csv OUT/a.csv"),
+    ("export", "IN/paper.rec --mcap OUT/a.mcap --csv OUT/a.csv --scene paper --layout OUT/a.json"),
     ("schema", ""),
     ("completions", "bash"),
     ("man", "OUT/man"),

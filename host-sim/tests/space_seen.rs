@@ -41,7 +41,8 @@ fn read(path: &Path) -> SpaceScene {
 /// MCAP of a recording with this scene.
 fn export(recording: &Path, scene: &Path, to: &Path) -> Output {
     let mut export = Command::new(env!("CARGO_BIN_EXE_host-sim"));
-    export.arg("export").arg(recording).arg("--scene").arg(scene).arg("--mcap").arg(to).output().unwrap()
+    export.arg("export").arg(recording).arg("--scene").arg(scene).arg("--mcap").arg(to);
+    export.arg("--layout").arg(to.with_extension("json")).output().unwrap()
 }
 
 fn vector(value: &Value) -> Point<3> {
@@ -147,6 +148,7 @@ fn mcap_shows_the_body_where_the_recording_and_the_model_have_it(
     the_body_is_the_models(model, &bodies, truths);
     tools_are_where_the_recording_has_them(model, &messages(&bytes, "/scene"), truths);
     let layout = std::fs::read(report.join("inclusion-dynamic.foxglove.json")).unwrap();
+    assert_eq!(layout, std::fs::read(again.with_extension("json")).unwrap(), "the layout, exported with it");
     let layout: Value = serde_json::from_slice(&layout).unwrap();
     for topic in ["/scene", "/scene/rest", "/scene/body"] {
         assert_eq!(layout["configById"]["3D!scene"]["topics"][topic]["visible"], true, "{topic}");

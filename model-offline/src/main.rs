@@ -4,8 +4,8 @@ mod commands;
 
 use std::process::ExitCode;
 
-use model_offline::output::end_between_results;
 use model_offline::output::terminal::all_was_said;
+use model_offline::output::{end_between_results, told};
 
 fn main() -> ExitCode {
     end_between_results();
@@ -14,7 +14,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::FAILURE,
         Err(error) => {
             let code = error.exit_code();
-            eprintln!("{:?}", miette::Report::new(error));
+            eprintln!("{}", told(error));
             ExitCode::from(code)
         }
     }

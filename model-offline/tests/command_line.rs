@@ -176,6 +176,27 @@ fn a_vtu_that_goes_into_a_pipe_has_nothing_beside_it() {
     assert!(!Path::new("/dev/stdout.py").exists() && !Path::new("/dev/stdout-parts.vtu").exists());
 }
 
+/// Standard output is the result and nothing else; what would be said there is on standard error.
+#[cfg(unix)]
+#[test]
+fn a_result_on_standard_output_is_not_mixed_with_words() {
+    for call in [&["place", "paper"][..], &["check", "paper"], &["solve", "paper", "--depth", "0.01"], &["materials"]] {
+        let piped = model_offline().args(call).args(["--json", "/dev/stdout"]).assert().success();
+        let output = piped.get_output();
+        let _: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert!(!output.stderr.is_empty(), "{call:?}");
+    }
+}
+
+/// What cannot be written is told once, with its reason.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_told_once() {
+    let refused = model_offline().args(["place", "paper", "--quiet", "--json", "/dev/full"]).assert().code(1);
+    let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
+    assert_eq!(said.matches("No space left").count(), 1, "{said}");
+}
+
 /// The JSON goes into a pipe that is slow to be read, a signal comes meanwhile, and the picture is still to be written.
 #[cfg(unix)]
 #[test]

@@ -95,6 +95,20 @@ fn a_solid_that_would_swell_by_itself_is_refused() {
     assert!(Law::linear(-0.66 * mu, mu).is_ok());
 }
 
+/// A law that is stable and whose stability drowns in rounding is not called unstable: in the plane the ratio of the moduli is
+/// (λ + μ) / μ, in the norm's measure.
+#[test]
+fn a_law_that_rounding_decides_on_says_so() {
+    for law in [Law::linear(1e12, 1.0), Law::neo_hookean(1e12, 1.0)] {
+        match law {
+            Err(MaterialError::TooStiff(ratio)) => assert!(ratio > 0.9e12 && ratio < 3e12, "{ratio}"),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert!(Law::linear(1e11, 1.0).is_ok());
+    assert!(matches!(Law::linear(1e16, 1.0), Err(MaterialError::Unstable(_))));
+}
+
 #[test]
 fn moduli_at_rest_are_those_of_the_linear_law() {
     for law in laws() {

@@ -2,7 +2,7 @@
 
 use model_offline::discretization::{Integration, Resolution};
 use model_offline::geometry::Point2;
-use model_offline::model::TissueModel;
+use model_offline::model::{Body, TissueModel};
 use model_offline::placement::{PlacementOptions, place};
 use model_offline::scene::Scene;
 use model_offline::solver::equilibrium::{FailureReason, NewtonSettings};
@@ -148,6 +148,25 @@ fn too_deep_is_a_typed_failure_with_the_last_converged_state() {
             FailureReason::LostStability | FailureReason::ElementInverted | FailureReason::NotConverged
         ));
     }
+}
+
+/// Settings of a simulator's steps, which keep a factor while it gains: one that led astray is not what the next try begins with.
+#[test]
+fn what_failed_leaves_no_factor_behind() {
+    let model = model(Integration::Scni);
+    let settings = NewtonSettings { max_cutbacks: 0, ..NewtonSettings::SMALL_STEPS };
+    let small = |body: &mut Body| {
+        let before = body.equilibrium().effort().factorisations;
+        body.drive(1e-6, Vector2::zeros()).unwrap();
+        (body.equilibrium().effort().factorisations - before, body.target_displacement())
+    };
+    let mut body = model.body(Some(2), settings).unwrap();
+    let (kept, expected) = small(&mut body.clone());
+    assert_eq!(kept, 0, "the factor at rest serves the first small step");
+    body.drive(0.2, Vector2::zeros()).unwrap_err();
+    let (made, found) = small(&mut body);
+    assert_eq!(made, 1);
+    assert!((found - expected).norm() < 1e-6 * expected.norm(), "{found} {expected}");
 }
 
 #[test]

@@ -34,6 +34,9 @@ pub(crate) struct ExportArgs {
     /// solved again at some ticks)
     #[arg(long, value_name = "FILE", requires = "mcap")]
     pub(crate) scene: Option<PathBuf>,
+    /// Write the layout that shows it, to be imported in Foxglove or Lichtblick
+    #[arg(long, value_name = "FILE", requires = "scene")]
+    pub(crate) layout: Option<PathBuf>,
     /// Export the ticks before the damage of a recording that is damaged or cut off
     #[arg(long)]
     pub(crate) salvage: bool,
@@ -45,7 +48,8 @@ pub(crate) struct ExportArgs {
 /// [`SimError::Record`], [`SimError::File`].
 pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
     let inputs: Vec<&Path> = args.scene.iter().chain([&args.recording]).map(PathBuf::as_path).collect();
-    check_outputs(&inputs, &[("--mcap", args.mcap.as_deref()), ("--csv", args.csv.as_deref())])?;
+    let outputs = [("--mcap", &args.mcap), ("--csv", &args.csv), ("--layout", &args.layout)];
+    check_outputs(&inputs, &outputs.map(|(option, path)| (option, path.as_deref())))?;
     let Salvaged { recording, damage } =
         if args.salvage { Recording::salvage(&args.recording)? } else { Recording::read(&args.recording)?.into() };
     let shape = Header::read(&recording.header.table).map_or((2, 2), |header| (header.dimension, header.paddle_dof));
@@ -76,19 +80,21 @@ fn files<'a, const D: usize, const N: usize, const P: usize>(
     let mut files = Vec::new();
     if let Some(path) = &args.mcap {
         let paddles: Vec<u32> = table.paddles.iter().map(|paddle| paddle.index).collect();
-        let encode = |stage: Option<&dyn Scenery>| {
-            mcap::encode(recording, &series, mcap::Known { stage, ..mcap::Known::default() })
+        let mut seen = |stage: Option<&dyn Scenery>| {
+            let bytes = mcap::encode(recording, &series, mcap::Known { stage, ..mcap::Known::default() })?;
+            files.push((path.as_path(), bytes));
+            files.extend(args.layout.as_deref().zip(stage.map(Scenery::layout_file)));
+            Ok::<_, SimError>(())
         };
-        let bytes = match args.scene.as_deref() {
-            None => encode(None),
-            Some(scene) if D == 2 => encode(Some(&stage(scene, recording, paddles[0])?)),
+        match args.scene.as_deref() {
+            None => seen(None)?,
+            Some(scene) if D == 2 => seen(Some(&stage(scene, recording, paddles[0])?))?,
             Some(scene) => {
                 let model = model_in_space(scene, recording)?;
                 let solved = solved_bodies(&model, &paddles, &recording.truths())?;
-                encode(Some(&SpaceStage::new(SpaceGeometry::new(&model), &paddles, &solved)))
+                seen(Some(&SpaceStage::new(SpaceGeometry::new(&model), &paddles, &solved)))?;
             }
-        };
-        files.push((path.as_path(), bytes?));
+        }
     }
     if let Some(path) = &args.csv {
         files.push((path.as_path(), series.recording(recording)));

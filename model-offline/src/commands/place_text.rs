@@ -136,8 +136,11 @@ fn without(paddles: &[u32]) -> String {
     let names: Vec<String> = paddles.iter().map(ToString::to_string).collect();
     match names.len() {
         0 => String::new(),
-        1 => format!(" (without paddle {}, of which no table can be made)", names[0]),
-        _ => format!(" (without paddles {}, of which no table can be made)", names.join(", ")),
+        1 => format!(" (without paddle {}, which cannot hold the target: its error is in its row)", names[0]),
+        _ => format!(
+            " (without paddles {}, which cannot hold the target: their errors are in their rows)",
+            names.join(", ")
+        ),
     }
 }
 

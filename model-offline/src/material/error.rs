@@ -11,6 +11,11 @@ pub enum MaterialError {
     /// The law is unstable at rest.
     #[error("the law is not stable at rest: its small-strain tangent has eigenvalue {0:.3e}")]
     Unstable(f64),
+    /// The law resists one strain so much more than another that the smaller resistance drowns in the rounding of the larger.
+    #[error(
+        "the law resists one strain {0:.0e} times as much as another, which numbers of sixteen digits cannot tell from none"
+    )]
+    TooStiff(f64),
     /// A modulus is negative where none may be.
     #[error("{0} must not be negative")]
     Negative(&'static str),
@@ -52,6 +57,9 @@ impl MaterialError {
             }
             Self::UnknownStress(_) => {
                 "name the unit of stress in [scene] units, or write out the numbers (`model-offline materials --json` has them)"
+            }
+            Self::TooStiff(_) => {
+                "take a smaller lambda: 1000 times mu is Poisson's ratio 0.4995, and incompressible as far as tissue is known"
             }
             Self::Missing(_) => "give every modulus of the law",
             Self::Meaningless(_) => "remove it, or choose another model",

@@ -66,7 +66,8 @@ pub trait Material<const D: usize>: std::fmt::Debug {
     /// definite. For isotropic laws that is μ > 0 with λ + μ > 0 in the plane, λ + 2μ/3 > 0 in space.
     ///
     /// # Errors
-    /// [`MaterialError::Unstable`] with the lowest eigenvalue; [`MaterialError::NotFinite`].
+    /// [`MaterialError::Unstable`] with the lowest eigenvalue; [`MaterialError::TooStiff`] where rounding decides;
+    /// [`MaterialError::NotFinite`].
     fn check_stable_at_rest(&self) -> Result<(), MaterialError> {
         stable_at_rest(&self.tangent(&Matrix::zeros()))
     }
@@ -95,6 +96,12 @@ pub(super) fn stable_at_rest<const D: usize>(a: &Tensor4<D>) -> Result<(), Mater
     if !mandel.iter().all(|v| v.is_finite()) {
         return Err(MaterialError::NotFinite("a modulus"));
     }
-    let lowest = mandel.symmetric_eigenvalues().min();
-    if lowest > 1e-12 * mandel.norm() { Ok(()) } else { Err(MaterialError::Unstable(lowest)) }
+    let (lowest, norm) = (mandel.symmetric_eigenvalues().min(), mandel.norm());
+    if lowest > 1e-12 * norm {
+        Ok(())
+    } else if lowest > 1e-14 * norm {
+        Err(MaterialError::TooStiff(norm / lowest))
+    } else {
+        Err(MaterialError::Unstable(lowest))
+    }
 }

@@ -53,6 +53,11 @@ pub(super) fn write_stream(path: &Path, bytes: &[u8]) -> io::Result<()> {
     File::options().append(true).open(path)?.write_all(bytes)
 }
 
+/// Whether a stream is this process's standard output.
+pub(super) fn is_standard_output(stream: &Path) -> bool {
+    descriptor_of(stream) == Some(1)
+}
+
 /// Which of this process's descriptors a path stands for.
 fn descriptor_of(path: &Path) -> Option<u32> {
     let own = ["/proc/self/fd", "/proc/thread-self/fd"].map(|folder| Path::new(folder).canonicalize().ok());

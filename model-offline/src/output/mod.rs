@@ -19,6 +19,7 @@ pub mod surface;
 pub mod table_text;
 pub mod terminal;
 mod together;
+mod told;
 pub mod vtu;
 
 pub use geometry::{Geometry, PaddleGeometry};
@@ -26,6 +27,7 @@ pub use picture_file::{PictureError, PictureFormat, write_picture};
 pub use preflight::{OutputRefused, RefusalReason, check_outputs};
 pub use state::{NodalFields, State, has_stress};
 pub use together::{Together, end_between_results, together};
+pub use told::told;
 
 use destination::Destination;
 use std::io::Write as _;

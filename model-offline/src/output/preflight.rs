@@ -1,7 +1,8 @@
 //! Outputs, checked before the work begins: a result that cannot be kept is known in the first second, and no output
 //! overwrites an input or another output.
 
-use super::destination::{Destination, folder_of};
+use super::destination::{Destination, folder_of, is_standard_output};
+use super::terminal;
 use std::path::{Path, PathBuf};
 
 /// An output that is refused before anything is computed.
@@ -60,7 +61,12 @@ pub fn check_outputs(inputs: &[&Path], outputs: &[(&'static str, Option<&Path>)]
             Destination::Stream(stream) if inputs.contains(&Identity::of(&stream)) => {
                 return Err(refused(RefusalReason::IsInput));
             }
-            Destination::Stream(_) => continue,
+            Destination::Stream(stream) => {
+                if is_standard_output(&stream) {
+                    terminal::give_way();
+                }
+                continue;
+            }
             Destination::File(file) => file,
         };
         let identity = Identity::of(&file);

@@ -15,6 +15,14 @@ const LINES_EVERY: Duration = Duration::from_secs(4);
 /// Whether something that was to be said could not be, and somebody wants to read it.
 static UNSAID: AtomicBool = AtomicBool::new(false);
 
+/// Whether standard output is what a file was asked to be.
+static IS_A_FILE: AtomicBool = AtomicBool::new(false);
+
+/// From now on words go to standard error: standard output is a result (`--json /dev/stdout`), which another program reads.
+pub fn give_way() {
+    IS_A_FILE.store(true, Ordering::Relaxed);
+}
+
 /// Says a line on standard output. Where its reader has gone (`| head`) the work goes on in silence: files that are asked for
 /// are written all the same. Another reason why it cannot be written is told once, and [`all_was_said`] knows.
 #[macro_export]
@@ -30,8 +38,11 @@ macro_rules! tell {
 
 /// What [`say!`] and [`tell!`] do.
 pub fn put(what: fmt::Arguments<'_>) {
-    let mut out = std::io::stdout().lock();
-    put_into(&mut out, what);
+    if IS_A_FILE.load(Ordering::Relaxed) {
+        put_into(&mut std::io::stderr().lock(), what);
+    } else {
+        put_into(&mut std::io::stdout().lock(), what);
+    }
 }
 
 fn put_into(out: &mut impl Write, what: fmt::Arguments<'_>) {

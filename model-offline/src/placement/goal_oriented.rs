@@ -13,7 +13,7 @@
 //! has gone farther than that since the pair of meshes before, that way is left open.
 
 use super::fields::{Fields, Loads};
-use super::hindrance::{is_usable, is_useless_within};
+use super::hindrance::{Open, is_hindered_within, is_usable, is_usable_within, is_useless_within};
 use super::rest::{RestResponse, for_each_paddle, response_of};
 use crate::discretization::nodes::bisection::Triangulation;
 use crate::discretization::{Integration, Method, Planar};
@@ -38,8 +38,10 @@ const REMEMBERED: f64 = 0.5;
 /// What is left open, relative, from which on the measure of a paddle that no table can be made of is given up, where those of
 /// all paddles are asked for.
 const HOPELESS: f64 = 0.1;
-/// Share of the sum of the triangles' parts that the triangles cut next make up.
-const CUT: f64 = 0.6;
+/// Share of the sum of the triangles' parts that the triangles cut next make up; less of it where that takes too many nodes.
+const CUTS: [f64; 4] = [0.6, 0.45, 0.3, 0.2];
+/// Fewer triangles more than that, over those that there are, are not worth another solution.
+const LEAST_GROWTH: f64 = 1.1;
 /// More nodes than this are not tried on the fine mesh.
 const MAX_NODES: usize = 80_000;
 /// Refinement level of the graded nodes that the first triangulation is made of.
@@ -58,10 +60,12 @@ pub(super) struct Certified {
     pub open: Vec<f64>,
     /// What it leaves open of the Jacobians, over their norm.
     pub open_jacobian: Vec<f64>,
+    /// Whose measures are to be known.
+    pub asked: Asked,
     /// Whose measures have to be known: those that are [asked for](Asked), and of all paddles where that leaves none.
     pub counted: Vec<bool>,
-    /// Of which no table can be made, wherever the limit lies.
-    useless: Vec<bool>,
+    /// Which cannot hold the target, wherever the limit lies, nor be the best to control it.
+    unable: Vec<bool>,
     /// What it leaves open of the small-depth displacements, over the largest.
     pub open_displacement: f64,
     /// The share of an amplified error of the Jacobian that reaches the length, paddle by paddle.
@@ -80,13 +84,21 @@ impl Certified {
     }
 }
 
-/// Whose measures a refinement is to make known.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Whose measures a refinement is to make known: never those of the hopeless, of which no table can be made, wherever the limit
+/// lies, and which are far from known.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Asked {
-    /// Those of all paddles but the hopeless: no table can be made of them, wherever the limit lies, and they are far from known.
+    /// Those of all other paddles.
     All,
-    /// Those of paddles that a table may be made of.
-    Usable,
+    /// Those of all others but the spared, in the order of the scene.
+    AllBut(Vec<bool>),
+}
+
+impl Asked {
+    /// Whether a paddle is spared.
+    pub(super) fn spares(&self, paddle: usize) -> bool {
+        matches!(self, Self::AllBut(spared) if spared[paddle])
+    }
 }
 
 /// A refinement on its way: it can be asked for more.
@@ -105,11 +117,17 @@ impl Refinement {
         self.last.as_ref().map(|(certified, _)| (&self.mesh, certified))
     }
 
-    /// Whether a paddle that no table can be made of has its measure asked for.
-    pub(super) fn asks_for_useless(&self) -> bool {
-        let pairs =
-            |last: &Certified| last.useless.iter().zip(&last.counted).any(|(useless, counted)| *useless && *counted);
-        self.last.as_ref().is_some_and(|(last, _)| pairs(last) && last.useless.contains(&false))
+    /// What else to ask for where the tolerance is not reached: the same without paddles that cannot hold the target and whose
+    /// measures, on this mesh, are not within `most`. None where those are none, or all.
+    pub(super) fn without_unable(&self, most: f64) -> Option<Asked> {
+        let (last, _) = self.last.as_ref()?;
+        let limits = last.limit.iter().zip(&last.open);
+        let errors =
+            last.responses.iter().zip(limits).map(|(found, (limit, open))| found.measure_distance(limit) + open);
+        let is_spared = |(unable, error): (&bool, f64)| *unable && error > most;
+        let spared: Vec<bool> = last.unable.iter().zip(errors).map(is_spared).collect();
+        let changes = spared.iter().zip(&last.counted).any(|(spared, counted)| *spared && *counted);
+        (changes && spared.contains(&false)).then_some(Asked::AllBut(spared))
     }
 
     /// The coarsest mesh, not solved yet.
@@ -136,27 +154,36 @@ impl Refinement {
     ) -> Result<(&Certified, bool), ModelError> {
         let mut last = match self.last.take() {
             Some(last) => last,
-            None => certified(&self.scene, self.asked, &self.mesh, None)?,
+            None => certified(&self.scene, &self.asked, &self.mesh, None)?,
         };
         let mut is_enough = enough(&last.0);
         while !is_enough {
-            let (next, _) = self.mesh.bisected(&largest(&last.1, CUT));
-            // Quadratic triangles have about twice as many nodes as there are triangles, and the fine ones four times that.
-            if 8 * next.triangles.len() > MAX_NODES {
-                break;
-            }
-            last = certified(&self.scene, self.asked, &next, Some(&last.0))?;
+            let Some(next) = self.finer(&last.1) else { break };
+            last = certified(&self.scene, &self.asked, &next, Some(&last.0))?;
             self.mesh = next;
             is_enough = enough(&last.0);
         }
         Ok((&self.last.insert(last).0, is_enough))
+    }
+
+    /// The present mesh with the triangles cut that what is missing asks for most; with fewer of them cut where those would be
+    /// too many nodes, and none where that is hardly more than there are.
+    fn finer(&self, parts: &[f64]) -> Option<Triangulation> {
+        // Quadratic triangles have about twice as many nodes as there are triangles, and the fine ones four times that.
+        let most = MAX_NODES / 8;
+        let worth = |share: f64, next: &Triangulation| {
+            share == CUTS[0] || next.triangles.len() as f64 > LEAST_GROWTH * self.mesh.triangles.len() as f64
+        };
+        let mut tries = CUTS.into_iter().map(|share| (share, self.mesh.bisected(&largest(parts, share)).0));
+        let fits = tries.find(|(_, next)| next.triangles.len() <= most);
+        fits.filter(|(share, next)| worth(*share, next)).map(|(_, next)| next)
     }
 }
 
 /// A mesh certified by the one in which each of its triangles is cut into four, and by what coarser ones have shown.
 fn certified(
     scene: &Scene,
-    asked: Asked,
+    asked: &Asked,
     mesh: &Triangulation,
     before: Option<&Certified>,
 ) -> Result<(Certified, Vec<f64>), ModelError> {
@@ -199,7 +226,7 @@ struct Pair {
 
 impl Pair {
     /// Answers of both, and every coarse triangle's part of their differences (the largest over all answers).
-    fn certify(self, asked: Asked, earlier: Option<&Certified>) -> Result<(Certified, Vec<f64>), ModelError> {
+    fn certify(self, asked: &Asked, earlier: Option<&Certified>) -> Result<(Certified, Vec<f64>), ModelError> {
         let mut coarse: Vec<Fields> = Vec::new();
         for_each_paddle(&self.coarse, Loads::OnTarget, |_, fields| {
             coarse.push(fields.clone());
@@ -210,7 +237,8 @@ impl Pair {
         let stiffness = self.stiffness();
         let mut parts = vec![0.0_f64; self.coarse.cells().len()];
         let (mut limit, mut open, mut open_displacement) = (Vec::new(), Vec::new(), 0.0_f64);
-        let (mut open_jacobian, mut shares, mut useless) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut open_jacobian, mut shares) = (Vec::new(), Vec::new());
+        let (mut useless, mut hindered, mut within) = (Vec::new(), Vec::new(), Vec::new());
         // What one pair of meshes has decided is decided; the next one looks again.
         let is_asked = |paddle: usize| earlier.is_none_or(|earlier| earlier.counted[paddle]);
         for_each_paddle(&self.fine, Loads::OnTarget, |paddle, fields| {
@@ -225,22 +253,26 @@ impl Pair {
             let left = left_open(before, &found, earlier.map(|earlier| earlier.shares[paddle]));
             let jacobian = OPEN * (found.jacobian - before.jacobian).norm();
             let left_open = left.open.max(earlier.map_or(0.0, |earlier| went(&earlier.limit[paddle], &shifted)));
+            let moved = OPEN * (found.target_per_depth - before.target_per_depth).norm();
             useless.push(is_useless_within(&shifted, jacobian) || vanishes(before, &found));
+            within.push(Open { measure: left_open, jacobian, displacement: moved });
+            hindered.push(is_hindered_within(&shifted, &within[paddle], self.fine.scene()));
             open_jacobian.push(jacobian / shifted.jacobian.norm().max(f64::MIN_POSITIVE));
             open.push(left_open);
             limit.push(shifted);
             shares.push(left.share);
-            let moved = (found.target_per_depth - before.target_per_depth).norm();
-            open_displacement = open_displacement.max(OPEN * moved / largest);
+            open_displacement = open_displacement.max(moved / largest);
             Ok(())
         })?;
+        let unable = unable_and_worse(&useless, &hindered, &limit, &within);
         let counted = counted(asked, &useless, &open);
         let nodes = self.fine.nodes();
         let certified = Certified {
             model: self.coarse,
             responses,
+            asked: asked.clone(),
             counted,
-            useless,
+            unable,
             limit,
             open,
             open_jacobian,
@@ -304,13 +336,20 @@ fn vanishes(coarse: &RestResponse, fine: &RestResponse) -> bool {
     one_alone && [coarse, fine].iter().all(|response| !is_usable(response))
 }
 
+/// Which paddles cannot hold the target and are not the best to control it either, wherever the limits lie: no table can be made
+/// of the useless, so that none of them is the best; of the others, one that a table can surely be made of is surely better.
+fn unable_and_worse(useless: &[bool], hindered: &[bool], limit: &[RestResponse], open: &[Open]) -> Vec<bool> {
+    let measure = |paddle: usize| limit[paddle].controllability_measure;
+    let usable = (0..limit.len()).filter(|&paddle| is_usable_within(&limit[paddle], open[paddle].jacobian));
+    let best = usable.map(|paddle| measure(paddle) * (1.0 + open[paddle].measure)).fold(f64::INFINITY, f64::min);
+    let is_worse = |paddle: usize| measure(paddle) * (1.0 - open[paddle].measure) > best;
+    (0..limit.len()).map(|paddle| useless[paddle] || hindered[paddle] && is_worse(paddle)).collect()
+}
+
 /// Whose measures have to be known, of paddles that are useless or not and left open so far.
-fn counted(asked: Asked, useless: &[bool], open: &[f64]) -> Vec<bool> {
-    let is_counted = |(useless, open): (&bool, &f64)| match asked {
-        Asked::All => !useless || *open <= HOPELESS,
-        Asked::Usable => !useless,
-    };
-    let mut counted: Vec<bool> = useless.iter().zip(open).map(is_counted).collect();
+fn counted(asked: &Asked, useless: &[bool], open: &[f64]) -> Vec<bool> {
+    let is_counted = |paddle: usize| !asked.spares(paddle) && (!useless[paddle] || open[paddle] <= HOPELESS);
+    let mut counted: Vec<bool> = (0..open.len()).map(is_counted).collect();
     if !counted.contains(&true) {
         counted.fill(true);
     }
@@ -493,6 +532,26 @@ mod tests {
         assert!(!useless(4e-3, 1.7e-3) && !useless(1.7e-3, 4e-3));
         assert!(useless(3e-4, 2e-4) && useless(2e-4, 3e-4) && useless(1e-4, -1e-4));
         assert!(!useless(1.1e-3, 1.05e-3) && !useless(0.2, 0.1));
+    }
+
+    /// The first answers best and may or may not be one that a table can be made of; the second is the only one that surely is. It
+    /// cannot hold the target, but is the best if the first is none.
+    #[test]
+    fn the_best_that_a_table_can_surely_be_made_of_is_not_unable() {
+        let of = |least: f64, most: f64| {
+            RestResponse::new(Matrix2::new(least, 0.0, 0.0, most), Vector2::zeros(), Vector2::y())
+        };
+        let open = |jacobian: f64| Open { measure: 0.1, jacobian, displacement: 0.0 };
+        let limit = [of(0.36 / 1400.0, 0.36), of(0.01, 0.02), of(0.01, 0.005)];
+        assert!(!is_usable(&limit[0]) && !is_useless_within(&limit[0], 3e-4) && is_usable(&limit[1]));
+        let within = [open(3e-4), open(1e-4), open(1e-4)];
+        let unable = unable_and_worse(&[false; 3], &[false, true, true], &limit, &within);
+        assert_eq!(unable, [false, false, true]);
+        // Where the first is one for certain, both others are.
+        let sure = [of(0.1, 0.36), limit[1], limit[2]];
+        assert_eq!(unable_and_worse(&[false; 3], &[false, true, true], &sure, &within), [false, true, true]);
+        // All are hindered: the best of them is asked for.
+        assert_eq!(unable_and_worse(&[false; 3], &[true; 3], &sure, &within), [false, true, true]);
     }
 
     #[test]

@@ -74,6 +74,40 @@ pub(super) fn is_useless_within(rest: &RestResponse, open: f64) -> bool {
     (least + open) * CONDITION_LIMIT < norm - open || norm + open < FAINTEST
 }
 
+/// Whether a table can be made of a paddle whose Jacobian is within `open` of this one, in the Frobenius norm, whichever it is:
+/// condition numbers grow with the ratio of the singular values, which move by no more than that.
+pub(super) fn is_usable_within(rest: &RestResponse, open: f64) -> bool {
+    let values = rest.jacobian.singular_values();
+    let (most, least) = (values.max() + open, values.min() - open);
+    rest.best_direction.is_some()
+        && rest.jacobian.norm() - open >= FAINTEST
+        && least > 0.0
+        && most / least + least / most <= CONDITION_LIMIT
+}
+
+/// What is left open of a response, absolute but for the measure.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Open {
+    /// Of the controllability measure, relative.
+    pub measure: f64,
+    /// Of the Jacobian, in the Frobenius norm.
+    pub jacobian: f64,
+    /// Of the target's displacement per depth.
+    pub displacement: f64,
+}
+
+/// Whether a paddle cannot hold the target, whichever response it is within what is left open: the [measure](RestResponse) ‖J⁻¹n‖
+/// is no more than ‖J⁻¹‖, so that a condition number is at least ‖J‖ times it.
+pub(super) fn is_hindered_within(rest: &RestResponse, open: &Open, scene: &Scene) -> bool {
+    let measure = rest.controllability_measure * (1.0 - open.measure);
+    if !measure.is_finite() || measure <= 0.0 {
+        return false;
+    }
+    let drift = rest.target_per_depth.dot(&scene.needle.orthogonal()).abs() - open.displacement;
+    let is_ill_conditioned = (rest.jacobian.norm() - open.jacobian) * measure > CONDITION_LIMIT;
+    is_ill_conditioned || drift * scene.needle.depth * measure > scene.actuator.max_displacement
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,6 +124,15 @@ mod tests {
                 // Towards the best that there is: what is smallest grows, along its own singular vectors.
                 let best = turned * Matrix2::new(1.0, 0.0, 0.0, least + open);
                 assert_eq!(is_useless_within(&of(jacobian), open), !is_usable(&of(best)), "{least} {open}");
+            }
+        }
+        // Every Jacobian around one that is usable within a distance is usable, the worst of them just.
+        for least in [9e-4, 1.1e-3, 2e-3, 0.5] {
+            let jacobian = turned * Matrix2::new(1.0, 0.0, 0.0, least);
+            for open in [0.0, 5e-5, 2e-4, 6e-4, 2e-3] {
+                let worst = turned * Matrix2::new(1.0 + open, 0.0, 0.0, least - open);
+                let expected = least > open && is_usable(&of(worst));
+                assert_eq!(is_usable_within(&of(jacobian), open), expected, "{least} {open}");
             }
         }
         // What the target hardly follows is useless however well it is conditioned, if that is certain.

@@ -1,7 +1,7 @@
 //! A solution to judge others by: quadratic triangles, refined where the answers ask for it and extrapolated.
 
 use super::goal_oriented::{Asked, Certified, Refinement};
-use super::hindrance::is_usable;
+use super::hindrance::{best_to_control, hindrance, is_usable};
 use super::rest::RestResponse;
 use crate::model::ModelError;
 use crate::scene::Scene;
@@ -9,13 +9,15 @@ use crate::scene::Scene;
 /// A solution on quadratic triangles, extrapolated, to judge others by.
 #[derive(Debug, Clone)]
 pub struct Reference {
+    scene: Scene,
+    asked: Asked,
     responses: Vec<RestResponse>,
     open_by_paddle: Vec<f64>,
     open_jacobian: Vec<f64>,
     counted: Vec<bool>,
     open_displacement: f64,
-    /// What it leaves open: worst relative error, of the displacements and of the measures of all paddles but those that no table
-    /// can be made of, wherever the limit lies.
+    /// What it leaves open: worst relative error, of the displacements and of the measures of all paddles but those that are
+    /// left out.
     pub open: f64,
     /// Nodes of the finer mesh.
     pub nodes: usize,
@@ -41,6 +43,8 @@ impl Reference {
 
     pub(super) fn from_certified(certified: &Certified) -> Self {
         Self {
+            scene: certified.model.scene().clone(),
+            asked: certified.asked.clone(),
             responses: certified.limit.clone(),
             open_by_paddle: certified.open.clone(),
             open_jacobian: certified.open_jacobian.clone(),
@@ -59,10 +63,17 @@ impl Reference {
     }
 
     /// Whose measures a tolerance is of, paddle by paddle: not those of paddles that no table can be made of, neither by these
-    /// responses nor wherever the limit lies, where they are not known to a tenth or the tolerance is not reached with them. Their
-    /// Jacobians are all but singular, and nobody needs their measures to three digits. All count where that leaves none.
+    /// responses nor wherever the limit lies, where they are not known to a tenth; and where the tolerance is not reached with
+    /// them, not those of paddles that can neither hold the target nor are the best to control it, by these responses either. Nobody needs such measures to
+    /// three digits. All count where that leaves none.
     pub fn counts(&self, responses: &[RestResponse]) -> Vec<bool> {
-        responses.iter().zip(&self.counted).map(|(found, counted)| *counted || is_usable(found)).collect()
+        let best = best_to_control(responses);
+        let may_matter = |place: usize, found: &RestResponse| {
+            let is_asked = !self.asked.spares(place) || best == Some(place);
+            is_usable(found) && (is_asked || hindrance(found, &self.scene).is_none())
+        };
+        let all = responses.iter().enumerate();
+        all.map(|(place, found)| self.counted[place] || may_matter(place, found)).collect()
     }
 
     /// Worst of the [errors](Self::errors) that [count](Self::counts).

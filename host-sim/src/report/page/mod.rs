@@ -46,30 +46,25 @@ const PARTS: [(&str, &str); 7] = [
     ("repeat", "To repeat it"),
 ];
 
+/// Columns of the first table.
+const COLUMNS: [&str; 7] =
+    ["tissue", "no paddle", "static", "dynamic", "static / dynamic", "none / dynamic", "table made from"];
+
 fn head(run: &RunResult) -> Markup {
     let unit = &run.units[0];
     html! {
         p.quiet { "Stillpoint report" }
         h1 { "Scene " (run.scene) }
         @for sentence in conclusion::sentences(run) { p.lead { (sentence) } }
-        div.scroll { table {
+        div.scroll { table.cards {
             caption { span {
                 (in_unit("Largest target displacement orthogonal to the needle", unit)) " over an insertion of "
                 (plain(run.settings.depth)) " in " (plain(run.settings.insertion_s)) " s; paddle in brackets"
             } }
             thead { tr {
-                th { "tissue" } th { "no paddle" } th { "static" } th { "dynamic" } th { "static / dynamic" } th { "none / dynamic" }
-                th.left { "table made from" }
+                @for (place, title) in COLUMNS.into_iter().enumerate() { th.left[place + 1 == COLUMNS.len()] { (title) } }
             } }
-            tbody { @for case in &run.cases { tr {
-                td { (case.tissue) }
-                td.best[case.stillest() == Strategy::None] { (largest(run.without_paddle(case))) }
-                td.best[case.stillest() == Strategy::Static] { (largest(case.strategies.static_paddle.as_ref())) }
-                td.best[case.stillest() == Strategy::Dynamic] { (largest(case.strategies.controlled())) }
-                td { (case.improvement.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
-                td { (case.improvement_over_none.map_or_else(|| "–".to_owned(), |factor| number(factor, 3))) }
-                td.left { (case.table_tissue) }
-            } } }
+            tbody { @for case in &run.cases { tr { (case_cells(run, case)) } } }
         } }
         p.quiet {
             "Strategies compared in " (run.mode) ", seed " (run.seed) ". Lengths are in the scene's own unit"
@@ -84,6 +79,26 @@ fn head(run: &RunResult) -> Markup {
             }
         }
         nav { ol { @for (id, title) in PARTS { li { a href=(format!("#{id}")) { (title) } } } } }
+    }
+}
+
+/// One case's numbers, each with its column's title, which narrow screens show beside it.
+fn case_cells(run: &RunResult, case: &CaseResult) -> Markup {
+    let factor = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |factor| number(factor, 3));
+    let stillest = |strategy: Strategy| case.stillest() == strategy;
+    let cells = [
+        (case.tissue.to_string(), false),
+        (largest(run.without_paddle(case)), stillest(Strategy::None)),
+        (largest(case.strategies.static_paddle.as_ref()), stillest(Strategy::Static)),
+        (largest(case.strategies.controlled()), stillest(Strategy::Dynamic)),
+        (factor(case.improvement), false),
+        (factor(case.improvement_over_none), false),
+        (case.table_tissue.to_string(), false),
+    ];
+    html! {
+        @for (place, (title, (cell, is_best))) in COLUMNS.into_iter().zip(cells).enumerate() {
+            td.best[is_best].left[place + 1 == COLUMNS.len()] data-title=(title) { (cell) }
+        }
     }
 }
 
