@@ -4,7 +4,7 @@ mod commands;
 
 use std::process::ExitCode;
 
-use model_offline::output::terminal::all_was_said;
+use model_offline::output::terminal::{all_was_said, complain};
 use model_offline::output::told;
 
 fn main() -> ExitCode {
@@ -19,9 +19,9 @@ fn main() -> ExitCode {
         Err(error) => {
             let code = error.exit_code();
             if is_controller {
-                eprintln!("controller process:");
+                complain("controller process:");
             }
-            eprintln!("{}", told(error));
+            complain(&told(error));
             ExitCode::from(code)
         }
     }

@@ -53,6 +53,11 @@ fn check_exports(folder: &Path, report: &Path) -> usize {
     // A layout is of what is to be seen: none without the scene, and not over the file that it is of.
     let refused = export(&["--layout", layout.to_str().unwrap()], &folder.join("none.mcap")).code(2);
     assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("--scene"));
+    let refused = export(&["--scene", "block"], &folder.join("none.mcap")).code(2);
+    assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("not the scene that was recorded"));
+    // A device that takes nothing: nothing else is written.
+    #[cfg(target_os = "linux")]
+    export(&["--scene", "paper", "--layout", "/dev/full"], &folder.join("none.mcap")).code(1);
     let refused = export(&["--scene", "paper", "--layout", again.to_str().unwrap()], &again).code(2);
     assert!(String::from_utf8_lossy(&refused.get_output().stderr).contains("same file"));
     assert!(std::fs::read(&again).unwrap() == whole && !folder.join("none.mcap").exists());

@@ -4,7 +4,7 @@ mod commands;
 
 use std::process::ExitCode;
 
-use model_offline::output::terminal::all_was_said;
+use model_offline::output::terminal::{all_was_said, complain};
 use model_offline::output::{end_between_results, told};
 
 fn main() -> ExitCode {
@@ -14,7 +14,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::FAILURE,
         Err(error) => {
             let code = error.exit_code();
-            eprintln!("{}", told(error));
+            complain(&told(error));
             ExitCode::from(code)
         }
     }

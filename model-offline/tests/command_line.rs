@@ -195,6 +195,13 @@ fn a_full_disk_is_told_once() {
     let refused = model_offline().args(["place", "paper", "--quiet", "--json", "/dev/full"]).assert().code(1);
     let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert_eq!(said.matches("No space left").count(), 1, "{said}");
+    // Where words cannot be said either, there is no panic.
+    for call in [&["check", "paper", "--json", "/dev/stdout"][..], &["check", "none.toml"]] {
+        let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+        let program = assert_cmd::cargo::cargo_bin!("model-offline");
+        let output = std::process::Command::new(program).args(call).stderr(full).output().unwrap();
+        assert!(matches!(output.status.code(), Some(1 | 2)), "{call:?}: {:?}", output.status);
+    }
 }
 
 /// The JSON goes into a pipe that is slow to be read, a signal comes meanwhile, and the picture is still to be written.

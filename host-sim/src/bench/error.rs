@@ -141,6 +141,19 @@ pub enum SimError {
     /// The table cannot be computed.
     #[error("the controller table cannot be computed")]
     TableBuild(#[from] TableBuildError),
+    /// The table of one tissue of a scene cannot be computed.
+    #[error("the controller table of the {tissue} tissue cannot be computed for paddle {paddle}, its best")]
+    TissueTable {
+        /// Which.
+        tissue: TissueVariant,
+        /// The best dynamic paddle there.
+        paddle: u32,
+        /// What may be asked for instead, if anything.
+        #[help]
+        instead: Option<String>,
+        /// Why.
+        source: Box<TableBuildError>,
+    },
     /// A run ended early.
     #[error(transparent)]
     #[diagnostic(transparent)]

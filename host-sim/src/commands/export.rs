@@ -13,11 +13,11 @@ use host_sim::world::retrace::solved_bodies;
 
 use model_offline::model::space::SpaceModel;
 use model_offline::output::space_picture::SpaceGeometry;
-use model_offline::output::{check_outputs, together};
+use model_offline::output::{check_outputs, is_stream, together};
 use model_offline::placement::space::workflow::coarse;
 use model_offline::say;
+use model_offline::scene::TissueVariant;
 use model_offline::scene::space::{AnyScene, SpaceScene};
-use model_offline::scene::{Scene, TissueVariant};
 
 /// Options of `export`.
 #[derive(Args, Clone, Debug)]
@@ -59,7 +59,9 @@ pub(crate) fn export(args: &ExportArgs) -> Result<(), SimError> {
         _ => files::<2, 1, 1>(args, &recording),
     };
     let mut said: Vec<String> = damage.map(|damage| format!("damaged: {damage}")).into_iter().collect();
-    let files = files?;
+    let mut files = files?;
+    // What flows into a pipe or a device can fail at any time: nothing is left then.
+    files.sort_by_key(|(path, _)| !is_stream(path));
     let together = together();
     for (path, bytes) in files {
         said.push(written(path, &bytes)?);
@@ -104,10 +106,11 @@ fn files<'a, const D: usize, const N: usize, const P: usize>(
 
 /// The planar scene of a recording, with or without its inclusions.
 fn stage(path: &Path, recording: &Recording, paddle: u32) -> Result<Stage, SimError> {
-    let scene = Scene::read(path)?;
+    let not_its = || SimError::NotTheRecordings { scene: path.to_owned() };
+    let AnyScene::Planar(scene) = AnyScene::read(path)? else { return Err(not_its()) };
     let simulated = TissueVariant::ALL.map(|tissue| tissue.of(&scene)).into_iter();
     let simulated = simulated.into_iter().find(|scene| scene.hash() == recording.header.scene_hash);
-    Ok(Stage::new(&simulated.ok_or_else(|| SimError::NotTheRecordings { scene: path.to_owned() })?, paddle))
+    Ok(Stage::new(&simulated.ok_or_else(not_its)?, paddle))
 }
 
 /// The model that insertions into a recording's body in space were followed on, with or without its inclusions.

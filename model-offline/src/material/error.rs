@@ -13,9 +13,9 @@ pub enum MaterialError {
     Unstable(f64),
     /// The law resists one strain so much more than another that the smaller resistance drowns in the rounding of the larger.
     #[error(
-        "the law resists one strain {0:.0e} times as much as another, which numbers of sixteen digits cannot tell from none"
+        "the law resists one strain more than 10¹² times as much as another: numbers of sixteen digits cannot tell whether it is stable at rest"
     )]
-    TooStiff(f64),
+    TooFarApart,
     /// A modulus is negative where none may be.
     #[error("{0} must not be negative")]
     Negative(&'static str),
@@ -58,8 +58,8 @@ impl MaterialError {
             Self::UnknownStress(_) => {
                 "name the unit of stress in [scene] units, or write out the numbers (`model-offline materials --json` has them)"
             }
-            Self::TooStiff(_) => {
-                "take a smaller lambda: 1000 times mu is Poisson's ratio 0.4995, and incompressible as far as tissue is known"
+            Self::TooFarApart => {
+                "bring its moduli closer together; a lambda of 1000 times mu is Poisson's ratio 0.4995, as incompressible as tissue is known to be"
             }
             Self::Missing(_) => "give every modulus of the law",
             Self::Meaningless(_) => "remove it, or choose another model",

@@ -2,7 +2,7 @@
 
 use super::chart::number::{in_unit, plain};
 use super::chart::style::BANDS;
-use super::chart::{Anchor, Drawing, Marker, Plane, Px, colour_bar, heading, map, sheet};
+use super::chart::{Anchor, Drawing, Marker, Plane, Px, colour_bar, heading, map, open_colour_bar, sheet};
 use super::result_file::ResultBody;
 use super::surface::{Motion, inside, middle, triangles};
 
@@ -90,7 +90,8 @@ pub fn svg(body: &ResultBody, field: Field, values: &[f64]) -> String {
     );
     let title = format!("{}: depth\u{a0}{}", body.name, with_unit(body.depth, &body.units[0]));
     let width = drawn.size[0];
-    let bar = colour_bar(width, &field.label(&body.units), scale);
+    let bar = if largest > scale { open_colour_bar } else { colour_bar };
+    let bar = bar(width, &field.label(&body.units), scale);
     sheet(&title, &[heading(&title, &caption, width), drawn, bar], 1).file()
 }
 
@@ -294,6 +295,8 @@ mod tests {
         assert_eq!(Field::Strain.scale(&strain), 0.1);
         let picture = svg(&body, Field::Strain, &strain);
         assert!(picture.contains(&plain(123.0)), "the whole is told");
+        let ends = |field: Field| svg(&body, field, &field.values(&body).unwrap()).contains(" and more</text>");
+        assert!(ends(Field::Strain) && !ends(Field::Size), "the bar says whether it ends there");
         assert!(picture.contains("depth\u{a0}2\u{a0}mm") && svg(&body, Field::Size, &[0.0; 121]).contains("[mm]"));
     }
 }

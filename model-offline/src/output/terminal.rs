@@ -39,19 +39,24 @@ macro_rules! tell {
 /// What [`say!`] and [`tell!`] do.
 pub fn put(what: fmt::Arguments<'_>) {
     if IS_A_FILE.load(Ordering::Relaxed) {
-        put_into(&mut std::io::stderr().lock(), what);
+        put_into(&mut std::io::stderr().lock(), "standard error", what);
     } else {
-        put_into(&mut std::io::stdout().lock(), what);
+        put_into(&mut std::io::stdout().lock(), "standard output", what);
     }
 }
 
-fn put_into(out: &mut impl Write, what: fmt::Arguments<'_>) {
+fn put_into(out: &mut impl Write, name: &str, what: fmt::Arguments<'_>) {
     match out.write_fmt(what).and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe && !UNSAID.swap(true, Ordering::Relaxed) => {
-            eprintln!("cannot write to standard output: {error}");
+            complain(&format!("cannot write to {name}: {error}"));
         }
         _ => {}
     }
+}
+
+/// Says a line on standard error; where that cannot be written either, nobody is left to be told.
+pub fn complain(what: &str) {
+    let _ = writeln!(std::io::stderr(), "{what}");
 }
 
 /// Whether everything that was said could be written: a program that could not ends in failure.
@@ -233,9 +238,9 @@ mod tests {
                 Ok(())
             }
         }
-        put_into(&mut Failing(ErrorKind::BrokenPipe), format_args!("words"));
+        put_into(&mut Failing(ErrorKind::BrokenPipe), "a pipe", format_args!("words"));
         assert!(all_was_said());
-        put_into(&mut Failing(ErrorKind::StorageFull), format_args!("words"));
+        put_into(&mut Failing(ErrorKind::StorageFull), "a disk", format_args!("words"));
         assert!(!all_was_said());
     }
 

@@ -19,7 +19,7 @@ use model_offline::parallel;
 use model_offline::placement::study::steps;
 use model_offline::placement::{PlacementOptions, PlacementStudy, discretise};
 use model_offline::scene::{Scene, TableScalar};
-use model_offline::table::{TableOptions, build, to_bytes};
+use model_offline::table::{TableBuildError, TableOptions, build, to_bytes};
 use sha2::{Digest, Sha256};
 
 use self::cases::{Case, cases};
@@ -336,7 +336,7 @@ impl<'p> Comparison<'p> {
     /// How the other tissue would be simulated without this one, where both are asked for.
     fn other_alone(&self, tissue: TissueVariant) -> Option<String> {
         let alone = self.cases.iter().find(|case| ![case.tissue, case.table_tissue].contains(&tissue))?;
-        Some(format!("--tissue {} is simulated without it", alone.tissue))
+        Some(format!("--tissue {} does without it", alone.tissue))
     }
 
     fn studied(&self, tissue: TissueVariant) -> &Studied {
@@ -377,8 +377,12 @@ impl<'p> Comparison<'p> {
         let paddle = studied.study.placement.optimum.dynamic_paddle.ok_or_else(none)?;
         let needle_speed = self.simulation.needle_speed();
         let model = if self.options.table_knows_the_world { studied.plant() } else { &studied.study.model };
-        let table = build(model, paddle, &TableOptions { needle_speed, ..TableOptions::default() })?;
-        let bytes = to_bytes(&table)?;
+        let failed = |source: TableBuildError| {
+            let instead = self.other_alone(tissue);
+            SimError::TissueTable { tissue, paddle, instead, source: Box::new(source) }
+        };
+        let table = build(model, paddle, &TableOptions { needle_speed, ..TableOptions::default() }).map_err(failed)?;
+        let bytes = to_bytes(&table).map_err(failed)?;
         Ok(EncodedTable { table, bytes })
     }
 

@@ -1,8 +1,8 @@
 //! The page of a run in space.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use model_offline::number::{in_unit, length};
-use model_offline::output::chart::number::number;
+use model_offline::number::in_unit;
+use model_offline::output::chart::number::{in_unit as labelled, number};
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Panel, Place, ReferenceLine, Series};
 
 use super::attachments::Attachments;
@@ -83,6 +83,8 @@ fn charts_of(run: &SpaceRun, case: &SpaceCase) -> [Panel; 3] {
 fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
     let unit = &run.units[0];
     let rows = STRATEGIES.into_iter().zip([&case.none, &case.fixture, &case.dynamic]);
+    let [error, rms, travel] = ["largest error", "RMS", "travel"].map(|title| labelled(title, unit));
+    let titles = ["".to_owned(), "paddles".to_owned(), error, rms, travel, "state".to_owned()];
     html! {
         section {
             h2 { "Tissue " (case.tissue.name()) ", table of tissue " (case.table_tissue.name()) }
@@ -91,27 +93,27 @@ fn of_case(run: &SpaceRun, place: usize, case: &SpaceCase) -> Markup {
                 "The dynamic paddles' largest error is " (change(&[case.improvement])) " than the best static paddles', and "
                 (change(&[case.improvement_over_none])) " than without any."
             } }
-            div.scroll { table {
-                thead {
-                    tr { th { "" } th { "paddles" } th { "largest error, " (unit) } th { "RMS, " (unit) } th { "travel, " (unit) } th { "state" } }
-                }
-                tbody {
-                    @for (name, result) in rows {
-                        tr {
-                            td { (name) }
-                            td { (paddles(result)) }
-                            td { (length(result.max_orthogonal_error)) }
-                            td { (length(result.rms_orthogonal_error)) }
-                            td { (length(result.paddle_travel)) }
-                            td { (result.final_state.map_or_else(String::new, |mode| mode.to_string())) }
-                        }
-                    }
-                }
+            div.scroll { table.cards {
+                thead { tr { @for title in &titles { th { (title) } } } }
+                tbody { @for (name, result) in rows { tr { (cells(&titles, name, result)) } } }
             } }
             (panels(&charts_of(run, case)))
             (space_view::case_sections(run, place))
         }
     }
+}
+
+/// One strategy's numbers, each with its column's title, which narrow screens show beside it.
+fn cells(titles: &[String], name: &str, result: &SpaceStrategyResult) -> Markup {
+    let cells = [
+        name.to_owned(),
+        paddles(result),
+        number(result.max_orthogonal_error, 3),
+        number(result.rms_orthogonal_error, 3),
+        number(result.paddle_travel, 3),
+        result.final_state.map_or_else(String::new, |mode| mode.to_string()),
+    ];
+    html! { @for (title, cell) in titles.iter().zip(cells) { td data-title=(title) { (cell) } } }
 }
 
 fn paddles(result: &SpaceStrategyResult) -> String {

@@ -7,7 +7,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use maud::{Markup, PreEscaped, html};
 use model_offline::geometry::Point;
-use model_offline::number::{in_unit, length};
+use model_offline::number::in_unit;
 use model_offline::output::chart::{colour_bar, heading, sheet};
 use model_offline::output::field_picture::Field;
 use model_offline::output::space_picture::{
@@ -77,7 +77,7 @@ pub(super) fn section(run: &SpaceRun) -> Markup {
             }
             (view(&controls(run), true))
             figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(&run.units), scale(run, place)))) }
-            p.quiet { "Bodies are solved for once more at the end of each insertion, to " (length(run.depth)) " " (unit) "." }
+            p.quiet { "Bodies are solved for once more at the end of each insertion, to " (in_unit(run.depth, unit)) "." }
         }
     }
 }

@@ -59,5 +59,5 @@ pub use map::{map, map_of};
 pub use notes::Names;
 pub use panel::{Bars, Dash, Note, Panel, Place, ReferenceLine, Series, Strip};
 pub use plane::Plane;
-pub use ramp::colour_bar;
+pub use ramp::{colour_bar, open_colour_bar};
 pub use style::Colour;
