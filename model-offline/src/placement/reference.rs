@@ -64,8 +64,8 @@ impl Reference {
 
     /// Whose measures a tolerance is of, paddle by paddle: not those of paddles that no table can be made of, neither by these
     /// responses nor wherever the limit lies, where they are not known to a tenth; and where the tolerance is not reached with
-    /// them, not those of paddles that can neither hold the target nor are the best to control it, by these responses either. Nobody needs such measures to
-    /// three digits. All count where that leaves none.
+    /// them, not those of paddles that can neither hold the target nor are the best to control it, by these responses either.
+    /// Nobody needs such measures to three digits. All count where that leaves none.
     pub fn counts(&self, responses: &[RestResponse]) -> Vec<bool> {
         let best = best_to_control(responses);
         let may_matter = |place: usize, found: &RestResponse| {
