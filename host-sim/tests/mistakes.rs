@@ -165,7 +165,17 @@ fn a_tissue_that_cannot_be_simulated_is_named() {
     let harder = said(run("harder.toml", &[]));
     assert!(harder.contains("the inclusion tissue cannot be simulated") && harder.contains("paddle 2"), "{harder}");
     assert!(harder.contains("--tissue homogeneous does without it"), "{harder}");
-    run("concave.toml", &["--tissue", "inclusion"]).success();
+}
+
+/// And that other tissue can be had. By itself, so that it takes its time beside the refusals.
+#[test]
+fn without_the_tissue_that_cannot_be_simulated_there_is_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("concave.toml"), HARD_WITHOUT_INCLUSIONS).unwrap();
+    let words = "run --mode lockstep --insertion-time 0.1 --quiet --out report --scene concave.toml --tissue inclusion";
+    let mut run = Command::new(env!("CARGO_BIN_EXE_host-sim"));
+    run.args(words.split(' ')).current_dir(folder.path()).assert().success();
+    assert!(folder.path().join("report").exists());
 }
 
 fn entries(folder: &std::path::Path) -> Vec<std::path::PathBuf> {

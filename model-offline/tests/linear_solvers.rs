@@ -1,10 +1,13 @@
 //! Conjugate gradients with the last factor against a factor for every tangent: the same states, the same Jacobians, and
-//! the same loss of stability.
+//! the same loss of stability. In space, where factors are large, that is also single precision against double.
 
 use model_offline::discretization::{Integration, Method, Resolution};
-use model_offline::solver::equilibrium::{Effort, LinearSolver, NewtonSettings};
+use model_offline::model::space::SpaceModel;
+use model_offline::placement::space::workflow;
+use model_offline::scene::space::SpaceScene;
+use model_offline::solver::equilibrium::{Effort, FailureReason, LinearSolver, NewtonSettings};
 use model_offline::{Scene, TissueModel};
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{Matrix2, Vector2, Vector3};
 
 fn model(integration: Integration, spacing: f64) -> TissueModel {
     let mut scene = Scene::bundled("paper").unwrap();
@@ -70,4 +73,58 @@ fn both_solvers_stop_at_the_same_depth_for_the_same_reason() {
         assert!(direct.0 < 0.5 && direct.1.is_some(), "{integration}: the law softens without end: {direct:?}");
         assert_eq!(direct, iterative, "{integration}");
     }
+}
+
+/// The block of so much stiffer an inclusion, large enough for its factor to be one of single precision.
+fn block(stiffness: f64) -> SpaceModel {
+    let mut scene = SpaceScene::bundled("block").unwrap();
+    scene.inclusions[0].stiffness = stiffness;
+    scene.discretization.resolution = Resolution::Level(0);
+    workflow::model(&scene).unwrap()
+}
+
+#[test]
+fn in_space_single_precision_finds_the_states_and_jacobians_of_double() {
+    for (stiffness, factors) in [(100.0, 2), (1e6, 3)] {
+        let model = block(stiffness);
+        let insertion = |solver| {
+            let mut body = model.body(&[2], settings(solver)).unwrap();
+            for k in 1..=2 {
+                body.drive(0.01 * f64::from(k), &[Vector3::new(0.002, -0.004, 0.001) * f64::from(k)]).unwrap();
+            }
+            let jacobian = body.actuation_jacobian().unwrap();
+            let equilibrium = body.equilibrium();
+            assert_eq!(equilibrium.has_single_precision(), solver == LinearSolver::BySize);
+            let reactions: Vec<f64> = equilibrium.reactions().collect();
+            (body.target_displacement(), equilibrium.energy(), reactions, jacobian, equilibrium.effort())
+        };
+        let (double, single) = (insertion(LinearSolver::Direct), insertion(LinearSolver::BySize));
+        assert_eq!(double.4.factorisations, double.4.iterations + 1, "a factor for every tangent");
+        // One at rest, one for the Jacobian: in between it is the first that proves each state stable, of the harder tissue one.
+        assert_eq!(single.4.factorisations, factors, "{stiffness}: {:?}", single.4);
+        assert!((double.0 - single.0).norm() < 1e-9 * double.0.norm(), "{stiffness}");
+        assert!((double.1 / single.1 - 1.0).abs() < 1e-9, "{stiffness}");
+        assert!(
+            (double.3.clone() - &single.3).norm() < 1e-9 * double.3.norm(),
+            "{stiffness}: {} {}",
+            double.3,
+            single.3
+        );
+        let largest = double.2.iter().fold(0.0_f64, |m, r| m.max(r.abs()));
+        let apart = double.2.iter().zip(&single.2).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(apart < 1e-7 * largest, "{stiffness}: reactions {apart:.1e} of {largest:.1e} apart");
+    }
+}
+
+#[test]
+fn in_space_single_precision_gives_way_where_double_does() {
+    let model = block(100.0);
+    let reached = |solver| {
+        let mut body = model.body(&[], NewtonSettings { max_cutbacks: 0, ..settings(solver) }).unwrap();
+        let failure = (1..=6).find_map(|k| body.drive(0.08 * f64::from(k), &[]).err());
+        (body.depth(), failure.map(|failure| failure.reason))
+    };
+    let (double, single) = (reached(LinearSolver::Direct), reached(LinearSolver::BySize));
+    assert_eq!(double.1, Some(FailureReason::ElementInverted), "{double:?}");
+    assert_eq!(double, single);
 }

@@ -17,6 +17,8 @@ use faer::sparse::linalg::cholesky::{
     factorize_symbolic_cholesky,
 };
 use faer::sparse::{FaerError, SparseColMatRef, SymbolicSparseColMatRef};
+use faer::traits::RealField;
+use faer::traits::math_utils::nan;
 use faer::{Conj, Mat, MatMut, Par, Side};
 use std::mem::MaybeUninit;
 use std::sync::Arc;
@@ -41,6 +43,8 @@ pub struct SymbolicFactor {
     symbolic: Result<Arc<SymbolicCholesky<u32>>, NotEnoughMemory>,
     /// Entries that are taken beside the factor and its workspace: of the matrix, and of dense matrices on what is retained.
     beside: usize,
+    /// Whether nodes are retained, to which others are condensed with the factor's own digits.
+    retains: bool,
 }
 
 /// Dense matrices of the size of what is retained: its factor, right-hand sides, and their products.
@@ -55,7 +59,7 @@ impl SymbolicFactor {
             order_nodes(pattern, positions, pattern.dimension())
                 .and_then(|nodes| analyse_ordered(pattern.symbolic(), &unknowns_of(pattern, &nodes)))
         };
-        Self::of(pattern, symbolic, 0)
+        Self::of(pattern, symbolic, None)
     }
 
     /// The same with the nodes `retained` (ascending) eliminated last, in their order, so that the factor's last columns are
@@ -63,17 +67,26 @@ impl SymbolicFactor {
     pub fn retaining<const D: usize>(pattern: &Pattern, positions: &[Point<D>], retained: &[u32]) -> Self {
         let symbolic = order_retaining(pattern, positions, retained)
             .and_then(|nodes| analyse_ordered(pattern.symbolic(), &unknowns_of(pattern, &nodes)));
-        Self::of(pattern, symbolic, CONDENSED * (retained.len() * pattern.dimension()).pow(2))
+        Self::of(pattern, symbolic, Some(retained.len() * pattern.dimension()))
     }
 
-    fn of(pattern: &Pattern, symbolic: Result<SymbolicCholesky<u32>, FaerError>, condensed: usize) -> Self {
+    fn of(pattern: &Pattern, symbolic: Result<SymbolicCholesky<u32>, FaerError>, retained: Option<usize>) -> Self {
         let too_many = |_| NotEnoughMemory { unknowns: pattern.unknowns(), needed: None, fixed: 0 };
-        Self { symbolic: symbolic.map(Arc::new).map_err(too_many), beside: pattern.entries() + condensed }
+        Self {
+            symbolic: symbolic.map(Arc::new).map_err(too_many),
+            beside: pattern.entries() + CONDENSED * retained.unwrap_or(0).pow(2),
+            retains: retained.is_some(),
+        }
     }
 
     /// Entries of a factor; infinitely many where they cannot be numbered.
     pub fn entries(&self) -> f64 {
         self.symbolic.as_ref().map_or(f64::INFINITY, |symbolic| symbolic.len_val() as f64)
+    }
+
+    /// Whether nodes are [retained](Self::retaining), to which others are condensed with the digits of the factor itself.
+    pub(super) fn retains(&self) -> bool {
+        self.retains
     }
 
     /// Floating-point operations that a factorisation takes; the same.
@@ -168,14 +181,14 @@ fn order_nodes<const D: usize>(
 }
 
 /// Workspace of a factorisation.
-fn scratch(symbolic: &SymbolicCholesky<u32>, threads: usize) -> StackReq {
-    symbolic.factorize_numeric_llt_scratch::<f64>(shared_by(threads), Default::default())
+fn scratch<T: RealField>(symbolic: &SymbolicCholesky<u32>, threads: usize) -> StackReq {
+    symbolic.factorize_numeric_llt_scratch::<T>(shared_by(threads), Default::default())
 }
 
-/// Cholesky factor of a matrix with a fixed pattern, with all workspace it needs.
-pub struct SparseCholesky {
+/// Cholesky factor of a matrix with a fixed pattern, with all workspace it needs, in numbers of double or of single precision.
+pub struct SparseCholesky<T = f64> {
     symbolic: Arc<SymbolicCholesky<u32>>,
-    factor: Vec<f64>,
+    factor: Vec<T>,
     workspace: MemBuffer,
     /// Threads that the workspace has room for.
     workspace_threads: usize,
@@ -185,13 +198,13 @@ pub struct SparseCholesky {
     shareable: bool,
 }
 
-impl std::fmt::Debug for SparseCholesky {
+impl<T> std::fmt::Debug for SparseCholesky<T> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("SparseCholesky").field("factor_entries", &self.factor.len()).finish_non_exhaustive()
     }
 }
 
-impl Clone for SparseCholesky {
+impl<T: RealField + Copy> Clone for SparseCholesky<T> {
     /// The same factor; workspace of its own.
     fn clone(&self) -> Self {
         let mut copy = Self::empty(&self.symbolic);
@@ -201,7 +214,7 @@ impl Clone for SparseCholesky {
     }
 }
 
-impl SparseCholesky {
+impl<T: RealField + Copy> SparseCholesky<T> {
     /// Room for a factor of a pattern that was analysed.
     ///
     /// # Errors
@@ -210,13 +223,16 @@ impl SparseCholesky {
         let symbolic = analysed.symbolic.as_ref().map_err(Clone::clone)?;
         let shareable = analysed.flops() >= SHARED_FLOPS;
         let threads = if shareable { parallel::here() } else { 1 };
-        let entries = (symbolic.len_val() as u64).saturating_add(analysed.beside as u64);
-        let workspace = scratch(symbolic, threads).size_bytes() as u64;
-        let bytes = entries.saturating_mul(size_of::<f64>() as u64).saturating_add(workspace);
+        let entries = |count: usize, size: usize| (count as u64).saturating_mul(size as u64);
+        // In other numbers the matrix is there twice.
+        let copied = if size_of::<T>() == size_of::<f64>() { 0 } else { size_of::<T>() };
+        let bytes = entries(symbolic.len_val(), size_of::<T>())
+            .saturating_add(entries(analysed.beside, size_of::<f64>() + copied))
+            .saturating_add(scratch::<T>(symbolic, threads).size_bytes() as u64);
         memory::take(symbolic.nrows(), bytes, || {
             let mut room = Self::empty(symbolic);
             // Written to, here and in the workspace, and no zeros: those take no memory until something else is in their place.
-            room.factor.resize(symbolic.len_val(), f64::NAN);
+            room.factor.resize(symbolic.len_val(), nan());
             room.shareable = shareable;
             room.reserve_threads(threads);
             room.workspace.fill(MaybeUninit::new(1));
@@ -241,14 +257,14 @@ impl SparseCholesky {
 
     fn reserve_threads(&mut self, threads: usize) {
         if threads > self.workspace_threads {
-            self.workspace = MemBuffer::new(scratch(&self.symbolic, threads));
+            self.workspace = MemBuffer::new(scratch::<T>(&self.symbolic, threads));
             self.workspace_threads = threads;
         }
     }
 
     fn reserve_columns(&mut self, columns: usize) {
         if columns > self.solve_columns {
-            self.solve_workspace = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(columns, Par::Seq));
+            self.solve_workspace = MemBuffer::new(self.symbolic.solve_in_place_scratch::<T>(columns, Par::Seq));
             self.solve_columns = columns;
         }
     }
@@ -263,7 +279,7 @@ impl SparseCholesky {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`]; the factor is then not usable.
-    pub fn factorise(&mut self, pattern: &Pattern, values: &[f64]) -> Result<(), NotPositiveDefinite> {
+    pub fn factorise(&mut self, pattern: &Pattern, values: &[T]) -> Result<(), NotPositiveDefinite> {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
         let threads = if self.shareable { parallel::here() } else { 1 };
         self.reserve_threads(threads);
@@ -282,6 +298,24 @@ impl SparseCholesky {
             .map_err(|_| NotPositiveDefinite)
     }
 
+    /// Solves in place for `columns` right-hand sides stored one after the other.
+    ///
+    /// # Panics
+    /// When the length of `rhs` is not `columns` times the number of unknowns.
+    pub fn solve(&mut self, rhs: &mut [T], columns: usize) {
+        let n = self.symbolic.nrows();
+        assert_eq!(rhs.len(), n * columns, "one column per right-hand side");
+        self.reserve_columns(columns);
+        LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(rhs, n, columns),
+            Par::Seq,
+            MemStack::new(&mut self.solve_workspace),
+        );
+    }
+}
+
+impl SparseCholesky {
     /// The last `count` rows and columns of the factor, dense and lower triangular, and the unknowns that they belong to: of
     /// an analysis that [retains](SymbolicFactor::retaining) nodes, the factor of what is left when all others are condensed.
     pub(super) fn last(&self, count: usize) -> (Mat<f64>, Vec<u32>) {
@@ -308,32 +342,16 @@ impl SparseCholesky {
         }
         (dense, (first..first + count).map(unknown).collect())
     }
-
-    /// Solves in place for `columns` right-hand sides stored one after the other.
-    ///
-    /// # Panics
-    /// When the length of `rhs` is not `columns` times the number of unknowns.
-    pub fn solve(&mut self, rhs: &mut [f64], columns: usize) {
-        let n = self.symbolic.nrows();
-        assert_eq!(rhs.len(), n * columns, "one column per right-hand side");
-        self.reserve_columns(columns);
-        LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(rhs, n, columns),
-            Par::Seq,
-            MemStack::new(&mut self.solve_workspace),
-        );
-    }
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::parallel::within;
 
     /// A cube of springs between neighbours along the axes and the diagonals of faces, three unknowns a node: enough work to
-    /// be shared.
-    fn cube(side: u32) -> (Pattern, Vec<Point<3>>, Vec<f64>) {
+    /// be shared. Every node is tied to the ground by a spring of so much, which is the smallest eigenvalue.
+    pub(in crate::linalg) fn cube(side: u32, ground: f64) -> (Pattern, Vec<Point<3>>, Vec<f64>) {
         let place = |i: u32| [i % side, i / side % side, i / side / side];
         let count = side.pow(3);
         let mut springs: Vec<Vec<u32>> = (0..count).map(|i| vec![i]).collect();
@@ -354,14 +372,14 @@ mod tests {
                 (0..3).for_each(|k| values[at + k * stride + k] += sign * (1.0 + f64::from(spring[0] % 7)));
             }
         }
-        (0..pattern.unknowns()).for_each(|u| values[pattern.diagonal_position(u)] += 0.1);
+        (0..pattern.unknowns()).for_each(|u| values[pattern.diagonal_position(u)] += ground);
         let positions = (0..count).map(|i| Point::<3>::from(place(i).map(f64::from))).collect();
         (pattern, positions, values)
     }
 
     #[test]
     fn the_order_with_the_fewest_operations_is_taken_however_many_nodes_are_kept_for_last() {
-        let (pattern, positions, values) = cube(16);
+        let (pattern, positions, values) = cube(16, 0.1);
         let by_degree = analyse(pattern.symbolic_of_nodes(), SymmetricOrdering::Amd, supernodal()).unwrap();
         let [alone, cut] = [flops(&by_degree), SymbolicFactor::new(&pattern, &positions).flops() / 27.0];
         assert!(alone * 27.0 > dissection_tried(3) && cut < 0.9 * alone, "{cut:e} for {alone:e}");
@@ -382,7 +400,7 @@ mod tests {
 
     #[test]
     fn a_factor_shared_by_threads_has_the_same_bits() {
-        let (pattern, positions, values) = cube(14);
+        let (pattern, positions, values) = cube(14, 0.1);
         let analysed = SymbolicFactor::new(&pattern, &positions);
         assert!(analysed.flops() > SHARED_FLOPS, "{:e}", analysed.flops());
         let factor = || {

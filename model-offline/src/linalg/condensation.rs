@@ -4,8 +4,8 @@
 //! K_II⁻¹ K_IS`, and `(K⁻¹)_SS = L_S⁻ᵀ L_S⁻¹`. Whatever is asked of K⁻¹ between retained unknowns then costs dense work on their
 //! number alone, however large the body is.
 
-use super::cholesky::SparseCholesky;
 use super::dense::{products_of_columns, solve_lower};
+use super::mixed::MixedCholesky;
 use faer::Mat;
 
 /// The factor of the retained unknowns of a matrix.
@@ -21,8 +21,12 @@ pub type Functional = Vec<(u32, f64)>;
 
 impl CondensedFactor {
     /// The last `count` unknowns of a factor whose analysis [retains](super::SymbolicFactor::retaining) them.
-    pub fn new(cholesky: &SparseCholesky, unknowns: usize, count: usize) -> Self {
-        let (factor, retained) = cholesky.last(count);
+    ///
+    /// # Panics
+    /// When the analysis retains none.
+    pub fn new(cholesky: &MixedCholesky, unknowns: usize, count: usize) -> Self {
+        let double = cholesky.double().expect("what an analysis retains has double precision");
+        let (factor, retained) = double.last(count);
         let mut place = vec![None; unknowns];
         retained.iter().enumerate().for_each(|(k, &u)| place[u as usize] = Some(k as u32));
         Self { factor, place }
@@ -84,8 +88,8 @@ mod tests {
         (0..3 * n).for_each(|u| values[pattern.diagonal_position(u)] += 0.05);
         let retained = [3, 17, 18, 40, 80];
         let symbolic = SymbolicFactor::retaining(&pattern, &positions, &retained);
-        let mut cholesky = SparseCholesky::new(&symbolic).unwrap();
-        cholesky.factorise(&pattern, &values).unwrap();
+        let mut cholesky = MixedCholesky::new(&symbolic).unwrap();
+        cholesky.factorise::<3>(&pattern, &values).unwrap();
         let condensed = CondensedFactor::new(&cholesky, 3 * n, 3 * retained.len());
         let functionals: Vec<Functional> =
             vec![vec![(9, 1.0)], vec![(51, 0.5), (54, -2.0)], vec![(121, 1.0), (122, 1.0)], vec![(241, 3.0)]];
@@ -93,7 +97,7 @@ mod tests {
         for (g, right) in functionals.iter().enumerate() {
             let mut x = vec![0.0; 3 * n];
             right.iter().for_each(|&(u, w)| x[u as usize] += w);
-            cholesky.solve(&mut x, 1);
+            cholesky.apply(&mut x, 1);
             for (f, left) in functionals.iter().enumerate() {
                 let whole: f64 = left.iter().map(|&(u, w)| w * x[u as usize]).sum();
                 let condensed = compliance[(f, g)];

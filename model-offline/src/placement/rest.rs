@@ -5,6 +5,7 @@ use super::attaching::Attaching;
 use super::condensed::{singular, tangent_at_rest};
 use super::controllability::best_direction;
 use super::fields::{Fields, Loads, RATES};
+use crate::linalg::Unfactorised;
 use crate::mechanics::ConstrainedRows;
 use crate::model::{ModelError, TissueModel};
 use crate::solver::constrained::{ConstrainedSolver, Unknowns};
@@ -88,7 +89,10 @@ fn for_each_paddle_by_itself(
         let mut multipliers = vec![0.0; forces.len() / model.dofs() * 2 * rows.len()];
         solver.constrain(rows);
         solver.load(&at_rest);
-        solver.factorise().map_err(|error| singular(&error.to_string()))?;
+        solver.factorise().map_err(|error| match error {
+            Unfactorised::NotPositiveDefinite(error) => singular(&error.to_string()),
+            Unfactorised::NotEnoughMemory(error) => Failure::from(error),
+        })?;
         let mut rates = [
             model.prescribed_values(Some(paddle), 0.0, Vector2::x()),
             model.prescribed_values(Some(paddle), 0.0, Vector2::y()),

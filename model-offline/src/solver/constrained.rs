@@ -16,7 +16,7 @@
 
 use super::analysis::Analysis;
 use super::conjugate_gradients::{Breakdown, Stop, conjugate_gradients, dot};
-use crate::linalg::{CondensedFactor, NotEnoughMemory, NotPositiveDefinite, Pattern, SparseCholesky};
+use crate::linalg::{CondensedFactor, MixedCholesky, NotEnoughMemory, Pattern, Unfactorised};
 use crate::mechanics::ConstrainedRows;
 use std::sync::Arc;
 
@@ -27,6 +27,12 @@ const PENALTY: f64 = 1e4;
 const TIGHT_PENALTY: f64 = 1e8;
 /// Rounds of multipliers; each costs one back-substitution.
 const MAX_ROUNDS: usize = 12;
+/// Correction over the solution at which refinement ends: the next would be of rounding.
+const REFINED: f64 = 1e-12;
+/// And at which it has converged: a factor's own matrix is left at its rounding, far below.
+const CONVERGED: f64 = 1e-7;
+/// Rounds of refinement.
+const MAX_REFINEMENTS: usize = 20;
 /// More iterations than this cost as much as a factorisation.
 const MAX_ITERATIONS: u32 = 12;
 
@@ -34,7 +40,7 @@ const MAX_ITERATIONS: u32 = 12;
 #[derive(Debug, Clone)]
 pub struct ConstrainedSolver<const D: usize> {
     pattern: Arc<Pattern>,
-    cholesky: SparseCholesky,
+    cholesky: MixedCholesky,
     constrained: ConstrainedRows,
     penalty: f64,
     /// Penalty over the mean diagonal of the first tangent.
@@ -79,8 +85,23 @@ impl<const D: usize> ConstrainedSolver<D> {
     /// # Panics
     /// When the pattern misses a pair of a constrained stencil.
     pub fn new(analysis: &Analysis, rows: ConstrainedRows) -> Result<Self, NotEnoughMemory> {
+        Ok(Self::with(MixedCholesky::new(&analysis.symbolic)?, analysis, rows))
+    }
+
+    /// The same by a factor in double precision, however large it is.
+    ///
+    /// # Errors
+    /// [`NotEnoughMemory`] when the machine has none for the factor.
+    ///
+    /// # Panics
+    /// When the pattern misses a pair of a constrained stencil.
+    pub fn in_double_precision(analysis: &Analysis, rows: ConstrainedRows) -> Result<Self, NotEnoughMemory> {
+        Ok(Self::with(MixedCholesky::in_double_precision(&analysis.symbolic)?, analysis, rows))
+    }
+
+    fn with(cholesky: MixedCholesky, analysis: &Analysis, rows: ConstrainedRows) -> Self {
         let mut solver = Self {
-            cholesky: SparseCholesky::new(&analysis.symbolic)?,
+            cholesky,
             matrix: vec![0.0; analysis.pattern.entries()],
             pattern: Arc::clone(&analysis.pattern),
             constrained: ConstrainedRows::default(),
@@ -90,7 +111,7 @@ impl<const D: usize> ConstrainedSolver<D> {
             work: Work::default(),
         };
         solver.constrain(rows);
-        Ok(solver)
+        solver
     }
 
     /// The same with a penalty that holds the constrained rows to rounding without rounds of multipliers, for what is asked of
@@ -187,33 +208,49 @@ impl<const D: usize> ConstrainedSolver<D> {
     /// Factorises the assembled matrix.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when the tangent is not, on the displacements that the prescribed values leave free.
-    pub fn factorise(&mut self) -> Result<(), NotPositiveDefinite> {
-        self.cholesky.factorise(&self.pattern, &self.matrix)
+    /// [`Unfactorised`] when the tangent is not positive definite, on the displacements that the prescribed values leave free.
+    pub fn factorise(&mut self) -> Result<(), Unfactorised> {
+        self.cholesky.factorise::<D>(&self.pattern, &self.matrix)
+    }
+
+    /// Whether the last factor proves that the assembled tangent is positive definite, for less than a factorisation; see
+    /// [`MixedCholesky::proves`].
+    ///
+    /// # Panics
+    /// When there is no factor.
+    pub(super) fn is_proven_stable(&mut self) -> bool {
+        self.cholesky.proves::<D>(&self.pattern, &self.matrix)
     }
 
     /// Adds `shift` to the diagonal of the matrix that the last [`factorise`](Self::factorise) refused, and tries again.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`] when the shift is still too small.
-    pub fn factorise_shifted(&mut self, shift: f64) -> Result<(), NotPositiveDefinite> {
+    /// [`Unfactorised`] when the shift is still too small.
+    pub fn factorise_shifted(&mut self, shift: f64) -> Result<(), Unfactorised> {
         for u in 0..self.pattern.unknowns() {
             self.matrix[self.pattern.diagonal_position(u)] += shift;
         }
-        self.cholesky.factorise(&self.pattern, &self.matrix)
+        self.cholesky.factorise_in_double_precision(&self.pattern, &self.matrix)
     }
 
     /// Solves `K x + Λᵀ μ = rhs`, `Λ x = gap` with the last factor, for as many right-hand sides as `rhs` holds one after
     /// the other (several at once pass through the factor together). The multipliers come in as a first guess (zeros will
     /// do); the constraint is met to `tolerance` (length units) or to rounding error.
     ///
+    /// False where the factor is one of single precision and the matrix assembled last, which is then solved for, too far from the
+    /// factorised one.
+    ///
     /// # Panics
     /// When the lengths do not belong to the same number of right-hand sides.
-    pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, solution: Unknowns<'_>) {
+    pub fn solve(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, solution: Unknowns<'_>) -> bool {
         let columns = self.first_right_side(rhs, gap, &solution);
-        self.cholesky.solve(&mut self.work.solution, columns);
+        self.cholesky.apply(&mut self.work.solution, columns);
         solution.x.copy_from_slice(&self.work.solution);
+        if self.cholesky.is_rough() {
+            return self.refine(rhs, gap, tolerance, solution);
+        }
         self.meet_constraints(gap, tolerance, solution);
+        true
     }
 
     /// The same for one right-hand side and the matrix assembled last, by conjugate gradients with the last factor as
@@ -233,7 +270,7 @@ impl<const D: usize> ConstrainedSolver<D> {
         self.first_right_side(rhs, gap, &solution);
         let Self { work: Work { solution: residual, violation, .. }, cholesky, pattern, matrix, .. } = self;
         solution.x.copy_from_slice(residual);
-        cholesky.solve(solution.x, 1);
+        cholesky.apply(solution.x, 1);
         let mut image = vec![0.0; residual.len()];
         pattern.multiply::<D>(matrix, solution.x, &mut image);
         // Energy of the solution without that of the penalty.
@@ -245,7 +282,7 @@ impl<const D: usize> ConstrainedSolver<D> {
         residual.iter_mut().zip(&image).for_each(|(r, i)| *r -= i);
         let iterations = conjugate_gradients(
             |x, out| pattern.multiply::<D>(matrix, x, out),
-            |r| cholesky.solve(r, 1),
+            |r| cholesky.apply(r, 1),
             residual,
             solution.x,
             Stop { goal: accuracy.relative * energy.sqrt(), iterations: MAX_ITERATIONS },
@@ -272,6 +309,56 @@ impl<const D: usize> ConstrainedSolver<D> {
             self.constrained.add_transpose::<D>(&weighted[row], &mut right[free]);
         }
         columns
+    }
+
+    /// Whether the factor is one of single precision.
+    pub fn has_single_precision(&self) -> bool {
+        self.cholesky.is_rough()
+    }
+
+    /// Rounds of refinement, and of multipliers with them, until both equations are met to rounding; false where they do not
+    /// converge.
+    fn refine(&mut self, rhs: &[f64], gap: &[f64], tolerance: f64, solution: Unknowns<'_>) -> bool {
+        let Unknowns { x, multipliers: mu } = solution;
+        let (unknowns, rows) = (self.pattern.unknowns(), self.constrained.len() * D);
+        let columns = x.len() / unknowns;
+        let Work { solution: correction, weighted, violation } = &mut self.work;
+        let mut image = vec![0.0; unknowns];
+        // Of the last two rounds: x and the multipliers take turns.
+        let mut sizes = [f64::INFINITY; 2];
+        for _ in 0..MAX_REFINEMENTS {
+            let mut largest = 0.0_f64;
+            correction.copy_from_slice(rhs);
+            for c in 0..columns {
+                let (free, row) = (c * unknowns..(c + 1) * unknowns, c * rows..(c + 1) * rows);
+                let (violation, weighted) = (&mut violation[row.clone()], &mut weighted[row.clone()]);
+                self.constrained.apply::<D>(&x[free.clone()], violation);
+                let pairs = violation.iter_mut().zip(&gap[row.clone()]).zip(&mut mu[row]).zip(weighted.iter_mut());
+                for (((v, g), m), w) in pairs {
+                    *v -= g;
+                    *m += self.penalty * *v;
+                    *w = self.penalty * g - *m;
+                    largest = largest.max(v.abs());
+                }
+                self.constrained.add_transpose::<D>(weighted, &mut correction[free.clone()]);
+                self.pattern.multiply::<D>(&self.matrix, &x[free.clone()], &mut image);
+                correction[free].iter_mut().zip(&image).for_each(|(r, i)| *r -= i);
+            }
+            self.cholesky.apply(correction, columns);
+            let length = |of: &[f64]| dot(of, of).sqrt();
+            let relative = |(c, x): (&[f64], &[f64])| length(c) / length(x).max(f64::MIN_POSITIVE);
+            let larger = |most: f64, size: f64| if size > most || size.is_nan() { size } else { most };
+            let size = correction.chunks(unknowns).zip(x.chunks(unknowns)).map(relative).fold(0.0, larger);
+            if size.is_nan() || size > 0.5 * sizes[0] {
+                break;
+            }
+            x.iter_mut().zip(correction.iter()).for_each(|(x, c)| *x += c);
+            sizes = [sizes[1], size];
+            if size <= REFINED && largest <= tolerance {
+                break;
+            }
+        }
+        sizes[1] <= CONVERGED
     }
 
     /// Rounds of multipliers after the first, until the constraint is met to `tolerance`.
@@ -304,7 +391,7 @@ impl<const D: usize> ConstrainedSolver<D> {
             for (free, row) in (0..columns).map(by_column) {
                 self.constrained.add_transpose::<D>(&weighted[row], &mut solution[free]);
             }
-            self.cholesky.solve(solution, columns);
+            self.cholesky.apply(solution, columns);
             for (x, s) in x.iter_mut().zip(solution.iter()) {
                 *x += s;
             }

@@ -5,10 +5,10 @@
 //! coefficients that satisfy `Λ d = g`, and a *stable* one is a minimum. That is what is looked for: a state whose
 //! tangent is not positive definite is reported as lost stability, never passed off as an answer.
 //!
-//! Every converged state has a Cholesky factor, which proves that it is stable. On the way to the next state that factor is
-//! the preconditioner of conjugate gradients: tangents change little from one increment to the next, so that a few
-//! iterations, each the price of a back-substitution, replace a factorisation. Negative curvature on the way, or too many
-//! iterations, bring the factorisation back.
+//! A Cholesky factor proves that a state is stable. On the way to the next state that factor is the preconditioner of
+//! conjugate gradients: tangents change little from one increment to the next, so that a few iterations, each the price of a
+//! back-substitution, replace a factorisation. Negative curvature on the way, or too many iterations, bring the factorisation
+//! back. In large models it proves that the next state is stable, too, as long as [refinement](crate::linalg::mixed) with it converges.
 
 mod newton;
 mod settings;
@@ -21,6 +21,7 @@ use super::conjugate_gradients::dot;
 use super::constrained::{ConstrainedSolver, Unknowns};
 use crate::discretization::Quadrature;
 use crate::geometry::Point;
+use crate::linalg::{NotEnoughMemory, Unfactorised};
 use crate::mechanics::Tissue;
 use crate::mechanics::assembly::{self, AssemblyState, Inverted, Medium};
 use crate::mechanics::blocks::BlockPositions;
@@ -149,7 +150,10 @@ impl<const D: usize> Equilibrium<D> {
             rule,
             tissue,
             blocks: Arc::clone(&analysis.blocks),
-            solver: ConstrainedSolver::new(analysis, rows)?,
+            solver: match settings.linear_solver {
+                LinearSolver::Direct => ConstrainedSolver::in_double_precision(analysis, rows)?,
+                LinearSolver::BySize | LinearSolver::Iterative => ConstrainedSolver::new(analysis, rows)?,
+            },
             weak,
             settings,
             spacing,
@@ -164,7 +168,7 @@ impl<const D: usize> Equilibrium<D> {
             effort: Effort::default(),
         };
         body.evaluate().map_err(|at| body.failure(reason_of(&at), 0.0, "at rest".into()))?;
-        if !body.refactorise() {
+        if !body.refactorise()? {
             return Err(body.failure(
                 FailureReason::SingularTangent,
                 0.0,
@@ -233,6 +237,11 @@ impl<const D: usize> Equilibrium<D> {
         self.effort
     }
 
+    /// Whether the Cholesky factor is one of [single precision](crate::linalg::mixed).
+    pub fn has_single_precision(&self) -> bool {
+        self.solver.has_single_precision()
+    }
+
     /// Entries of the Cholesky factor.
     pub fn factor_entries(&self) -> usize {
         self.solver.factor_entries()
@@ -274,11 +283,12 @@ impl<const D: usize> Equilibrium<D> {
                     step *= 2.0;
                 }
                 Attempt::Failed(reason, detail) => {
+                    let hopeless = reason == FailureReason::TooLarge;
                     self.at = last;
                     self.factor_is_current = false;
                     // A kept factor may be what led astray: the shorter way begins with one of its own.
                     self.factor_exists &= !self.settings.reuse_tangent || self.tissue.is_linear();
-                    if cuts >= self.settings.max_cutbacks {
+                    if hopeless || cuts >= self.settings.max_cutbacks {
                         return Err(self.failure(reason, reached, detail));
                     }
                     cuts += 1;
@@ -335,9 +345,14 @@ impl<const D: usize> Equilibrium<D> {
     /// # Panics
     /// When there is no whole number of rates or of loads.
     pub(crate) fn linear_responses(&mut self, rates: &[f64], loads: &[f64]) -> Result<Vec<f64>, Failure> {
-        if !self.factor_is_current && !self.refactorise() {
+        if !self.factor_is_current && !self.refactorise()? {
             return Err(self.failure(FailureReason::LostStability, 1.0, "tangent not positive definite".into()));
         }
+        Ok(self.responses(rates, loads).0)
+    }
+
+    /// Responses by the last factor, and whether it serves.
+    fn responses(&mut self, rates: &[f64], loads: &[f64]) -> (Vec<f64>, bool) {
         let (unknowns, rows, length) = (self.at.force.len(), self.at.multipliers.len(), self.at.prescribed.len());
         let whole = rates.len().is_multiple_of(length) && loads.len().is_multiple_of(unknowns);
         assert!(length > 0 && whole, "a whole number of rates and loads");
@@ -353,8 +368,8 @@ impl<const D: usize> Equilibrium<D> {
         rhs.extend_from_slice(loads);
         strong.resize(columns * rows, 0.0);
         let (mut x, mut mu) = (vec![0.0; columns * unknowns], vec![0.0; columns * rows]);
-        self.solver.solve(&rhs, &strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
-        Ok(x)
+        let serves = self.solver.solve(&rhs, &strong, 1e-14, Unknowns { x: &mut x, multipliers: &mut mu });
+        (x, serves)
     }
 
     /// Responses to loads with the last factor, whatever state it is of: good enough to step with.
@@ -365,13 +380,12 @@ impl<const D: usize> Equilibrium<D> {
     /// # Panics
     /// When there is no whole number of loads.
     pub(crate) fn rough_responses(&mut self, loads: &[f64]) -> Result<Vec<f64>, Failure> {
-        if !self.factor_exists {
-            return self.linear_responses(&[], loads);
+        if self.factor_exists
+            && let (responses, true) = self.responses(&[], loads)
+        {
+            return Ok(responses);
         }
-        let current = std::mem::replace(&mut self.factor_is_current, true);
-        let responses = self.linear_responses(&[], loads);
-        self.factor_is_current = current;
-        responses
+        self.linear_responses(&[], loads)
     }
 
     /// How the internal force curves along a direction of the coefficients, by second differences over a way of `length`
@@ -441,20 +455,35 @@ impl<const D: usize> Equilibrium<D> {
     }
 
     /// Assembles and factorises the tangent at the current state; false when it is not positive definite.
-    fn refactorise(&mut self) -> bool {
+    fn refactorise(&mut self) -> Result<bool, NotEnoughMemory> {
         self.assemble();
         self.factorise()
     }
 
-    fn factorise(&mut self) -> bool {
+    fn factorise(&mut self) -> Result<bool, NotEnoughMemory> {
         self.effort.factorisations += 1;
-        self.factor_is_current = self.solver.factorise().is_ok();
-        // A failed factorisation has overwritten the last factor.
-        self.factor_exists = self.factor_is_current;
-        if self.factor_is_current {
-            self.stable_at.clone_from(&self.at.coefficients);
+        // A failed factorisation overwrites the last factor.
+        (self.factor_is_current, self.factor_exists) = (false, false);
+        match self.solver.factorise() {
+            Ok(()) => {
+                (self.factor_is_current, self.factor_exists) = (true, true);
+                self.stable_at.clone_from(&self.at.coefficients);
+                Ok(true)
+            }
+            Err(Unfactorised::NotPositiveDefinite(_)) => Ok(false),
+            Err(Unfactorised::NotEnoughMemory(error)) => Err(error),
         }
-        self.factor_is_current
+    }
+
+    /// Whether the tangent at the current state is positive definite: by the last factor where that proves it for less, else by one
+    /// of its own.
+    fn is_stable(&mut self) -> Result<bool, NotEnoughMemory> {
+        self.assemble();
+        if self.factor_exists && self.settings.linear_solver != LinearSolver::Direct && self.solver.is_proven_stable() {
+            self.stable_at.clone_from(&self.at.coefficients);
+            return Ok(true);
+        }
+        self.factorise()
     }
 }
 

@@ -1,6 +1,7 @@
 //! Newton's method with line search, from one state towards the next.
 
 use super::{Equilibrium, FailureReason, LinearSolver, reason_of};
+use crate::linalg::NotEnoughMemory;
 use crate::solver::conjugate_gradients::dot;
 use crate::solver::constrained::{SolveAccuracy, Unknowns};
 
@@ -56,6 +57,12 @@ pub(super) enum Attempt {
     Failed(FailureReason, String),
 }
 
+impl From<NotEnoughMemory> for Attempt {
+    fn from(error: NotEnoughMemory) -> Self {
+        Self::Failed(FailureReason::TooLarge, error.to_string())
+    }
+}
+
 impl<const D: usize> Equilibrium<D> {
     /// Whether the body has moved far enough since its tangent was last found positive definite for that to have changed.
     fn stability_is_uncertain(&self) -> bool {
@@ -95,14 +102,19 @@ impl<const D: usize> Equilibrium<D> {
             if iterates && self.step_by_iteration(residual, step) {
                 return Ok(());
             }
-            step.indefinite = !self.factorise();
+            step.indefinite = !self.factorise()?;
             if step.indefinite && !self.refactorise_shifted() {
                 let detail = "tangent indefinite, no shift helps".into();
                 return Err(Attempt::Failed(FailureReason::LostStability, detail));
             }
         }
+        let before = step.multipliers.clone();
         let unknowns = Unknowns { x: &mut step.step, multipliers: &mut step.multipliers };
-        self.solver.solve(&step.rhs, &step.gap, 1e-13 * self.spacing, unknowns);
+        if !self.solver.solve(&step.rhs, &step.gap, 1e-13 * self.spacing, unknowns) && factor == Factor::Usable {
+            step.multipliers = before;
+            self.effort.iterations -= 1;
+            return self.newton_step(Factor::Stale, residual, step);
+        }
         Ok(())
     }
 
@@ -196,13 +208,14 @@ impl<const D: usize> Equilibrium<D> {
                 if self.settings.reuse_tangent && !step.indefinite && !self.stability_is_uncertain() {
                     return Attempt::Converged;
                 }
-                if self.settings.require_stability && !self.refactorise() {
-                    return Attempt::Failed(
+                return match self.settings.require_stability.then(|| self.is_stable()) {
+                    None | Some(Ok(true)) => Attempt::Converged,
+                    Some(Ok(false)) => Attempt::Failed(
                         FailureReason::LostStability,
                         "the equilibrium found is not a minimum of the energy".into(),
-                    );
-                }
-                return Attempt::Converged;
+                    ),
+                    Some(Err(error)) => error.into(),
+                };
             }
             if iteration + 1 == self.settings.max_iterations {
                 let detail = format!("residual {residual:.1e} after {} iterations", iteration + 1);

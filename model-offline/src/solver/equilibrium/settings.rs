@@ -9,10 +9,10 @@ pub enum LinearSolver {
     /// By iteration where there are nodes enough for it to pay, else directly.
     #[default]
     BySize,
-    /// By a factor for every tangent.
+    /// By a factor in double precision for every tangent. What a body is made with: the precision stays when settings change.
     Direct,
     /// By conjugate gradients with the last factor as preconditioner; a tangent that is not positive definite, or far from
-    /// the last, gets a factor of its own, and so does every converged state.
+    /// the last, gets a factor of its own, and so does every converged state that the last factor does not prove to be stable.
     Iterative,
 }
 
