@@ -1,4 +1,4 @@
-//! Draws estimated beside true errors on all scenes of `tests --test unseen_scenes`:
+//! Draws estimated beside true errors on all scenes of `tests --test verification unseen_scenes`:
 //! `cargo run --release -p tests --example estimates -- estimates.svg`.
 
 use model_offline::output::chart::{Axis, Colour, Dash, Figure, Marker, Panel, Place, ReferenceLine, Series};

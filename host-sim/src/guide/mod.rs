@@ -1,7 +1,7 @@
 //! Guides: run simulations, what is in the simulated world, check timing, inject faults, run the controller on a microcontroller, connect hardware, and what may be relied on.
 //!
 //! For whoever precomputes tables, and for how it all works with the equations, see [`model_offline::guide`]. Every command
-//! line on these pages is run by `cargo test -p host-sim --test documentation`, but for those marked in their source.
+//! line on these pages is run by `cargo test -p host-sim --test commands documentation`, but for those marked in their source.
 //! Their pictures show when the pages are read as files, and in the documentation after
 //! `cp -r host-sim/pictures target/doc/host_sim/`.
 

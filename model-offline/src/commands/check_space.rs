@@ -7,7 +7,7 @@ use model_offline::discretization::Resolution;
 use model_offline::material::{Law, Material};
 use model_offline::model::ModelError;
 use model_offline::model::space::meshing::{MeshSize, even_mesh, mesh};
-use model_offline::model::space::survey::{PatchSurvey, Survey};
+use model_offline::model::space::survey::{InclusionSurvey, PatchSurvey, Survey};
 use model_offline::number::{area, coordinate, in_unit, short};
 use model_offline::scene::space::SpaceScene;
 use model_offline::tell;
@@ -19,6 +19,12 @@ use std::path::Path;
 const ROUNDING: f64 = 1e-9;
 /// Elements with smaller angles than this make the answers worse, degrees.
 const FLAT: f64 = 3.0;
+/// An inclusion of which more than this share is outside of the body reaches out of it; less may be the sampling.
+const OUTSIDE: f64 = 0.02;
+/// An inclusion of this share of the body is all of it.
+const ALL: f64 = 0.999;
+/// Where less than this share of the surface is immobile, the body is hardly held.
+const BARELY: f64 = 0.002;
 
 pub(super) fn run(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
     check(scene, file).map_err(|error| error.reported_of(file, &scene.name, scene.tissue()))
@@ -26,6 +32,9 @@ pub(super) fn run(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliErro
 
 fn check(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
     let survey = survey(scene)?;
+    if let Some(error) = &survey.refused {
+        return Err(error.clone().into());
+    }
     let warnings = warnings(scene, &survey);
     let mut document = json!(survey);
     document["scene"] = json!(scene.name);
@@ -69,6 +78,37 @@ pub(super) fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
             inclusion.number
         )
     }));
+    let is_all = |inclusion: &&InclusionSurvey| inclusion.volume > ALL * survey.volume;
+    let outside = survey.inclusions.iter().filter(|inclusion| inclusion.outside > OUTSIDE && !is_all(inclusion));
+    all.extend(outside.map(|inclusion| {
+        let share = 100.0 * inclusion.outside;
+        format!(
+            "inclusion {} is partly outside the body: {share:.0} % of its volume; the part outside does nothing: move it, or cut it off",
+            inclusion.number
+        )
+    }));
+    all.extend(survey.inclusions.iter().filter(is_all).map(|inclusion| {
+        format!("inclusion {} is all of the body; give the body its stiffness, or make it smaller", inclusion.number)
+    }));
+    let share = survey.immobile.area / survey.surface;
+    all.extend((share < BARELY).then(|| {
+        format!(
+            "hardly anything holds the body: {} of its surface of {} is immobile; look whether [immobile] catches what it is meant to",
+            area(survey.immobile.area, &scene.length_unit),
+            area(survey.surface, &scene.length_unit)
+        )
+    }));
+    all.extend((survey.parts > 1).then(|| {
+        let on: Vec<String> = survey.apart.iter().map(ToString::to_string).collect();
+        let paddles = match on.len() {
+            0 => String::new(),
+            _ => format!(" (paddle {} is on another than the target, and moves nothing of it)", on.join(", ")),
+        };
+        format!(
+            "the body is in {} parts that no face joins{paddles}; join them, or leave out what is not meant",
+            survey.parts
+        )
+    }));
     let flat = survey.mesh.worst.first().filter(|worst| worst.dihedral < FLAT);
     all.extend(flat.map(|worst| {
         let (angle, at) = (worst.dihedral, told.point(worst.at));
@@ -94,7 +134,9 @@ fn text(told: &Told<'_>, warnings: &[String]) -> String {
     row("target", told.target());
     for inclusion in &survey.inclusions {
         let (times, volume) = (short(inclusion.stiffness), told.volume(inclusion.volume));
-        let what = format!("stiffness times {times}; volume {volume}, {} elements", inclusion.elements);
+        let held = 100.0 * inclusion.volume / inclusion.true_volume;
+        let of_it = if held < 99.0 { format!(" ({held:.0} % of its own)") } else { String::new() };
+        let what = format!("stiffness times {times}; volume {volume}{of_it}, {} elements", inclusion.elements);
         row(&format!("inclusion {}", inclusion.number), what);
     }
     for paddle in &survey.paddles {

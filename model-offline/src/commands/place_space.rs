@@ -1,12 +1,13 @@
 //! `model-offline place` of a scene in space: singles and pairs.
 
-use super::common::{RunArgs, StudyProgress};
+use super::check_space;
+use super::common::{RunArgs, StudyProgress, warned};
 use super::error::CliError;
 use super::json::write_json;
 use super::place_text::in_lengths_of;
 use model_offline::number::{decimals, length, smallest_told};
-use model_offline::placement::space::SpaceStudy;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
+use model_offline::placement::space::{SpaceErrorEstimate, SpaceStudy};
 use model_offline::scene::space::SpaceScene;
 use model_offline::tell;
 use serde_json::{Value, json};
@@ -30,23 +31,34 @@ fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), C
     let (begin, progress) = (|steps: u64| bar.begin(steps), || bar.step());
     let study = SpaceStudy::run(scene, run.threads(), &begin, &progress)?;
     bar.finish();
-    write_json(json, &document(&study))?;
+    let warnings = warnings(scene);
+    write_json(json, &document(&study, &warnings))?;
     if !run.quiet {
         for [a, b] in overlapping(&study) {
             eprintln!("note: paddles {a} and {b} overlap, and cannot be attached together: no such pair is the best");
         }
-        tell!("{}", summary(&study));
+        tell!("{}{}", summary(&study), warned(&warnings));
     }
     Ok(())
 }
 
-fn document(study: &SpaceStudy) -> Value {
+/// What is seldom meant in the scene, as `check` says it; that paddles overlap is told as it bears on the study.
+fn warnings(scene: &SpaceScene) -> Vec<String> {
+    let Ok(mut survey) = check_space::survey(scene) else { return Vec::new() };
+    survey.overlapping.clear();
+    check_space::warnings(scene, &survey)
+}
+
+fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
     let (scene, placement) = (study.model.scene(), &study.placement);
     let (mut paddles, mut pairs) = (json!(placement.paddles), json!(placement.pairs));
     let results = paddles.as_array_mut().into_iter().flatten().chain(pairs.as_array_mut().into_iter().flatten());
     for (i, result) in results.enumerate() {
-        let error = study.error_estimate.as_ref().and_then(|estimate| estimate.by_set.get(i));
-        result["error"] = json!({ "controllability_measure": error });
+        let estimate = study.error_estimate.as_ref();
+        result["error"] = json!({
+            "controllability_measure": estimate.and_then(|estimate| estimate.by_set.get(i)),
+            "controllability_full": estimate.and_then(|estimate| estimate.full_by_set.get(i)),
+        });
     }
     json!({
         "scene": scene.name,
@@ -65,6 +77,7 @@ fn document(study: &SpaceStudy) -> Value {
         "no_paddle": placement.no_paddle,
         "optimum": placement.optimum,
         "optimum_single": placement.optimum_single,
+        "warnings": warnings,
     })
 }
 
@@ -82,14 +95,13 @@ fn summary(study: &SpaceStudy) -> String {
     let studies = all.iter().map(|(_, answer)| &answer.static_study).chain([&placement.no_paddle.static_study]);
     let digits = decimals(smallest_told(studies.map(|study| study.max_orthogonal)), 6);
     let mut out = format!(
-        "{} · {} tissue · {} nodes · {:.1} s{}\n\n paddles   1/σ_min(NᵀJ)   ‖J⁺N‖       ±   max orthogonal (static)\n",
+        "{} · {} tissue · {} nodes · {:.1} s{}\n\n paddles   1/σ_min(NᵀJ)        ±      ‖J⁺N‖        ±   max orthogonal (static)\n",
         scene.name,
         scene.tissue(),
         study.model.nodes(),
         study.wall_s,
         in_lengths_of(&scene.length_unit)
     );
-    let errors = study.error_estimate.as_ref().map(|estimate| &estimate.by_set);
     let mut order: Vec<usize> = (0..placement.paddles.len()).collect();
     let mut of_pairs: Vec<usize> = (placement.paddles.len()..all.len()).collect();
     of_pairs.sort_by(|&a, &b| all[a].1.controllability_measure.total_cmp(&all[b].1.controllability_measure));
@@ -97,14 +109,20 @@ fn summary(study: &SpaceStudy) -> String {
     order.extend(of_pairs.into_iter().take(LISTED));
     for i in order {
         let (paddles, answer) = &all[i];
-        let error = errors.and_then(|errors| errors.get(i)).map_or(NONE.to_owned(), |e| format!("{:.2} %", 100.0 * e));
+        let estimate = study.error_estimate.as_ref();
+        let error = |of: fn(&SpaceErrorEstimate) -> &Vec<f64>, what: f64| {
+            let error = estimate.and_then(|estimate| of(estimate).get(i)).filter(|_| what.is_finite());
+            error.map_or(NONE.to_owned(), |&error| percent(error))
+        };
         let _ = writeln!(
             out,
-            "{:>8}   {:>12}{} {:>8}  {error:>8}   {}",
+            "{:>8}   {:>12}{} {:>8} {:>10} {:>8}   {}",
             named(paddles),
             measure(answer.controllability_measure),
             if [&placement.optimum.dynamic, &placement.optimum_single.dynamic].contains(&paddles) { '*' } else { ' ' },
+            error(|estimate| &estimate.by_set, answer.controllability_measure),
             measure(answer.controllability_full),
+            error(|estimate| &estimate.full_by_set, answer.controllability_full),
             fixture(&answer.static_study, digits)
         );
     }
@@ -113,7 +131,7 @@ fn summary(study: &SpaceStudy) -> String {
     }
     let _ = writeln!(
         out,
-        "    none   {NONE:>12}  {NONE:>8}  {NONE:>8}   {}",
+        "    none   {NONE:>12}  {NONE:>8} {NONE:>10} {NONE:>8}   {}",
         fixture(&placement.no_paddle.static_study, digits)
     );
     let words = |paddles: &[u32]| if paddles.is_empty() { NONE.to_owned() } else { named(paddles) };
@@ -170,6 +188,11 @@ fn second_pays(study: &SpaceStudy) -> Option<String> {
 
 fn named(paddles: &[u32]) -> String {
     paddles.iter().map(ToString::to_string).collect::<Vec<_>>().join(" + ")
+}
+
+/// A relative error; a number that is all error says no more.
+fn percent(error: f64) -> String {
+    if error > 1.0 { "> 100 %".to_owned() } else { format!("{:.2} %", 100.0 * error) }
 }
 
 fn measure(value: f64) -> String {

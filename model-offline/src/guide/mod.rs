@@ -2,7 +2,7 @@
 //! worked example.
 //!
 //! For whoever runs simulations, checks timing, injects faults or has a board, the guides are in the crate `host-sim`. Every
-//! command line on these pages is run by `cargo test -p host-sim --test documentation`, but for those marked in their source.
+//! command line on these pages is run by `cargo test -p host-sim --test commands documentation`, but for those marked in their source.
 //! Their pictures show when the pages are read as files, and in the documentation after
 //! `cp -r model-offline/pictures target/doc/model_offline/`.
 

@@ -1,7 +1,7 @@
 //! Why a scene cannot be modelled.
 
 use crate::discretization::meshing::StuffingError;
-use crate::discretization::{DiscretizationError, ShapeError, SpatialError};
+use crate::discretization::{DiscretizationError, Integration, ShapeError, SpatialError};
 use crate::material::MaterialError;
 use crate::number::{length, short};
 use crate::scene::NoSuchPaddle;
@@ -78,6 +78,24 @@ fn estimate(error: f64) -> String {
     if error.is_infinite() { "infinite".to_owned() } else { short(error) }
 }
 
+/// A rule that converges faster than the one that was asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Faster {
+    /// The rule.
+    pub integration: Integration,
+    /// The estimate that it has reached within the tolerance, where it was tried.
+    pub reached: Option<f64>,
+}
+
+impl fmt::Display for Faster {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.reached {
+            Some(reached) => write!(f, "--integration {}, which reaches {}", self.integration, estimate(reached)),
+            None => write!(f, "--integration {}, which converges faster", self.integration),
+        }
+    }
+}
+
 /// Why a scene cannot be modelled.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ModelError {
@@ -111,10 +129,16 @@ pub enum ModelError {
     },
     /// A region without any of the surface in it.
     #[error(
-        "the region of the {0} catches no surface of the body: move it onto the surface, let it reach into the body, or \
-         make it larger; where it does, take smaller elements"
+        "the region of the {part} catches no surface of the body{}: move it onto the surface, let it reach into the body, or \
+         make it larger; where it does, take smaller elements",
+        distance.map_or_else(String::new, |distance| format!(", which is about {} from it", short(distance)))
     )]
-    NothingCaught(BoundaryPart),
+    NothingCaught {
+        /// Whose region.
+        part: BoundaryPart,
+        /// How far it is from the surface, about, where it does not meet it; length units.
+        distance: Option<f64>,
+    },
     /// Two patches claim the same nodes.
     #[error(
         "the {part} touches the {other} at {}: tissue cannot follow both; move one of them or make it smaller",
@@ -179,10 +203,11 @@ pub enum ModelError {
     },
     /// Refinement ended before the tolerance.
     #[error(
-        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}{}; take a larger tolerance{}, or, where the rule is another, fem-t6 (in space fem-t10), which converge faster",
+        "tolerance {tolerance} was not reached on the nodes that are tried: the best estimate is {}{decided_by}{}; take a larger tolerance{}{}",
         estimate(*reached),
         memory.as_ref().map_or_else(String::new, |missing| format!("; a finer model did not fit into memory ({missing})")),
-        decided_by.alternative(*tolerance)
+        decided_by.alternative(*tolerance),
+        faster.as_ref().map_or_else(String::new, |faster| format!(", or {faster}"))
     )]
     ToleranceNotReached {
         /// Asked for.
@@ -192,7 +217,9 @@ pub enum ModelError {
         /// Whose it is.
         decided_by: DecidedBy,
         /// What a finer model had no memory for, where that was the end.
-        memory: Option<String>,
+        memory: Option<Box<str>>,
+        /// What may be asked for instead.
+        faster: Option<Box<Faster>>,
     },
     /// A tolerance in space, where no two meshes could be compared.
     #[error(
@@ -312,9 +339,9 @@ impl ModelError {
     }
 
     /// What there was no memory for; none of another error.
-    pub(crate) fn missing_memory(&self) -> Option<String> {
+    pub(crate) fn missing_memory(&self) -> Option<Box<str>> {
         match self {
-            Self::Solve(Failure { reason: FailureReason::TooLarge, detail, .. }) => Some(detail.clone()),
+            Self::Solve(Failure { reason: FailureReason::TooLarge, detail, .. }) => Some(detail.as_str().into()),
             _ => None,
         }
     }
@@ -331,7 +358,7 @@ impl ModelError {
                 | Self::RelaxesHeldWeakly
                 | Self::NeedleSlips
                 | Self::PatchesTouch { .. }
-                | Self::NothingCaught(_)
+                | Self::NothingCaught { .. }
                 | Self::LoosePart { .. }
                 | Self::Spatial(SpatialError::Planar(_))
                 | Self::Material(_)

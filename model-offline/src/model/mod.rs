@@ -11,7 +11,7 @@ mod tissue;
 pub(crate) use condensing::Condensing;
 pub use derivatives::{ControlDerivatives, Derivatives, control_derivatives};
 pub use driven::DrivenBody;
-pub use error::{BoundaryPart, DecidedBy, ModelError, ModelFailure};
+pub use error::{BoundaryPart, DecidedBy, Faster, ModelError, ModelFailure};
 pub use graded::{graded_model, sized_model};
 
 use self::tissue::{Mixing, tissue_of};

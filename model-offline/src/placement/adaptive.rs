@@ -12,7 +12,7 @@ use super::reference::Reference;
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::nodes::graded::{MAX_LEVEL, MIN_LEVEL};
 use crate::discretization::{Integration, Resolution};
-use crate::model::{DecidedBy, ModelError, TissueModel, graded_model, sized_model};
+use crate::model::{DecidedBy, Faster, ModelError, TissueModel, graded_model, sized_model};
 use crate::scene::Scene;
 use serde::Serialize;
 
@@ -215,7 +215,8 @@ fn refine_nodes(refinement: &mut Refinement, scene: &Scene, tolerance: f64) -> R
         }
     }
     let reached = best.map_or(f64::INFINITY, |b| b.worst());
-    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory })
+    let faster = Some(Box::new(Faster { integration: Integration::FemT6, reached: None }));
+    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory, faster })
 }
 
 fn first_level(tolerance: f64) -> i32 {
@@ -237,7 +238,7 @@ fn refine_elements(refinement: &mut Refinement, scene: &Scene, tolerance: f64) -
     })?;
     if !reached {
         let reached = estimate.map_or(f64::INFINITY, |e| e.worst());
-        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory: None });
+        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory: None, faster: None });
     }
     let reference = Some(Reference::from_certified(certified));
     let model = TissueModel::on(scene, certified.model.planar().clone(), certified.model.spacing())?;

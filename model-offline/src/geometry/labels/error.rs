@@ -51,3 +51,21 @@ pub enum LabelError {
         smoothing: f64,
     },
 }
+
+impl LabelError {
+    /// What to do.
+    pub fn help(&self) -> &'static str {
+        match self {
+            Self::Absent { .. } => "give a label that the file has, e.g. body = [1, 2]",
+            Self::Sheared { .. } => {
+                "resample the image to voxels with axes at right angles, and name the new file here"
+            }
+            Self::Smoothing(_) => "smooth by a width between 0 and 10 voxels",
+            Self::Size { .. } => "export the image again: the file is not whole",
+            Self::TooLarge { .. } => {
+                "resample the image to larger voxels (in 3D Slicer: Crop Volume), and name the new file here"
+            }
+            Self::Vanished { .. } => "take another label, or resample the image to smaller voxels",
+        }
+    }
+}

@@ -92,6 +92,15 @@ impl Labels {
         counts.into_iter().map(count).collect()
     }
 
+    /// Whether a voxel of the labels `wanted` is an outermost one of the image, beyond which nobody knows what is there.
+    pub fn reaches_edge(&self, wanted: &BTreeSet<u16>) -> bool {
+        let [nx, ny, nz] = self.size;
+        let is_last = |place: usize, count: usize| place == 0 || place + 1 == count;
+        let is_outermost =
+            |index: usize| is_last(index % nx, nx) || is_last(index / nx % ny, ny) || is_last(index / nx / ny, nz);
+        self.data.iter().enumerate().any(|(index, label)| wanted.contains(label) && is_outermost(index))
+    }
+
     /// Numbers of voxels of the separate parts of the labels `wanted`, the largest first: voxels of one part share faces.
     pub fn parts(&self, wanted: &BTreeSet<u16>) -> Vec<usize> {
         let steps = [1, self.size[0], self.size[0] * self.size[1]];

@@ -173,6 +173,22 @@ fn distances_are_those_to_the_nearest() {
 }
 
 #[test]
+fn what_reaches_the_edge_of_an_image_is_known() {
+    let ball = |x: &Point<3>| (x - Point::<3>::new(4.0, 4.0, 4.0)).norm() < 3.5;
+    let whole = image([9, 9, 9], Matrix4::identity(), ball);
+    let wanted = BTreeSet::from([1]);
+    assert!(!whole.reaches_edge(&wanted));
+    // Each of the six faces, and a label that is not wanted.
+    for at in [[0, 4, 4], [8, 4, 4], [4, 0, 4], [4, 8, 4], [4, 4, 0], [4, 4, 8]] {
+        for (label, reaches) in [(1, true), (2, false)] {
+            let mut cut = whole.clone();
+            cut.data[at[0] + 9 * (at[1] + 9 * at[2])] = label;
+            assert_eq!(cut.reaches_edge(&wanted), reaches, "{at:?}");
+        }
+    }
+}
+
+#[test]
 fn parts_are_what_hangs_together_by_faces() {
     // Two balls apart, a speck, and one voxel that touches it by an edge alone.
     let inside = |x: &Point<3>| {

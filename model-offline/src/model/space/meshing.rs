@@ -39,6 +39,10 @@ const SAMPLED: f64 = 0.5;
 const LOOKED_AT: f64 = 0.5;
 /// A target nearer to the surface than this share of the body's longest side counts as this far from it.
 const DEEP: f64 = 0.1;
+/// Points of the body's surface are this share of its longest side apart where a region's distance from it is looked for, which so
+/// many steps make better.
+const NEARBY: f64 = 0.03;
+const APPROACHES: usize = 30;
 /// Patches at an even spacing have at least this many edges across.
 const ACROSS: f64 = 3.0;
 
@@ -232,12 +236,28 @@ fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<T
         pinned: &[scene.target],
     };
     stuff(&request).map_err(|error| match error {
-        StuffingError::EmptyPatch { patch } => ModelError::NothingCaught(match patch.checked_sub(1) {
-            None => BoundaryPart::Needle,
-            Some(k) => scene.paddles.get(k).map_or(BoundaryPart::Immobile, |p| BoundaryPart::Paddle(p.index)),
-        }),
+        StuffingError::EmptyPatch { patch } => ModelError::NothingCaught {
+            part: match patch.checked_sub(1) {
+                None => BoundaryPart::Needle,
+                Some(k) => scene.paddles.get(k).map_or(BoundaryPart::Immobile, |p| BoundaryPart::Paddle(p.index)),
+            },
+            distance: patches.get(patch).and_then(|region| from_surface(scene, *region)),
+        },
         other => ModelError::Mesh(other),
     })
+}
+
+/// How far a region is from the body's surface, about; length units. None where they meet.
+fn from_surface(scene: &SpaceScene, region: &dyn Implicit) -> Option<f64> {
+    let body = scene.body.as_ref();
+    let points = surface_points(body, body, &|_| NEARBY * extent(scene));
+    let mut x = points.into_iter().min_by(|a, b| region.level(a).total_cmp(&region.level(b)))?;
+    // Towards the region, and back onto the surface.
+    for _ in 0..APPROACHES {
+        x -= region.gradient(&x) * region.level(&x).max(0.0);
+        x -= body.gradient(&x) * body.level(&x);
+    }
+    Some(region.level(&x)).filter(|distance| *distance > 0.0)
 }
 
 #[cfg(test)]

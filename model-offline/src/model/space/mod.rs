@@ -278,20 +278,30 @@ impl HeldNodes {
         let mut nodes = patches.iter().map(|patch| nodes_of(patch, &middles));
         let (immobile, needle) = (nodes.next().unwrap_or_default(), nodes.next().unwrap_or_default());
         let paddles: Vec<Vec<u32>> = nodes.collect();
-        let named = scene.paddles.iter().map(|p| BoundaryPart::Paddle(p.index)).zip(&paddles);
-        for (part, nodes) in named.chain([(BoundaryPart::Needle, &needle)]) {
-            let others = [(BoundaryPart::Immobile, &immobile), (BoundaryPart::Needle, &needle)];
-            for (other, theirs) in others.into_iter().filter(|(other, _)| *other != part) {
-                if let Some(node) = nodes.iter().find(|node| theirs.binary_search(node).is_ok()) {
-                    let at = spatial.positions()[*node as usize];
-                    return Err(ModelError::PatchesTouch { part, other, at: at.into() });
-                }
-            }
+        if let Some((part, other, node)) = touching(scene, [&immobile, &needle], &paddles) {
+            return Err(ModelError::PatchesTouch { part, other, at: spatial.positions()[node as usize].into() });
         }
         let all = immobile.iter().chain(&needle).chain(paddles.iter().flatten());
         let rows = all.map(|&node| Ok((node, spatial.nodal_stencil(node)?))).collect::<Result<_, ModelError>>()?;
         Ok(Self { immobile, needle, paddles, rows })
     }
+}
+
+/// A node that two patches claim, of which one cannot follow the other: what is immobile and the needle, or either and a paddle.
+/// Nodes of each in ascending order.
+fn touching(
+    scene: &SpaceScene,
+    [immobile, needle]: [&Vec<u32>; 2],
+    paddles: &[Vec<u32>],
+) -> Option<(BoundaryPart, BoundaryPart, u32)> {
+    let named = scene.paddles.iter().map(|p| BoundaryPart::Paddle(p.index)).zip(paddles);
+    named.chain([(BoundaryPart::Needle, needle)]).find_map(|(part, nodes)| {
+        let others = [(BoundaryPart::Immobile, immobile), (BoundaryPart::Needle, needle)];
+        others.into_iter().filter(|(other, _)| *other != part).find_map(|(other, theirs)| {
+            let common = nodes.iter().find(|node| theirs.binary_search(node).is_ok())?;
+            Some((part, other, *common))
+        })
+    })
 }
 
 /// Triangles of the immobile part, of the needle's contact and of every paddle.

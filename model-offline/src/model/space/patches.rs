@@ -114,6 +114,30 @@ pub(super) fn loose<'n>(mesh: &TetMesh, held: impl Iterator<Item = &'n u32>) -> 
     Some(mesh.nodes[mesh.tetrahedra[first][0] as usize])
 }
 
+/// The part of a mesh that each of its elements belongs to, counted from 0 in their order. Parts are what common faces join.
+pub(super) fn parts(mesh: &TetMesh) -> Vec<u32> {
+    let neighbours = mesh.neighbours();
+    let mut part = vec![u32::MAX; mesh.tetrahedra.len()];
+    let mut count = 0;
+    for first in 0..part.len() {
+        if part[first] != u32::MAX {
+            continue;
+        }
+        part[first] = count;
+        let mut beyond = vec![first as u32];
+        while let Some(t) = beyond.pop() {
+            for next in neighbours[t as usize].into_iter().flatten() {
+                if part[next as usize] == u32::MAX {
+                    part[next as usize] = count;
+                    beyond.push(next);
+                }
+            }
+        }
+        count += 1;
+    }
+    part
+}
+
 /// Whether two patches have triangles in common, and not just an edge or a corner.
 pub(super) fn overlap(a: &[[u32; 3]], b: &[[u32; 3]]) -> bool {
     let of_a: BTreeSet<&[u32; 3]> = a.iter().collect();

@@ -112,17 +112,64 @@ fn is_free(scene: &SpaceScene, place: usize, x: &Point<3>) -> bool {
     scene.inclusions[place + 1..].iter().all(|later| later.region.level(x) > 0.0)
 }
 
-/// The volume of an inclusion in the body that no later one takes, sampled.
-fn volume(scene: &SpaceScene, place: usize) -> f64 {
+/// The volume of an inclusion in the body that no later one takes, sampled; length units cubed.
+pub(super) fn volume(scene: &SpaceScene, place: usize) -> f64 {
     let region = &scene.inclusions[place].region;
     let Some((low, high)) = scene.body.bounds() else { return 0.0 };
     let (low, high) = region.bounds().map_or((low, high), |(l, h)| (low.sup(&l), high.inf(&h)));
-    let steps = || 0..STEPS;
-    let all = steps().flat_map(|i| steps().flat_map(move |j| steps().map(move |k| [i, j, k])));
-    let at = |cell: [i32; 3]| {
-        Point::<3>::from_fn(|k, _| low[k] + (high[k] - low[k]) * (f64::from(cell[k]) + 0.5) / f64::from(STEPS))
-    };
     let is_in = |x: &Point<3>| region.level(x) < 0.0 && scene.body.level(x) < 0.0 && is_free(scene, place, x);
-    let inside = all.filter(|cell| is_in(&at(*cell))).count();
+    let inside = samples(low, high).filter(is_in).count();
     (high - low).map(|side| side.max(0.0)).product() * inside as f64 / f64::from(STEPS).powi(3)
+}
+
+/// The part of an inclusion that is outside of the body, 0 to 1, sampled; none of what has no end.
+pub(super) fn outside(scene: &SpaceScene, place: usize) -> f64 {
+    let region = &scene.inclusions[place].region;
+    let Some((low, high)) = region.bounds() else { return 0.0 };
+    let all: Vec<Point<3>> = samples(low, high).filter(|x| region.level(x) < 0.0).collect();
+    let out = all.iter().filter(|x| scene.body.level(x) > 0.0).count();
+    out as f64 / all.len().max(1) as f64
+}
+
+/// The middles of the cells of a grid in a box.
+fn samples(low: Point<3>, high: Point<3>) -> impl Iterator<Item = Point<3>> {
+    let steps = || 0..STEPS;
+    let all = steps().flat_map(move |i| steps().flat_map(move |j| steps().map(move |k| [i, j, k])));
+    all.map(move |cell| {
+        Point::<3>::from_fn(|k, _| low[k] + (high[k] - low[k]) * (f64::from(cell[k]) + 0.5) / f64::from(STEPS))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::space::AnyScene;
+
+    /// `block` with other inclusions.
+    fn scene(inclusions: &str) -> SpaceScene {
+        let text = include_str!("../../../scenes/block.toml");
+        let at = text.find("[[inclusion]]").unwrap();
+        let end = at + 1 + text[at + 1..].find("\n[").unwrap();
+        let text = format!("{}{inclusions}{}", &text[..at], &text[end..]);
+        let AnyScene::Space(scene) = AnyScene::parse(&text, "block.toml").unwrap() else { panic!("planar") };
+        *scene
+    }
+
+    /// A ball that a later box takes an eighth of, and one that half of is in the body.
+    #[test]
+    fn volumes_are_those_of_geometry() {
+        let ball = |x: f64, y: f64| {
+            format!(
+                "[[inclusion]]\nellipsoid = {{ centre = [{x:?}, {y:?}, 0.5], semi_axes = [0.1, 0.1, 0.1] }}\nstiffness = 3.0\n"
+            )
+        };
+        let cut = "[[inclusion]]\nbox = { min = [0.3, 0.3, 0.5], max = [0.4, 0.4, 0.7] }\nstiffness = 2.0\n";
+        let scene = scene(&(ball(0.3, 0.3) + &ball(1.0, 0.6) + cut));
+        let whole = 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
+        let found = [0, 1, 2].map(|place| (volume(&scene, place), outside(&scene, place)));
+        let near = |a: f64, b: f64| (a - b).abs() < 0.01 * whole;
+        assert!(near(found[0].0, 7.0 / 8.0 * whole) && found[0].1 == 0.0, "{found:?}");
+        assert!(near(found[1].0, 0.5 * whole) && (found[1].1 - 0.5).abs() < 0.01, "{found:?}");
+        assert!((found[2].0 - 2e-3).abs() < 1e-12 && found[2].1 == 0.0, "{found:?}");
+    }
 }

@@ -1,8 +1,8 @@
 //! What can be known of a scene in space without solving: its numbers, its mesh, and what of it is seldom meant.
 
-use super::patches::Surface;
-use super::seen::BodySurface;
-use super::{loose_part, overlapping, patches_of};
+use super::patches::{Surface, nodes_of, parts};
+use super::seen::{BodySurface, outside, volume};
+use super::{loose_part, overlapping, patches_of, touching};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::mesh::Element;
 use crate::geometry::{Implicit, Point, box_of};
@@ -11,6 +11,7 @@ use crate::scene::SceneWarning;
 use crate::scene::space::SpaceScene;
 use crate::scene::warning::{self, ALONG};
 use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// So many of the worst elements are named.
 const NAMED: usize = 5;
@@ -44,6 +45,13 @@ pub struct Survey {
     pub mesh: MeshSurvey,
     /// Pairs of paddles that overlap, by index.
     pub overlapping: Vec<[u32; 2]>,
+    /// Parts that the body falls into: nothing more than an edge joins them.
+    pub parts: usize,
+    /// Paddles on another part than the target's, by index.
+    pub apart: Vec<u32>,
+    /// Why there is no model of this scene, although it can be looked at.
+    #[serde(skip)]
+    pub refused: Option<ModelError>,
     /// What is seldom meant.
     #[serde(skip)]
     pub warnings: Vec<SceneWarning>,
@@ -94,8 +102,12 @@ pub struct InclusionSurvey {
     pub number: usize,
     /// Factor on the energy.
     pub stiffness: f64,
-    /// Its volume in the body, without what later inclusions take.
+    /// Its volume in elements with straight edges, without what later inclusions take.
     pub volume: f64,
+    /// The same of the inclusion itself, sampled.
+    pub true_volume: f64,
+    /// The part of it that is outside of the body, 0 to 1, sampled.
+    pub outside: f64,
     /// Elements that it has.
     pub elements: usize,
 }
@@ -151,14 +163,22 @@ impl Survey {
         let volumes = mesh.volumes();
         let inclusions = scene.inclusions.iter().enumerate().map(|(i, inclusion)| {
             let own = || mesh.part.iter().zip(&volumes).filter(move |(part, _)| **part as usize == i + 1);
-            let volume = own().map(|(_, volume)| volume).sum();
-            InclusionSurvey { number: i + 1, stiffness: inclusion.stiffness, volume, elements: own().count() }
+            let in_elements = own().map(|(_, volume)| volume).sum();
+            InclusionSurvey {
+                number: i + 1,
+                stiffness: inclusion.stiffness,
+                volume: in_elements,
+                true_volume: volume(scene, i),
+                outside: outside(scene, i),
+                elements: own().count(),
+            }
         });
         let (low, high) = extent(scene, mesh);
         let needle =
             NeedleSurvey { contact: measured[1].clone(), axis: scene.needle.axis.into(), depth: scene.needle.depth };
         let paddles = scene.paddles.iter().zip(&measured[2..]);
         let overlapping = overlapping(scene, &patches);
+        let (parts, apart) = on_other_parts(scene, mesh, &patches[2..]);
         let mut survey = Self {
             low: low.into(),
             high: high.into(),
@@ -171,6 +191,9 @@ impl Survey {
             paddles: paddles.map(|(p, patch)| PaddleSurvey { index: p.index, patch: patch.clone() }).collect(),
             mesh: MeshSurvey::of(scene, mesh, &volumes),
             overlapping: overlapping.iter().map(|pair| pair.map(|p| scene.paddles[p].index)).collect(),
+            parts,
+            apart,
+            refused: refused(scene, mesh, &patches),
             warnings: Vec::new(),
         };
         survey.warnings = survey.seldom_meant(scene);
@@ -196,6 +219,30 @@ impl Survey {
         }
         found
     }
+}
+
+/// Parts of the body, and indices of the paddles that are not on the target's.
+fn on_other_parts(scene: &SpaceScene, mesh: &TetMesh, paddles: &[Vec<[u32; 3]>]) -> (usize, Vec<u32>) {
+    let part = parts(mesh);
+    let count = part.iter().max().map_or(0, |last| *last as usize + 1);
+    let to_target = |node: &u32| (mesh.nodes[*node as usize] - scene.target).norm();
+    let near = |t: usize| mesh.tetrahedra[t].iter().map(to_target).sum::<f64>();
+    let target = (0..part.len()).min_by(|a, b| near(*a).total_cmp(&near(*b))).map(|t| part[t]);
+    let has = |triangle: &[u32; 3]| {
+        let at = mesh.tetrahedra.iter().position(|corners| triangle.iter().all(|node| corners.contains(node)));
+        at.map(|t| part[t])
+    };
+    let is_apart = |patch: &Vec<[u32; 3]>| count > 1 && patch.iter().all(|triangle| has(triangle) != target);
+    let apart = scene.paddles.iter().zip(paddles).filter(|(_, patch)| is_apart(patch));
+    (count, apart.map(|(paddle, _)| paddle.index).collect())
+}
+
+/// Why patches cannot move as they should: of elements with straight edges, whose corners any rule holds.
+fn refused(scene: &SpaceScene, mesh: &TetMesh, patches: &[Vec<[u32; 3]>]) -> Option<ModelError> {
+    let corners: Vec<Vec<u32>> = patches.iter().map(|patch| nodes_of(patch, &BTreeMap::new())).collect();
+    let [immobile, needle, paddles @ ..] = &corners[..] else { return None };
+    let (part, other, node) = touching(scene, [immobile, needle], paddles)?;
+    Some(ModelError::PatchesTouch { part, other, at: mesh.nodes[node as usize].into() })
 }
 
 /// Depth at which a line that goes into a body comes out of it again, to a thousandth of its size.

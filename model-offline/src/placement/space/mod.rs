@@ -3,11 +3,13 @@
 pub mod controllability;
 pub mod holding;
 pub mod insertion;
+mod refinement;
 pub mod rest;
 pub mod study;
 pub mod workflow;
 
 pub use controllability::Controllability;
 pub use insertion::InsertionModel;
+pub use refinement::{SAFETY, distances};
 pub use study::SpacePlacement;
 pub use workflow::{SpaceErrorEstimate, SpaceStudy};

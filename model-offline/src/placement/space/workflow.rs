@@ -1,34 +1,23 @@
 //! From a scene in space to a placement: mesh, refine if a tolerance is asked for, study every paddle and pair.
 //!
-//! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
-//! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by the next coarser mesh. From a mesh to
-//! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
-//! is left; it is taken times [`SAFETY`].
+//! How a tolerance is kept is told in the module `refinement`.
 
 use super::insertion::InsertionModel;
+use super::refinement::{LEVELS, refine};
 use super::rest::{SpaceResponse, rest_responses};
 use super::study::{SpacePlacement, place_in_space, steps};
 use crate::discretization::{Integration, Method, Resolution, TetMesh};
+use crate::model::ModelError;
 use crate::model::space::SpaceModel;
 use crate::model::space::meshing::{MeshSize, even_mesh, mesh};
-use crate::model::{DecidedBy, ModelError};
 use crate::parallel;
 use crate::scene::space::SpaceScene;
-use crate::solver::equilibrium::{Failure, FailureReason};
 use serde::Serialize;
 use std::time::Instant;
 
-/// A mesh is finer than another where every patch has so many times its nodes.
-const GROWN: f64 = 1.3;
-/// What a difference of two meshes is multiplied by.
-pub const SAFETY: f64 = 1.5;
-/// Share of the tolerance that the reference of another method may leave open.
-const REFERENCE_SHARE: f64 = 0.5;
 /// Estimated error of the measures that insertions leave open at rest, at most. On the bundled scenes meshes that claim it are 0.8 % (`block`),
 /// 1.5 % (`scan`) and less than 3.8 % (`mound`) off; each further halving costs four times as much, and feedback makes up for it.
 const AT_REST: f64 = 0.15;
-/// Levels that refinement begins with, and ends with.
-const LEVELS: std::ops::RangeInclusive<i32> = 0..=5;
 /// Nodes of the largest model that is refined to, a minute or two and about 8 GB: nodal rules couple a few hundred neighbours,
 /// elements a few dozen.
 const MOST_NODES: usize = 20_000;
@@ -41,6 +30,9 @@ pub struct SpaceErrorEstimate {
     pub controllability: f64,
     /// The same by paddle, then by pair, in the scene's order.
     pub by_set: Vec<f64>,
+    /// Estimated relative errors of the measures without axial motion, in the same order. No tolerance is kept of them: where the
+    /// target hardly follows in one direction they are large.
+    pub full_by_set: Vec<f64>,
     /// The part of it that the reference leaves open; the whole where the model is its own.
     pub reference: f64,
     /// Nodes of the reference.
@@ -147,7 +139,7 @@ pub fn model(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
     }
 }
 
-fn at_level(scene: &SpaceScene, level: i32) -> Result<(SpaceModel, Vec<SpaceResponse>), ModelError> {
+pub(super) fn at_level(scene: &SpaceScene, level: i32) -> Result<(SpaceModel, Vec<SpaceResponse>), ModelError> {
     answering(scene, &mesh(scene, &MeshSize::level(level))?)
 }
 
@@ -168,181 +160,6 @@ fn answering(scene: &SpaceScene, mesh: &TetMesh) -> Result<(SpaceModel, Vec<Spac
     let model = SpaceModel::on(scene, mesh)?;
     let rest = rest_responses(&model)?;
     Ok((model, rest))
-}
-
-/// Relative distances of the controllability measures, by paddle and pair; 0 where neither controls the target, infinite where
-/// one does.
-pub fn distances(found: &[SpaceResponse], reference: &[SpaceResponse]) -> Vec<f64> {
-    let measure = |response: &SpaceResponse| response.controllability.map(|c| c.measure);
-    let pairs = found.iter().zip(reference).filter_map(|(a, b)| measure(a).zip(measure(b)));
-    pairs.map(|(a, b)| distance(a, b)).collect()
-}
-
-fn distance(found: f64, reference: f64) -> f64 {
-    match [found, reference].map(f64::is_infinite) {
-        [true, true] => 0.0,
-        [false, false] => (found / reference - 1.0).abs(),
-        _ => f64::INFINITY,
-    }
-}
-
-/// What is left open on the finer of two meshes whose answers are so far apart. Two meshes may agree by accident (the pair 1 + 2 of
-/// `block` does): nothing is taken to be better than the median.
-fn estimates(distances: &[f64]) -> Vec<f64> {
-    let mut sorted: Vec<f64> = distances.iter().copied().filter(|d| d.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
-    distances.iter().map(|d| SAFETY * d.max(median)).collect()
-}
-
-/// Indices of the paddles of every set that has a measure: of singles, then of pairs.
-fn sets(scene: &SpaceScene) -> impl Iterator<Item = Vec<u32>> {
-    let index = |at: usize| scene.paddles[at].index;
-    let singles = (0..scene.paddles.len()).map(move |paddle| vec![index(paddle)]);
-    singles.chain(scene.pairs.iter().map(move |pair| pair.map(index).to_vec()))
-}
-
-/// Whose estimate decides. Of equal estimates, as those that the median has raised, the one whose answers are farther apart.
-fn decided_by(scene: &SpaceScene, estimates: &[f64], apart: &[f64]) -> DecidedBy {
-    let mut all: Vec<_> = sets(scene).zip(estimates).zip(apart).collect();
-    all.sort_by(|a, b| b.1.total_cmp(a.1));
-    DecidedBy::measures(all.into_iter().map(|((paddles, &estimate), _)| (paddles, estimate)), None)
-}
-
-/// The best estimate that a refinement has come to, and whose it is.
-type Best = Option<(f64, DecidedBy)>;
-
-fn worst(errors: &[f64]) -> f64 {
-    errors.iter().copied().fold(0.0, f64::max)
-}
-
-/// Quadratic tetrahedra on finer and finer meshes, until their own estimate is within `open`.
-struct Reference {
-    model: SpaceModel,
-    rest: Vec<SpaceResponse>,
-    errors: Vec<f64>,
-    level: i32,
-}
-
-impl Reference {
-    fn within(scene: &SpaceScene, open: f64) -> Result<Self, ModelError> {
-        let scene = scene.with_method(Method::new(Integration::FemT10));
-        let mut best: Best = None;
-        let mut coarser: Option<(Vec<usize>, Vec<SpaceResponse>)> = None;
-        let (mut failed, mut memory) = (None, None);
-        for level in *LEVELS.start() - 1..=*LEVELS.end() {
-            let (model, rest) = match at_level(&scene, level) {
-                Ok(found) => found,
-                // The coarsest meshes may not see every patch, the finest may not be affordable.
-                Err(error) if error.is_too_large() && coarser.is_some() => {
-                    memory = error.missing_memory();
-                    break;
-                }
-                Err(_) if coarser.is_none() && level <= *LEVELS.start() => continue,
-                // One level may meet what is near a surface badly where the next does not.
-                Err(error @ ModelError::Mesh(_)) => {
-                    failed = Some(error);
-                    continue;
-                }
-                Err(error) => return Err(error),
-            };
-            let on_patches = model.nodes_on_patches();
-            if let Some((before, coarser)) = &coarser {
-                // Where a level's sizes change nothing on a patch, nothing is learnt of it: two answers with one error
-                // agree.
-                if before.iter().zip(&on_patches).any(|(before, now)| (*now as f64) < GROWN * *before as f64) {
-                    continue;
-                }
-                let apart = distances(coarser, &rest);
-                let errors = estimates(&apart);
-                let estimate = worst(&errors);
-                if estimate <= open {
-                    return Ok(Self { model, rest, errors, level });
-                }
-                if best.as_ref().is_none_or(|best| estimate < best.0) {
-                    best = Some((estimate, decided_by(&scene, &errors, &apart)));
-                }
-            }
-            coarser = Some((on_patches, rest));
-        }
-        // Without an estimate, no two meshes that could be afforded differ on every patch.
-        Err(match best {
-            Some((reached, decided_by)) => {
-                ModelError::ToleranceNotReached { tolerance: open, reached, decided_by, memory }
-            }
-            None => match memory {
-                Some(detail) => Failure { reason: FailureReason::TooLarge, reached: 0.0, detail }.into(),
-                None => failed.unwrap_or(ModelError::NothingToCompare),
-            },
-        })
-    }
-}
-
-/// What a reference that fails its share of a tolerance says of the whole: what was asked for, and what could have been kept.
-fn of_the_whole(error: ModelError, tolerance: f64) -> ModelError {
-    match error {
-        ModelError::ToleranceNotReached { reached, decided_by, memory, .. } => {
-            let whole = 1.0 / REFERENCE_SHARE;
-            ModelError::ToleranceNotReached {
-                tolerance,
-                reached: whole * reached,
-                decided_by: decided_by.scaled(whole),
-                memory,
-            }
-        }
-        other => other,
-    }
-}
-
-fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
-    let method = scene.discretization.method;
-    if method.integration == Integration::FemT10 {
-        let Reference { model, rest, errors, level } = Reference::within(scene, tolerance)?;
-        let controllability = worst(&errors);
-        let estimate = SpaceErrorEstimate {
-            controllability,
-            by_set: errors,
-            reference: controllability,
-            reference_nodes: model.nodes(),
-            level,
-        };
-        return Ok(Discretised { model, rest, estimate: Some(estimate) });
-    }
-    let reference =
-        Reference::within(scene, REFERENCE_SHARE * tolerance).map_err(|error| of_the_whole(error, tolerance))?;
-    let (mut best, mut memory): (Best, _) = (None, None);
-    let mut level = *LEVELS.start();
-    while level <= *LEVELS.end() {
-        let (model, rest) = match at_level(scene, level) {
-            Ok(found) => found,
-            Err(error) if error.is_too_large() && best.is_some() => {
-                memory = error.missing_memory();
-                break;
-            }
-            Err(error) => return Err(error),
-        };
-        let apart = distances(&rest, &reference.rest);
-        let errors: Vec<f64> = apart.iter().zip(&reference.errors).map(|(a, open)| a + open).collect();
-        let controllability = worst(&errors);
-        if controllability <= tolerance {
-            let estimate = SpaceErrorEstimate {
-                controllability,
-                by_set: errors,
-                reference: worst(&reference.errors),
-                reference_nodes: reference.model.nodes(),
-                level,
-            };
-            return Ok(Discretised { model, rest, estimate: Some(estimate) });
-        }
-        if best.as_ref().is_none_or(|best| controllability < best.0) {
-            best = Some((controllability, decided_by(scene, &errors, &apart)));
-        }
-        // The error falls with the size at the rims, which a level halves: levels that cannot do are not tried.
-        let left = worst(&apart) / (tolerance - worst(&reference.errors));
-        level += (left.log2().floor() as i32).clamp(1, 2);
-    }
-    let (reached, decided_by) = best.unwrap_or((f64::INFINITY, DecidedBy::Whole));
-    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory })
 }
 
 /// The model of a scene's insertions. At rest it answers as the scene's own discretization does; where that is given by a tolerance
@@ -375,79 +192,4 @@ pub fn coarse(scene: &SpaceScene) -> Result<SpaceModel, ModelError> {
         }
     }
     outcome
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn measures_are_as_far_apart_one_way_as_the_other() {
-        assert_eq!(distance(f64::INFINITY, f64::INFINITY), 0.0);
-        assert!((distance(1.1, 1.0) - 0.1).abs() < 1e-12);
-        // One says that the target is controlled, and the other that it is not.
-        assert_eq!([distance(f64::INFINITY, 2.0), distance(2.0, f64::INFINITY)], [f64::INFINITY; 2]);
-        let with = |measure: f64| SpaceResponse {
-            jacobian: nalgebra::DMatrix::zeros(3, 3),
-            target_per_depth: nalgebra::Vector3::zeros(),
-            controllability: Some(crate::placement::space::Controllability { measure, ..unit() }),
-        };
-        let nobody = SpaceResponse { controllability: None, ..with(1.0) };
-        let found = distances(&[with(1.5), with(f64::INFINITY), nobody.clone()], &[with(1.0), with(3.0), nobody]);
-        assert_eq!(found, [0.5, f64::INFINITY]);
-    }
-
-    fn unit() -> crate::placement::space::Controllability {
-        let n = nalgebra::Matrix3x2::new(1.0, 0.0, 0.0, 1.0, 0.0, 0.0);
-        crate::placement::space::Controllability::of(&nalgebra::DMatrix::identity(3, 3), &n)
-    }
-
-    /// `block` has eight paddles and pairs of them.
-    #[test]
-    fn the_set_that_is_farthest_apart_decides() {
-        let scene = SpaceScene::bundled("block").unwrap();
-        let all: Vec<Vec<u32>> = sets(&scene).collect();
-        let mut apart = vec![0.01; all.len()];
-        apart[3] = 0.05;
-        let last = all.len() - 1;
-        apart[last] = 0.07;
-        let decided = decided_by(&scene, &estimates(&apart), &apart);
-        assert_eq!(decided, DecidedBy::Measure { paddles: all[last].clone(), others: Some(1.5 * 0.05) });
-        // Of two sets the median is the larger distance: both have one estimate, and the second has caused it.
-        let mut two = scene.clone();
-        two.paddles.truncate(2);
-        two.pairs.clear();
-        let apart = [0.01, 0.03];
-        let found = estimates(&apart);
-        assert_eq!(found[0], found[1]);
-        let DecidedBy::Measure { paddles, others } = decided_by(&two, &found, &apart) else { panic!() };
-        assert_eq!((paddles, others), (vec![two.paddles[1].index], Some(found[0])));
-        // One mesh says that the second paddle controls the target, and the other that it does not; the first agrees.
-        let apart = [0.01, f64::INFINITY];
-        let decided_by = decided_by(&two, &estimates(&apart), &apart);
-        let told = ModelError::ToleranceNotReached { tolerance: 0.1, reached: f64::INFINITY, decided_by, memory: None }
-            .to_string();
-        assert!(
-            told.contains("the best estimate is infinite (of the measure of paddle 2; 0.015 of all else)"),
-            "{told}"
-        );
-    }
-
-    #[test]
-    fn a_reference_that_fails_its_half_is_told_as_the_tolerance_that_was_asked_for() {
-        let decided_by = DecidedBy::Measure { paddles: vec![2, 5], others: Some(0.001) };
-        let memory = Some("to factorise 9 unknowns".to_owned());
-        let of_half = ModelError::ToleranceNotReached { tolerance: 0.002, reached: 0.0057, decided_by, memory };
-        let told = of_the_whole(of_half, 0.004);
-        let ModelError::ToleranceNotReached { tolerance, reached, .. } = &told else { panic!("{told}") };
-        assert!(*tolerance == 0.004 && (reached - 0.0114).abs() < 1e-12, "{tolerance} {reached}");
-        let text = told.to_string();
-        assert!(
-            text.contains(
-                "0.0114 (of the measure of paddles 2 + 5; 0.002 of all else); a finer model did not fit into memory (to factorise \
-                 9 unknowns); take a larger tolerance, leave that pair out of the scene, or"
-            ),
-            "{text}"
-        );
-    }
 }

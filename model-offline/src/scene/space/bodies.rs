@@ -165,6 +165,12 @@ impl<'a> Bodies<'a> {
             LabelSet::Several(labels) => labels.iter().copied().collect(),
         };
         let region = self.region_of(&read.value, &wanted, body.span())?;
+        let absent = wanted.iter().filter(|label| !read.value.counts().iter().any(|count| count.label == **label));
+        self.note(file.get(), absent.map(|label| format!("no voxel has the label {label} that the body is to have")));
+        if read.value.reaches_edge(&wanted) {
+            let told = "the body reaches the edge of the image, where it is cut off flat".to_owned();
+            self.note(file.get(), [told]);
+        }
         if let [largest, others @ ..] = read.value.parts(&wanted).as_slice()
             && !others.is_empty()
         {
@@ -225,9 +231,8 @@ impl<'a> Bodies<'a> {
     }
 
     fn region_of(&self, labels: &Labels, wanted: &BTreeSet<u16>, span: Range<usize>) -> Checked<Body> {
-        let body = LabelBody::new(labels, wanted, SMOOTHING).map_err(|wrong| {
-            self.source.error(span, format!("labels: {wrong}"), "give a label that the file has, e.g. body = [1, 2]")
-        })?;
+        let body = LabelBody::new(labels, wanted, SMOOTHING)
+            .map_err(|wrong| self.source.error(span, format!("labels: {wrong}"), wrong.help()))?;
         Ok(Arc::new(body))
     }
 

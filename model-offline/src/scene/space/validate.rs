@@ -8,6 +8,7 @@ use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::geometry::implicit::share;
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::{Law, MaterialSection};
+use crate::number::length;
 use crate::scene::Actuator;
 use crate::scene::error::{SceneError, Source};
 use crate::scene::exactly::{Coordinates, Exactly};
@@ -20,6 +21,8 @@ use std::sync::Arc;
 
 type Checked<T> = Result<T, SceneError>;
 
+/// Distances below this part of the body's size are rounding.
+const ROUNDING: f64 = 1e-9;
 /// Bodies are at least this long, and their coordinates at most so large, in units of the scene.
 const SMALLEST: f64 = 1e-12;
 const LARGEST: f64 = 1e12;
@@ -113,8 +116,9 @@ impl Validator<'_> {
         let sections = [(&file.sensor, "[sensor]"), (&file.motion, "[motion]"), (&file.fit, "[fit]")];
         let given = sections.into_iter().find_map(|(section, name)| section.as_ref().map(|section| (section, name)));
         if let Some((section, name)) = given {
-            let message = format!("{name} is of simulations, and scenes in space are not simulated yet");
-            return Err(self.error(section.span(), message, "take it out: `place` and `solve` do not need it"));
+            let message = format!("{name} is read of scenes in the plane alone");
+            let help = "take it out: `place`, `solve` and `table` do not need it, and `host-sim run` has options for the sensor";
+            return Err(self.error(section.span(), message, help));
         }
         match &file.needle.mechanics {
             Some(mechanics) if mechanics.get() != "patch" => Err(self.error(
@@ -197,14 +201,24 @@ impl Validator<'_> {
     fn target(&self, body: &dyn Implicit) -> Checked<Point<3>> {
         let located = &self.file.target.position;
         let target = self.point(located, "target")?;
-        match body.level(&target) {
-            outside if outside >= 0.0 => Err(self.error(
-                located.span(),
-                format!("the target is outside the body, about {outside:.4} from it"),
-                "move the target into the body",
-            )),
-            _ => Ok(target),
+        let outside = body.level(&target);
+        if outside < 0.0 {
+            return Ok(target);
         }
+        if !share(body, body, &|_| true) {
+            return Err(self.error(
+                self.file.domain.span(),
+                "nothing is left of the body",
+                "look at the order of a difference, and whether the parts of an intersection meet",
+            ));
+        }
+        let size = body.bounds().map_or(1.0, |(low, high)| (high - low).norm());
+        let told = if outside <= ROUNDING * size {
+            "the target is on the surface of the body".to_owned()
+        } else {
+            format!("the target is outside the body, about {} from it", length(outside))
+        };
+        Err(self.error(located.span(), told, "move the target into the body"))
     }
 
     fn immobile(&self) -> Checked<Vec<Solid>> {
@@ -309,8 +323,8 @@ impl Validator<'_> {
         if law.relaxation().is_some() {
             return Err(self.error(
                 located.span(),
-                "material: tissue that relaxes is of simulations, and scenes in space are not simulated yet",
-                "write [material.relaxation] g = [], tau = []: without terms a preset's relaxation is left out, too",
+                "material: tissue that relaxes is computed in the plane alone",
+                "write [material.relaxation] g = [], tau = []: the elastic part of the preset is left, with its moduli of a fast deformation",
             ));
         }
         Ok(law)

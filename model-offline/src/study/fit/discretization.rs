@@ -54,7 +54,13 @@ pub fn discretization(
     let rejected: Vec<Rejected> = reasons.collect();
     let Some(best) = best else {
         let reached = rejected.iter().filter_map(|r| r.reason.error()).fold(f64::INFINITY, f64::min);
-        return Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by: DecidedBy::Whole, memory: None });
+        return Err(ModelError::ToleranceNotReached {
+            tolerance,
+            reached,
+            decided_by: DecidedBy::Whole,
+            memory: None,
+            faster: None,
+        });
     };
     Ok(ChosenDiscretization {
         discretization: best.candidate,

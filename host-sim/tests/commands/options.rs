@@ -2,8 +2,6 @@
 //! file that is left half made. The options come from clap's own command tree, by way of the completion script, so that
 //! new ones are tried without anybody's doing. `STILLPOINT_OPTIONS=all` tries every value on every option.
 
-mod missing;
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -97,7 +95,7 @@ fn programs() -> Vec<Program> {
         let is_built = program.path.is_file();
         if !is_built {
             let path = program.path.display();
-            missing::skip("every option of it", format!("{path} is not built; `cargo test --workspace` does"));
+            crate::missing::skip("every option of it", format!("{path} is not built; `cargo test --workspace` does"));
         }
         is_built
     });

@@ -1,11 +1,10 @@
 //! The closed loop on a body in space, through the command.
 
-mod scenes;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
+use crate::scenes::with_pairs;
 use host_sim::record::recording::{Record, Recording};
 use host_sim::runtime::accounting::tick::ControllerTick;
 use host_sim::runtime::executor::AnyTable;
@@ -15,7 +14,6 @@ use model_offline::placement::space::workflow::insertion_model;
 use model_offline::scene::SensorPreset;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use nalgebra::Vector3;
-use scenes::with_pairs;
 use serde_json::Value;
 
 fn run(directory: &Path, arguments: &[&str]) -> std::process::Output {

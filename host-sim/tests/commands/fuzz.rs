@@ -19,7 +19,7 @@ const SVG: &str = r#"<svg xmlns="http://www.w3.org/2000/svg" width="120mm" heigh
 <polygon points="5,5 9,5 9,9"/></svg>"#;
 
 /// A drawing with every role.
-const SVG_ROLES: &str = include_str!("../../model-offline/pictures/drawing.svg");
+const SVG_ROLES: &str = include_str!("../../../model-offline/pictures/drawing.svg");
 
 const GMSH_2: &str = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0.5 0.5 0\n$EndNodes\n\
 $Elements\n4\n1 2 2 1 1 1 2 5\n2 2 2 1 1 2 3 5\n3 2 2 1 1 3 4 5\n4 2 2 1 1 4 1 5\n$EndElements\n";

@@ -11,7 +11,7 @@ const INCLUSION: &str = "box = { min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4] }"
 
 /// `block` on a coarse mesh, one paddle, with replacements.
 fn scene(changes: &[(&str, &str)]) -> String {
-    let text = include_str!("../scenes/block.toml");
+    let text = include_str!("../../scenes/block.toml");
     let (before, after) = (text.find("[[paddle]]\nindex = 2").unwrap(), text.find("[pairs]").unwrap());
     let text = format!("{}{}", &text[..before], &text[after..]);
     let text = text.replacen("tolerance = 0.05", "level = 0\nintegration = \"fem-t4\"", 1);

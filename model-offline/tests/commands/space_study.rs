@@ -9,7 +9,7 @@ fn program() -> Command {
 }
 
 fn text() -> &'static str {
-    include_str!("../scenes/block.toml")
+    include_str!("../../scenes/block.toml")
 }
 
 /// Places on a scene of this text; exit code, standard error, and what was written.
@@ -48,10 +48,37 @@ fn a_study_in_space_is_written_as_the_contract_says() {
     assert_eq!(study["optimum_single"]["dynamic"], serde_json::json!([3]));
 }
 
+/// Both measures have an error of their own.
+#[test]
+fn a_tolerance_comes_with_the_errors_of_both_measures() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = text().replace("of = \"all\"", "of = [[3, 6]]").replacen("tolerance = 0.05", "tolerance = 0.2", 1);
+    let options = ["--integration", "fem-t10", "--without-inclusion", "--quiet"];
+    let (code, said, written) = place(&text, &options, folder.path());
+    assert_eq!((code, said.as_str()), (0, ""));
+    let study = written.unwrap();
+    let estimate = &study["error_estimate"];
+    let results = [study["paddles"].as_array().unwrap(), study["pairs"].as_array().unwrap()];
+    for (i, result) in results.into_iter().flatten().enumerate() {
+        for (key, of_all) in [("controllability_measure", "by_set"), ("controllability_full", "full_by_set")] {
+            let error = &result["error"][key];
+            assert!(error.as_f64().unwrap() > 0.0 && *error == estimate[of_all][i], "{i} {key}: {error}");
+        }
+    }
+    assert!(estimate["by_set"] != estimate["full_by_set"]);
+}
+
 #[test]
 fn what_cannot_be_is_refused_with_the_place_and_nothing_is_written() {
     for (from, to, expected) in [
         ("position = [0.5, 0.5, 0.5]", "position = [0.5, 0.5, 1.5]", "outside the body"),
+        ("position = [0.5, 0.5, 0.5]", "position = [0.5, 0.5, 1.0]", "on the surface of the body"),
+        (
+            "box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }",
+            "solid = { difference = [{ box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }, \
+             { box = { min = [-1.0, -1.0, -1.0], max = [2.0, 2.0, 2.0] } }] }",
+            "nothing is left of the body",
+        ),
         ("position = [0.5, 0.5, 0.5]", "position = [0.5, nan, 0.5]", "finite"),
         ("axis = [0.0, 0.0, -1.0]", "axis = [0.0, 0.0, 0.0]", "no direction"),
         ("of = \"all\"", "of = [[1, 9]]", "no paddle 9"),

@@ -1,7 +1,5 @@
 //! The live view as Foxglove and Lichtblick see it, through a client that is not ours.
 
-#![cfg(feature = "foxglove")]
-
 mod watcher;
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};

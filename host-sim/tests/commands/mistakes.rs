@@ -1,8 +1,6 @@
 //! Wrong things that a newcomer does: each ends with the exit code of bad input, says what and where or what to do,
 //! and writes nothing.
 
-mod missing;
-
 use std::path::Path;
 
 use assert_cmd::Command;
@@ -207,7 +205,7 @@ fn a_command_of_the_other_program_is_told_from_a_wrong_one() {
     let host_sim = Path::new(env!("CARGO_BIN_EXE_host-sim"));
     let model_offline = host_sim.with_file_name("model-offline");
     if !model_offline.is_file() {
-        return missing::skip(
+        return crate::missing::skip(
             "commands of the other program",
             "model-offline is not built: `cargo test --workspace` does",
         );

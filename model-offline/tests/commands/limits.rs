@@ -1,7 +1,5 @@
 //! Processes whose memory is limited end with a message, and are not ended.
 
-#![cfg(target_os = "linux")]
-
 use std::process::Command;
 
 /// The exit code and what was told of a command whose addresses are limited to so many megabytes.

@@ -1,12 +1,11 @@
 //! A run in space as other tools see it: its files read back, and held against the recording and against bodies that are
 //! solved here.
 
-mod scenes;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::scenes::with_pairs;
 use host_sim::record::recording::Recording;
 use host_sim::world::truth::{Truth, from_frame};
 use model_offline::geometry::Point;
@@ -15,7 +14,6 @@ use model_offline::model::space::surfaces::Surfaces;
 use model_offline::placement::space::workflow::coarse;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::solver::equilibrium::NewtonSettings;
-use scenes::with_pairs;
 use serde_json::Value;
 
 /// The paddles of the runs.

@@ -191,7 +191,7 @@ fn tables_are_of_one_paddle_or_two_that_there_are() {
 #[test]
 fn the_hash_is_of_what_the_numbers_depend_on() {
     use model_offline::scene::space::AnyScene;
-    let text = include_str!("../scenes/block.toml");
+    let text = include_str!("../../scenes/block.toml");
     let hash = |text: &str| match AnyScene::parse(text, "block.toml").unwrap() {
         AnyScene::Space(scene) => scene.hash(),
         AnyScene::Planar(_) => panic!("in space"),

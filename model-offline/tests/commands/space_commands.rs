@@ -58,7 +58,7 @@ fn balls_in_coarse_meshes_have_their_volume_roughly() {
     let folder = tempfile::tempdir().unwrap();
     assert_eq!(run(&["new", "--dimension", "3", "-o", "new.toml"], folder.path()).0, 0);
     let new = std::fs::read_to_string(folder.path().join("new.toml")).unwrap();
-    let mound = include_str!("../scenes/mound.toml");
+    let mound = include_str!("../../scenes/mound.toml");
     let cases: [(&str, &str, &[f64]); 4] =
         [(&new, "-1", &[8.0]), (&new, "0", &[8.0]), (mound, "0", &[6.0, 4.0]), (mound, "1", &[6.0, 4.0])];
     for (text, level, radii) in cases {
@@ -89,7 +89,7 @@ fn a_check_says_what_is_seldom_meant() {
         ),
     ] {
         let folder = tempfile::tempdir().unwrap();
-        let text = include_str!("../scenes/block.toml");
+        let text = include_str!("../../scenes/block.toml");
         assert!(text.contains(from));
         std::fs::write(folder.path().join("a.toml"), text.replacen(from, to, 1)).unwrap();
         let (code, told, said) = run(&["check", "a.toml", "--without-inclusion", "--json", "a.json"], folder.path());
@@ -98,14 +98,108 @@ fn a_check_says_what_is_seldom_meant() {
         assert!(warnings.contains(expected), "{warnings}");
     }
     // What cannot be is refused, as by `place`.
+    for (from, to, expected) in [
+        (
+            "min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]",
+            "min = [1.0, 0.2, 0.2], max = [1.0, 0.4, 0.4]",
+            "touches the immobile",
+        ),
+        (
+            "min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]",
+            "min = [0.5, 0.4, 1.0], max = [0.8, 0.6, 1.0]",
+            "touches the needle",
+        ),
+        (
+            "regions = [{ box = { min = [1.0, 0.0, 0.0]",
+            "regions = [{ box = { min = [0.0, 0.0, 0.0]",
+            "touches the immobile",
+        ),
+        (
+            "min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]",
+            "min = [-0.3, 0.2, 0.2], max = [-0.2, 0.4, 0.4]",
+            "about 0.2 from it",
+        ),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let text = include_str!("../../scenes/block.toml");
+        assert!(text.contains(from));
+        std::fs::write(folder.path().join("a.toml"), text.replacen(from, to, 1)).unwrap();
+        let (code, _, said) = run(&["check", "a.toml", "--json", "a.json"], folder.path());
+        let told = said.replace(['\n', '│'], " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(code == 2 && told.contains(expected) && !folder.path().join("a.json").exists(), "{to}: {said}");
+        assert_eq!(run(&["place", "a.toml", "--spacing", "0.2", "--quiet"], folder.path()), (2, String::new(), said));
+    }
     let folder = tempfile::tempdir().unwrap();
     let apart = "solid = { union = [{ box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }, \
                  { box = { min = [2.0, 0.0, 0.0], max = [3.0, 1.0, 1.0] } }] }";
-    let text = include_str!("../scenes/block.toml");
+    let text = include_str!("../../scenes/block.toml");
     let text = text.replacen("box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }", apart, 1);
     std::fs::write(folder.path().join("a.toml"), text).unwrap();
     let (code, _, said) = run(&["check", "a.toml", "--json", "a.json"], folder.path());
     assert!(code == 2 && said.contains("hangs on nothing") && !folder.path().join("a.json").exists(), "{said}");
+}
+
+/// What a scene of inclusions, supports and parts says of itself; `place` says it too.
+#[test]
+fn parts_supports_and_inclusions_that_are_hardly_meant_are_said() {
+    const BODY: &str = "box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] }";
+    const PART: &str = "box = { min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4] }";
+    const HELD: &str = "regions = [{ box = { min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }]";
+    let two = "solid = { union = [{ box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }, \
+               { box = { min = [-2.0, 0.0, 0.0], max = [-1.0, 1.0, 1.0] } }] }";
+    let both = "regions = [{ box = { min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }, \
+                { box = { min = [-2.0, 0.0, 0.0], max = [-1.0, 1.0, 0.0] } }]";
+    let beside = "min = [-1.0, 0.2, 0.2], max = [-1.0, 0.4, 0.4]";
+    let cases: [(&[(&str, &str)], &str); 5] = [
+        (&[(PART, "box = { min = [-1.0, -1.0, -1.0], max = [2.0, 2.0, 2.0] }")], "inclusion 1 is all of the body"),
+        (
+            &[(PART, "box = { min = [0.6, 0.4, -0.1], max = [0.7, 0.6, 0.1] }")],
+            "inclusion 1 is partly outside the body: 50 % of its volume",
+        ),
+        (
+            &[(HELD, "regions = [{ box = { min = [1.0, 0.5, 0.5], max = [1.0, 0.53, 0.53] } }]")],
+            "hardly anything holds the body: 0.0009 of its surface of 6",
+        ),
+        (
+            &[(BODY, two), (HELD, both), ("min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]", beside)],
+            "in 2 parts that no face joins (paddle 1 is on another than the target, and moves nothing of it)",
+        ),
+        // A body that is whole.
+        (&[], "no warnings"),
+    ];
+    for (changes, expected) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let text = include_str!("../../scenes/block.toml").replace("of = \"all\"", "of = []");
+        assert!(changes.iter().all(|(from, _)| text.contains(from)));
+        let text = changes.iter().fold(text, |text, (from, to)| text.replacen(from, to, 1));
+        std::fs::write(folder.path().join("a.toml"), text).unwrap();
+        let (code, told, said) = run(&["check", "a.toml"], folder.path());
+        assert!(code == 0 && told.contains(expected), "{expected}: {code} {told} {said}");
+        let options = ["place", "a.toml", "--integration", "fem-t4", "--spacing", "0.25", "--json", "a.json"];
+        let (code, told, said) = run(&options, folder.path());
+        let warnings = read("a.json", folder.path())["warnings"].to_string();
+        let is_whole = changes.is_empty();
+        assert!(code == 0 && (is_whole || told.contains(expected)), "{expected}: {code} {told} {said}");
+        assert!(if is_whole { warnings == "[]" } else { warnings.contains(expected) }, "{warnings}");
+    }
+}
+
+/// Of a ball elements with straight edges have less than all, and the check says how much.
+#[test]
+fn a_check_says_how_much_of_an_inclusion_is_in_elements() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../scenes/mound.toml").replacen("tolerance = 0.05", "level = 0", 1);
+    std::fs::write(folder.path().join("a.toml"), text).unwrap();
+    let (code, told, said) = run(&["check", "a.toml", "--json", "a.json"], folder.path());
+    assert_eq!((code, said.as_str()), (0, ""));
+    let check = read("a.json", folder.path());
+    for (inclusion, radius) in check["inclusions"].as_array().unwrap().iter().zip([6.0_f64, 4.0]) {
+        let whole = 4.0 / 3.0 * PI * radius.powi(3);
+        assert!((number(&inclusion["true_volume"]) / whole - 1.0).abs() < 0.01, "{inclusion}");
+        let share = (100.0 * number(&inclusion["volume"]) / whole).round();
+        let said = [-1.0, 0.0, 1.0].map(|by| format!("({} % of its own)", share + by));
+        assert!(share < 90.0 && said.iter().any(|said| told.contains(said)), "{share}: {told}");
+    }
 }
 
 /// A linear law's solution is the sum of what needle and paddles do, and those are what `place` finds.
@@ -114,7 +208,7 @@ fn a_solution_is_made_of_what_place_finds() {
     let folder = tempfile::tempdir().unwrap();
     let method = ["--integration", "fem-t10", "--spacing", "0.25", "--quiet", "--without-inclusion"];
     let law = "model = \"fung\"\nlambda = 383.0\nmu = 318.5\nc = 0.779\nlambda_c = 1.5\nmu_c = 1.0";
-    let text = include_str!("../scenes/block.toml");
+    let text = include_str!("../../scenes/block.toml");
     assert!(text.contains(law));
     let text = text.replacen(law, "model = \"linear\"\nlambda = 383.0\nmu = 318.5", 1);
     std::fs::write(folder.path().join("a.toml"), text).unwrap();

@@ -16,7 +16,7 @@ const HELD: &str = "min = [1.0, 0.0, 0.0], max = [1.0, 1.0, 1.0]";
 /// `block` on a coarse mesh, with replacements.
 fn block(changes: &[(&str, &str)]) -> String {
     let text =
-        include_str!("../scenes/block.toml").replacen("tolerance = 0.05", "level = 0\nintegration = \"fem-t4\"", 1);
+        include_str!("../../scenes/block.toml").replacen("tolerance = 0.05", "level = 0\nintegration = \"fem-t4\"", 1);
     let text = text.replacen("of = \"all\"", "of = [[1, 2], [3, 6]]", 1);
     changes.iter().fold(text, |text, (from, to)| {
         assert!(text.contains(from), "{from}");
@@ -173,4 +173,26 @@ fn an_angle_from_a_surface_is_the_solid() {
     }
     std::fs::write(folder.path().join("angle.obj"), obj).unwrap();
     assert_same("angle", &study(&text("surface = \"angle.obj\""), folder.path()), &expected);
+}
+
+/// A label that the body is to have and no voxel has is no reason to refuse, and is said.
+#[test]
+fn a_label_that_no_voxel_has_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    std::fs::copy(scenes.join("scan.nii.gz"), folder.path().join("scan.nii.gz")).unwrap();
+    let text = std::fs::read_to_string(scenes.join("scan.toml")).unwrap();
+    let check = |text: &str| {
+        std::fs::write(folder.path().join("scan.toml"), text).unwrap();
+        let output = Command::cargo_bin("model-offline").unwrap();
+        let output = { output }.current_dir(folder.path()).args(["check", "scan.toml"]).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned())
+    };
+    let note = "no voxel has the label 9 that the body is to have";
+    let (code, told) = check(&text);
+    assert!(code == Some(0) && !told.contains("no voxel has") && !told.contains("cut off flat"), "{told}");
+    let more = text.replacen("body = [", "body = [9, ", 1);
+    assert_ne!(more, text);
+    let (code, told) = check(&more);
+    assert!(code == Some(0) && told.contains(note), "{told}");
 }

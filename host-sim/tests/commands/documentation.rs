@@ -1,7 +1,6 @@
 //! Every command line of the README and of the guides is run, in the order of its page, in a folder of its own. Fenced blocks
 //! after a comment `<!-- not run by tests: WHY -->` are left out.
 
-mod missing;
 mod results;
 
 use std::path::{Path, PathBuf};
@@ -63,7 +62,7 @@ fn works(pages: &[PathBuf]) {
     let model_offline = Path::new(HOST_SIM).with_file_name("model-offline");
     if !model_offline.is_file() {
         let missing = "model-offline is not built; `cargo test --workspace` does, or `cargo build --workspace` before";
-        return missing::skip("every command shown", missing);
+        return crate::missing::skip("every command shown", missing);
     }
     for page in pages {
         let text = std::fs::read_to_string(page).unwrap();

@@ -122,7 +122,7 @@ scenes! {
 /// Nodes along a thin layer follow its width and its length: as near as its ends ask for, all along, none of these would end.
 #[test]
 fn a_thin_layer() {
-    check(include_str!("../scenes/layer.toml"));
+    check(include_str!("../../scenes/layer.toml"));
 }
 
 /// A band that is 9 times as long as wide and 10,000 times as stiff as what is around it asks for near nodes all along.

@@ -1,0 +1,357 @@
+//! Refinement of a body in space to a tolerance of its controllability measures.
+//!
+//! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
+//! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by the next coarser mesh. From a mesh to
+//! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
+//! is left; it is taken times [`SAFETY`]. The tetrahedra are refined no further than the model that is held against them needs.
+
+use super::rest::SpaceResponse;
+use super::workflow::{Discretised, SpaceErrorEstimate, at_level};
+use crate::discretization::{Integration, Method};
+use crate::model::space::SpaceModel;
+use crate::model::{DecidedBy, Faster, ModelError};
+use crate::placement::space::Controllability;
+use crate::scene::space::SpaceScene;
+use crate::solver::equilibrium::{Failure, FailureReason};
+
+/// A mesh is finer than another where every patch has so many times its nodes.
+const GROWN: f64 = 1.3;
+/// What a difference of two meshes is multiplied by.
+pub const SAFETY: f64 = 1.5;
+/// Share of the tolerance that the reference of another method may leave open at first.
+const FIRST_SHARE: f64 = 0.75;
+/// Where the method leaves at least this share to the reference, that is sharpened, and not the method's own nodes refined.
+const LEAST_SHARE: f64 = 0.25;
+/// Levels that refinement begins with, and ends with.
+pub(super) const LEVELS: std::ops::RangeInclusive<i32> = 0..=5;
+
+/// Relative distances of the controllability measures, by paddle and pair; 0 where neither controls the target, infinite where
+/// one does.
+pub fn distances(found: &[SpaceResponse], reference: &[SpaceResponse]) -> Vec<f64> {
+    distances_of(|controls| controls.measure, found, reference)
+}
+
+/// The same of what is read of a Jacobian.
+fn distances_of(read: fn(&Controllability) -> f64, found: &[SpaceResponse], reference: &[SpaceResponse]) -> Vec<f64> {
+    let value = |response: &SpaceResponse| response.controllability.as_ref().map(read);
+    let pairs = found.iter().zip(reference).filter_map(|(a, b)| value(a).zip(value(b)));
+    pairs.map(|(a, b)| distance(a, b)).collect()
+}
+
+fn distance(found: f64, reference: f64) -> f64 {
+    match [found, reference].map(f64::is_infinite) {
+        [true, true] => 0.0,
+        [false, false] => (found / reference - 1.0).abs(),
+        _ => f64::INFINITY,
+    }
+}
+
+/// What is left open on the finer of two meshes whose answers are so far apart. Two meshes may agree by accident (the pair 1 + 2 of
+/// `block` does): nothing is taken to be better than the median.
+fn estimates(distances: &[f64]) -> Vec<f64> {
+    let mut sorted: Vec<f64> = distances.iter().copied().filter(|d| d.is_finite()).collect();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    distances.iter().map(|d| SAFETY * d.max(median)).collect()
+}
+
+/// Indices of the paddles of every set that has a measure: of singles, then of pairs.
+fn sets(scene: &SpaceScene) -> impl Iterator<Item = Vec<u32>> {
+    let index = |at: usize| scene.paddles[at].index;
+    let singles = (0..scene.paddles.len()).map(move |paddle| vec![index(paddle)]);
+    singles.chain(scene.pairs.iter().map(move |pair| pair.map(index).to_vec()))
+}
+
+/// Whose estimate decides. Of equal estimates, as those that the median has raised, the one whose answers are farther apart.
+fn decided_by(scene: &SpaceScene, estimates: &[f64], apart: &[f64]) -> DecidedBy {
+    let mut all: Vec<_> = sets(scene).zip(estimates).zip(apart).collect();
+    all.sort_by(|a, b| b.1.total_cmp(a.1));
+    DecidedBy::measures(all.into_iter().map(|((paddles, &estimate), _)| (paddles, estimate)), None)
+}
+
+fn worst(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
+}
+
+/// Quadratic tetrahedra on a mesh, and what the next coarser one says of their errors.
+struct Reference {
+    model: SpaceModel,
+    rest: Vec<SpaceResponse>,
+    /// Estimated errors of the measures, and of the measures without axial motion, by set.
+    errors: Vec<f64>,
+    full: Vec<f64>,
+    decided_by: DecidedBy,
+    level: i32,
+}
+
+impl Reference {
+    fn open(&self) -> f64 {
+        worst(&self.errors)
+    }
+}
+
+/// Quadratic tetrahedra on finer and finer meshes.
+struct Ladder {
+    scene: SpaceScene,
+    /// The level that is next.
+    level: i32,
+    /// Nodes on patches and answers of the mesh before.
+    coarser: Option<(Vec<usize>, Vec<SpaceResponse>)>,
+    /// The reference of the least estimate.
+    best: Option<Reference>,
+    /// Why a mesh was left out, and what a finer one had no memory for.
+    failed: Option<ModelError>,
+    memory: Option<Box<str>>,
+    ended: bool,
+}
+
+impl Ladder {
+    fn new(scene: &SpaceScene) -> Self {
+        let scene = scene.with_method(Method::new(Integration::FemT10));
+        let level = *LEVELS.start() - 1;
+        Self { scene, level, coarser: None, best: None, failed: None, memory: None, ended: false }
+    }
+
+    fn open(&self) -> f64 {
+        self.best.as_ref().map_or(f64::INFINITY, Reference::open)
+    }
+
+    /// Goes on until the estimate is within `open`, or no finer mesh can be afforded.
+    ///
+    /// # Errors
+    /// [`ModelError`] where a mesh cannot be modelled for another reason than its size.
+    fn climb(&mut self, open: f64) -> Result<(), ModelError> {
+        while self.open() > open && !self.ended {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    /// The next mesh.
+    fn step(&mut self) -> Result<(), ModelError> {
+        let level = self.level;
+        self.level += 1;
+        self.ended = self.level > *LEVELS.end();
+        let (model, rest) = match at_level(&self.scene, level) {
+            Ok(found) => found,
+            // The coarsest meshes may not see every patch, the finest may not be affordable.
+            Err(error) if error.is_too_large() && self.coarser.is_some() => {
+                self.memory = error.missing_memory();
+                self.ended = true;
+                return Ok(());
+            }
+            Err(_) if self.coarser.is_none() && level <= *LEVELS.start() => return Ok(()),
+            // One level may meet what is near a surface badly where the next does not.
+            Err(error @ ModelError::Mesh(_)) => {
+                self.failed = Some(error);
+                return Ok(());
+            }
+            Err(error) => return Err(error),
+        };
+        let on_patches = model.nodes_on_patches();
+        if let Some((before, coarser)) = &self.coarser {
+            // Where a level's sizes change nothing on a patch, nothing is learnt of it: two answers with one error
+            // agree.
+            if before.iter().zip(&on_patches).any(|(before, now)| (*now as f64) < GROWN * *before as f64) {
+                return Ok(());
+            }
+            let apart = distances(coarser, &rest);
+            let errors = estimates(&apart);
+            if worst(&errors) < self.open() || self.best.is_none() {
+                let full = estimates(&distances_of(|controls| controls.full, coarser, &rest));
+                let decided_by = decided_by(&self.scene, &errors, &apart);
+                self.best = Some(Reference { model, rest: rest.clone(), errors, full, decided_by, level });
+            }
+        }
+        self.coarser = Some((on_patches, rest));
+        Ok(())
+    }
+
+    /// Why a tolerance cannot be kept with a reference that may take a share of it.
+    fn refusal(self, tolerance: f64, share: f64) -> ModelError {
+        match (self.best, self.memory) {
+            (Some(best), memory) => ModelError::ToleranceNotReached {
+                tolerance,
+                reached: best.open() / share,
+                decided_by: best.decided_by.scaled(1.0 / share),
+                memory,
+                faster: None,
+            },
+            // Without an estimate, no two meshes that could be afforded differ on every patch.
+            (None, Some(detail)) => {
+                Failure { reason: FailureReason::TooLarge, reached: 0.0, detail: detail.into() }.into()
+            }
+            (None, None) => self.failed.unwrap_or(ModelError::NothingToCompare),
+        }
+    }
+}
+
+/// Refines a scene's own method until the estimated errors of all measures are within the tolerance.
+///
+/// # Errors
+/// [`ModelError`], among them [`ModelError::ToleranceNotReached`].
+pub(super) fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
+    let mut ladder = Ladder::new(scene);
+    if scene.discretization.method.integration == Integration::FemT10 {
+        ladder.climb(tolerance)?;
+        return match ladder.best {
+            Some(best) if best.open() <= tolerance => Ok(Discretised::of_reference(best)),
+            _ => Err(ladder.refusal(tolerance, 1.0)),
+        };
+    }
+    ladder.climb(FIRST_SHARE * tolerance)?;
+    // Where no finer mesh can be had, what it leaves open may do all the same.
+    if ladder.open() > tolerance {
+        return Err(ladder.refusal(tolerance, FIRST_SHARE));
+    }
+    refine_against(&mut ladder, scene, tolerance)
+}
+
+impl Discretised {
+    fn of_reference(Reference { model, rest, errors, full, level, .. }: Reference) -> Self {
+        let controllability = worst(&errors);
+        let estimate = SpaceErrorEstimate {
+            controllability,
+            by_set: errors,
+            full_by_set: full,
+            reference: controllability,
+            reference_nodes: model.nodes(),
+            level,
+        };
+        Self { model, rest, estimate: Some(estimate) }
+    }
+}
+
+/// Refines a method's own nodes, or the reference, whichever stands in the way. There is a reference.
+fn refine_against(ladder: &mut Ladder, scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
+    let (mut best, mut memory): (Option<(f64, DecidedBy)>, _) = (None, None);
+    let mut level = *LEVELS.start();
+    while level <= *LEVELS.end() {
+        let (model, rest) = match at_level(scene, level) {
+            Ok(found) => found,
+            Err(error) if error.is_too_large() && best.is_some() => {
+                memory = error.missing_memory();
+                break;
+            }
+            Err(error) => return Err(error),
+        };
+        let mut apart = worst_apart(&rest, ladder);
+        // What the reference leaves open decides: the next mesh of tetrahedra costs less than the next level, and serves all to come.
+        while apart + ladder.open() > tolerance && apart <= (1.0 - LEAST_SHARE) * tolerance && !ladder.ended {
+            ladder.step()?;
+            apart = worst_apart(&rest, ladder);
+        }
+        let Some(reference) = &ladder.best else { break };
+        let add = |apart: Vec<f64>, open: &[f64]| apart.iter().zip(open).map(|(a, open)| a + open).collect::<Vec<_>>();
+        let errors = add(distances(&rest, &reference.rest), &reference.errors);
+        let controllability = worst(&errors);
+        if controllability <= tolerance {
+            let full = distances_of(|controls| controls.full, &rest, &reference.rest);
+            let estimate = SpaceErrorEstimate {
+                controllability,
+                by_set: errors,
+                full_by_set: add(full, &reference.full),
+                reference: reference.open(),
+                reference_nodes: reference.model.nodes(),
+                level,
+            };
+            return Ok(Discretised { model, rest, estimate: Some(estimate) });
+        }
+        if best.as_ref().is_none_or(|best| controllability < best.0) {
+            let apart = distances(&rest, &reference.rest);
+            best = Some((controllability, decided_by(scene, &errors, &apart)));
+        }
+        // The error falls with the size at the rims, which a level halves: levels that cannot do are not tried.
+        let left = apart / (tolerance - reference.open().min(0.5 * tolerance));
+        level += (left.log2().floor() as i32).clamp(1, 2);
+    }
+    let (reached, decided_by) = best.unwrap_or((f64::INFINITY, DecidedBy::Whole));
+    // The reference may keep what the method does not.
+    let faster = Box::new(Faster { integration: Integration::FemT10, reached: Some(ladder.open()) });
+    let faster = Some(faster).filter(|_| ladder.open() <= tolerance);
+    Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory, faster })
+}
+
+/// Worst distance of the measures from those of the best reference.
+fn worst_apart(found: &[SpaceResponse], ladder: &Ladder) -> f64 {
+    ladder.best.as_ref().map_or(f64::INFINITY, |reference| worst(&distances(found, &reference.rest)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measures_are_as_far_apart_one_way_as_the_other() {
+        assert_eq!(distance(f64::INFINITY, f64::INFINITY), 0.0);
+        assert!((distance(1.1, 1.0) - 0.1).abs() < 1e-12);
+        // One says that the target is controlled, and the other that it is not.
+        assert_eq!([distance(f64::INFINITY, 2.0), distance(2.0, f64::INFINITY)], [f64::INFINITY; 2]);
+        let with = |measure: f64| SpaceResponse {
+            jacobian: nalgebra::DMatrix::zeros(3, 3),
+            target_per_depth: nalgebra::Vector3::zeros(),
+            controllability: Some(crate::placement::space::Controllability { measure, ..unit() }),
+        };
+        let nobody = SpaceResponse { controllability: None, ..with(1.0) };
+        let found = distances(&[with(1.5), with(f64::INFINITY), nobody.clone()], &[with(1.0), with(3.0), nobody]);
+        assert_eq!(found, [0.5, f64::INFINITY]);
+    }
+
+    fn unit() -> crate::placement::space::Controllability {
+        let n = nalgebra::Matrix3x2::new(1.0, 0.0, 0.0, 1.0, 0.0, 0.0);
+        crate::placement::space::Controllability::of(&nalgebra::DMatrix::identity(3, 3), &n)
+    }
+
+    /// `block` has eight paddles and pairs of them.
+    #[test]
+    fn the_set_that_is_farthest_apart_decides() {
+        let scene = SpaceScene::bundled("block").unwrap();
+        let all: Vec<Vec<u32>> = sets(&scene).collect();
+        let mut apart = vec![0.01; all.len()];
+        apart[3] = 0.05;
+        let last = all.len() - 1;
+        apart[last] = 0.07;
+        let decided = decided_by(&scene, &estimates(&apart), &apart);
+        assert_eq!(decided, DecidedBy::Measure { paddles: all[last].clone(), others: Some(1.5 * 0.05) });
+        // Of two sets the median is the larger distance: both have one estimate, and the second has caused it.
+        let mut two = scene.clone();
+        two.paddles.truncate(2);
+        two.pairs.clear();
+        let apart = [0.01, 0.03];
+        let found = estimates(&apart);
+        assert_eq!(found[0], found[1]);
+        let DecidedBy::Measure { paddles, others } = decided_by(&two, &found, &apart) else { panic!() };
+        assert_eq!((paddles, others), (vec![two.paddles[1].index], Some(found[0])));
+        // One mesh says that the second paddle controls the target, and the other that it does not; the first agrees.
+        let apart = [0.01, f64::INFINITY];
+        let decided_by = decided_by(&two, &estimates(&apart), &apart);
+        let told = ModelError::ToleranceNotReached {
+            tolerance: 0.1,
+            reached: f64::INFINITY,
+            decided_by,
+            memory: None,
+            faster: None,
+        }
+        .to_string();
+        assert!(
+            told.contains("the best estimate is infinite (of the measure of paddle 2; 0.015 of all else)"),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn what_was_not_reached_is_told_with_what_may_be_asked_for() {
+        let decided_by = DecidedBy::Measure { paddles: vec![2, 5], others: Some(0.001) }.scaled(2.0);
+        let memory = Some("to factorise 9 unknowns".into());
+        let faster = Some(Box::new(Faster { integration: Integration::FemT10, reached: Some(0.0036) }));
+        let told = ModelError::ToleranceNotReached { tolerance: 0.004, reached: 0.0114, decided_by, memory, faster };
+        let text = told.to_string();
+        assert!(
+            text.contains(
+                "0.0114 (of the measure of paddles 2 + 5; 0.002 of all else); a finer model did not fit into memory (to factorise \
+                 9 unknowns); take a larger tolerance, leave that pair out of the scene, or --integration fem-t10, which reaches 0.0036"
+            ),
+            "{text}"
+        );
+    }
+}
