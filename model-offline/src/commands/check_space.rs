@@ -21,6 +21,8 @@ const ROUNDING: f64 = 1e-9;
 const FLAT: f64 = 3.0;
 /// An inclusion of which more than this share is outside of the body reaches out of it; less may be the sampling.
 const OUTSIDE: f64 = 0.02;
+/// Elements that have less than this share of an inclusion have less than all; more may be the sampling.
+const LESS: f64 = 0.95;
 /// An inclusion of this share of the body is all of it.
 const ALL: f64 = 0.999;
 /// Where less than this share of the surface is immobile, the body is hardly held.
@@ -88,7 +90,7 @@ pub(super) fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
         )
     }));
     all.extend(survey.inclusions.iter().filter(is_all).map(|inclusion| {
-        format!("inclusion {} is all of the body; give the body its stiffness, or make it smaller", inclusion.number)
+        format!("inclusion {} is all of the body; make the body of its tissue, or make it smaller", inclusion.number)
     }));
     let share = survey.immobile.area / survey.surface;
     all.extend((share < BARELY).then(|| {
@@ -99,13 +101,16 @@ pub(super) fn warnings(scene: &SpaceScene, survey: &Survey) -> Vec<String> {
         )
     }));
     all.extend((survey.parts > 1).then(|| {
-        let on: Vec<String> = survey.apart.iter().map(ToString::to_string).collect();
-        let paddles = match on.len() {
-            0 => String::new(),
-            _ => format!(" (paddle {} is on another than the target, and moves nothing of it)", on.join(", ")),
-        };
+        let paddles: Vec<String> = survey.apart.iter().map(ToString::to_string).collect();
+        let mut on: Vec<String> = survey.needle_apart.then(|| "the needle enters".to_owned()).into_iter().collect();
+        on.extend(match paddles.len() {
+            0 => None,
+            1 => Some(format!("paddle {} is on", paddles[0])),
+            _ => Some(format!("paddles {} are on", paddles.join(", "))),
+        });
+        let told = if on.is_empty() { String::new() } else { format!(" ({} another than the target)", on.join(", ")) };
         format!(
-            "the body is in {} parts that no face joins{paddles}; join them, or leave out what is not meant",
+            "the body is in {} parts that no face joins{told}; join them, or leave out what is not meant",
             survey.parts
         )
     }));
@@ -134,8 +139,8 @@ fn text(told: &Told<'_>, warnings: &[String]) -> String {
     row("target", told.target());
     for inclusion in &survey.inclusions {
         let (times, volume) = (short(inclusion.stiffness), told.volume(inclusion.volume));
-        let held = 100.0 * inclusion.volume / inclusion.true_volume;
-        let of_it = if held < 99.0 { format!(" ({held:.0} % of its own)") } else { String::new() };
+        let held = inclusion.sampled_volume.map(|own| inclusion.volume / own).filter(|held| *held < LESS);
+        let of_it = held.map_or_else(String::new, |held| format!(" ({:.0} % of its own)", 100.0 * held));
         let what = format!("stiffness times {times}; volume {volume}{of_it}, {} elements", inclusion.elements);
         row(&format!("inclusion {}", inclusion.number), what);
     }

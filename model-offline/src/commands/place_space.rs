@@ -6,6 +6,7 @@ use super::error::CliError;
 use super::json::write_json;
 use super::place_text::in_lengths_of;
 use model_offline::number::{decimals, length, smallest_told};
+use model_offline::parallel;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
 use model_offline::placement::space::{SpaceErrorEstimate, SpaceStudy};
 use model_offline::scene::space::SpaceScene;
@@ -29,9 +30,11 @@ pub(super) fn run(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Res
 fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), CliError> {
     let bar = StudyProgress::new(run, scene.discretization.resolution);
     let (begin, progress) = (|steps: u64| bar.begin(steps), || bar.step());
+    // Before the study: what is found out is written at once.
+    let is_told = json.is_some() || !run.quiet;
+    let warnings = if is_told { parallel::within(run.threads(), || warnings(scene)) } else { Vec::new() };
     let study = SpaceStudy::run(scene, run.threads(), &begin, &progress)?;
     bar.finish();
-    let warnings = warnings(scene);
     write_json(json, &document(&study, &warnings))?;
     if !run.quiet {
         for [a, b] in overlapping(&study) {
@@ -42,11 +45,24 @@ fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), C
     Ok(())
 }
 
-/// What is seldom meant in the scene, as `check` says it; that paddles overlap is told as it bears on the study.
+/// What is seldom meant in the scene, as `check` says it, but for what the study says better: that paddles overlap, and elements, which
+/// are others. What cannot be meshed at all is the study's to say.
 fn warnings(scene: &SpaceScene) -> Vec<String> {
     let Ok(mut survey) = check_space::survey(scene) else { return Vec::new() };
     survey.overlapping.clear();
+    survey.mesh.worst.clear();
     check_space::warnings(scene, &survey)
+}
+
+/// Estimated errors of one of the measures, by set.
+type OfSets = fn(&SpaceErrorEstimate) -> &Vec<f64>;
+
+fn by_set(estimate: &SpaceErrorEstimate) -> &Vec<f64> {
+    &estimate.by_set
+}
+
+fn full_by_set(estimate: &SpaceErrorEstimate) -> &Vec<f64> {
+    &estimate.full_by_set
 }
 
 fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
@@ -55,10 +71,11 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
     let results = paddles.as_array_mut().into_iter().flatten().chain(pairs.as_array_mut().into_iter().flatten());
     for (i, result) in results.enumerate() {
         let estimate = study.error_estimate.as_ref();
-        result["error"] = json!({
-            "controllability_measure": estimate.and_then(|estimate| estimate.by_set.get(i)),
-            "controllability_full": estimate.and_then(|estimate| estimate.full_by_set.get(i)),
-        });
+        for (key, of) in [("controllability_measure", by_set as OfSets), ("controllability_full", full_by_set)] {
+            // Nothing is known of a number that is none.
+            let error = estimate.and_then(|estimate| of(estimate).get(i)).filter(|_| !result[key].is_null());
+            result["error"][key] = json!(error);
+        }
     }
     json!({
         "scene": scene.name,
@@ -110,7 +127,7 @@ fn summary(study: &SpaceStudy) -> String {
     for i in order {
         let (paddles, answer) = &all[i];
         let estimate = study.error_estimate.as_ref();
-        let error = |of: fn(&SpaceErrorEstimate) -> &Vec<f64>, what: f64| {
+        let error = |of: OfSets, what: f64| {
             let error = estimate.and_then(|estimate| of(estimate).get(i)).filter(|_| what.is_finite());
             error.map_or(NONE.to_owned(), |&error| percent(error))
         };
@@ -120,9 +137,9 @@ fn summary(study: &SpaceStudy) -> String {
             named(paddles),
             measure(answer.controllability_measure),
             if [&placement.optimum.dynamic, &placement.optimum_single.dynamic].contains(&paddles) { '*' } else { ' ' },
-            error(|estimate| &estimate.by_set, answer.controllability_measure),
+            error(by_set, answer.controllability_measure),
             measure(answer.controllability_full),
-            error(|estimate| &estimate.full_by_set, answer.controllability_full),
+            error(full_by_set, answer.controllability_full),
             fixture(&answer.static_study, digits)
         );
     }

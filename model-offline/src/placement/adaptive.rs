@@ -215,7 +215,7 @@ fn refine_nodes(refinement: &mut Refinement, scene: &Scene, tolerance: f64) -> R
         }
     }
     let reached = best.map_or(f64::INFINITY, |b| b.worst());
-    let faster = Some(Box::new(Faster { integration: Integration::FemT6, reached: None }));
+    let faster = Some(Box::new(Faster { integration: Integration::FemT6, keeps: false }));
     Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory, faster })
 }
 

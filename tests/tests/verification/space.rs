@@ -133,10 +133,27 @@ fn a_tolerance_is_kept_and_its_estimate_is_no_smaller_than_the_error() {
         for (found, key, estimate) in [(controls.measure, "cm", of_measure), (controls.full, "cm_full", of_full)] {
             let error = found / limit[key].as_f64().unwrap() - 1.0;
             assert!(error.abs() < estimate + 0.003, "{} {key}: {error} {estimate}", limit["paddles"]);
+            assert!(*estimate < 0.1, "{} {key}: {estimate}", limit["paddles"]);
         }
     }
     println!("{error:.4} {}", estimate.controllability);
     assert!(error <= estimate.controllability + 0.003 && estimate.controllability <= 0.05, "{error} {estimate:?}");
+}
+
+/// The default rule is held against quadratic tetrahedra, which are refined as far as it needs.
+#[test]
+fn a_tolerance_of_the_default_rule_is_kept_with_what_its_reference_leaves_open() {
+    let (mut scene, limits) = case("block", false, Integration::ScniStabilised);
+    scene.discretization.resolution = Resolution::Tolerance(0.15);
+    let found = discretise(&scene).unwrap();
+    let estimate = found.estimate.unwrap();
+    println!("{} of which {}", estimate.controllability, estimate.reference);
+    assert!(estimate.controllability <= 0.15 && estimate.reference < estimate.controllability, "{estimate:?}");
+    let all = ["single", "pair"].into_iter().flat_map(|kind| limits[kind].as_array().unwrap());
+    for ((response, limit), estimate) in found.rest.iter().zip(all).zip(&estimate.by_set) {
+        let error = response.controllability.unwrap().measure / limit["cm"].as_f64().unwrap() - 1.0;
+        assert!(error.abs() < estimate + 0.003, "{}: {error} {estimate}", limit["paddles"]);
+    }
 }
 
 /// What attached paddles do, condensed, is what whole solves with them attached say: a single one, and a pair that touches.

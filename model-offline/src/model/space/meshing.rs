@@ -43,6 +43,8 @@ const DEEP: f64 = 0.1;
 /// many steps make better.
 const NEARBY: f64 = 0.03;
 const APPROACHES: usize = 30;
+/// Nearer than this share of the longest side they meet, but for rounding and what files leave open.
+const MEETS: f64 = 1e-4;
 /// Patches at an even spacing have at least this many edges across.
 const ACROSS: f64 = 3.0;
 
@@ -252,12 +254,16 @@ fn from_surface(scene: &SpaceScene, region: &dyn Implicit) -> Option<f64> {
     let body = scene.body.as_ref();
     let points = surface_points(body, body, &|_| NEARBY * extent(scene));
     let mut x = points.into_iter().min_by(|a, b| region.level(a).total_cmp(&region.level(b)))?;
+    let (near, mut least) = (MEETS * extent(scene), region.level(&x));
     // Towards the region, and back onto the surface.
     for _ in 0..APPROACHES {
         x -= region.gradient(&x) * region.level(&x).max(0.0);
         x -= body.gradient(&x) * body.level(&x);
+        if body.level(&x).abs() <= near {
+            least = least.min(region.level(&x));
+        }
     }
-    Some(region.level(&x)).filter(|distance| *distance > 0.0)
+    Some(least).filter(|distance| *distance > near)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use crate::discretization::meshing::surface_points;
 use crate::geometry::implicit::share;
 use crate::geometry::surface::Facets;
 use crate::geometry::{Implicit, Point};
+use crate::random::SplitMix64;
 use crate::scene::space::SpaceScene;
 
 /// What is farther away than this part of the edges there is no chord across a curved surface.
@@ -17,6 +18,8 @@ const LEAST: f64 = 0.1;
 const SEEN: f64 = 0.5;
 /// Volumes are sampled on grids of so many points along each side.
 const STEPS: i32 = 24;
+/// A volume is known from so many of them.
+const FEWEST: usize = 500;
 /// The surface of a mesh is nowhere farther from the body's than this part of the edges there: with eight edges around
 /// a bore it is at 0.1 of them.
 const SAG: f64 = 0.1;
@@ -113,7 +116,7 @@ fn is_free(scene: &SpaceScene, place: usize, x: &Point<3>) -> bool {
 }
 
 /// The volume of an inclusion in the body that no later one takes, sampled; length units cubed.
-pub(super) fn volume(scene: &SpaceScene, place: usize) -> f64 {
+fn volume(scene: &SpaceScene, place: usize) -> f64 {
     let region = &scene.inclusions[place].region;
     let Some((low, high)) = scene.body.bounds() else { return 0.0 };
     let (low, high) = region.bounds().map_or((low, high), |(l, h)| (low.sup(&l), high.inf(&h)));
@@ -122,10 +125,28 @@ pub(super) fn volume(scene: &SpaceScene, place: usize) -> f64 {
     (high - low).map(|side| side.max(0.0)).product() * inside as f64 / f64::from(STEPS).powi(3)
 }
 
-/// The part of an inclusion that is outside of the body, 0 to 1, sampled; none of what has no end.
+/// The same from a point anywhere in each cell of the grid, which layers and rods of any width and direction are known by to a few per
+/// cent; none where too few are in it.
+pub(super) fn sampled_volume(scene: &SpaceScene, place: usize) -> Option<f64> {
+    let region = &scene.inclusions[place].region;
+    let body = scene.body.bounds()?;
+    let (low, high) = region.bounds().map_or(body, |(l, h)| (body.0.sup(&l), body.1.inf(&h)));
+    let cell = (high - low) / f64::from(STEPS);
+    let mut random = SplitMix64(0);
+    let mut anywhere = |x: Point<3>| x + cell.map(|side| side * (random.unit() - 0.5));
+    let is_in = |x: &Point<3>| region.level(x) < 0.0 && scene.body.level(x) < 0.0 && is_free(scene, place, x);
+    let inside = samples(low, high).map(&mut anywhere).filter(is_in).count();
+    (inside >= FEWEST).then(|| cell.product() * inside as f64)
+}
+
+/// The part of an inclusion that is outside of the body, 0 to 1, sampled; none of what has no end, or is as long as the body: layers
+/// are meant to reach beyond it.
 pub(super) fn outside(scene: &SpaceScene, place: usize) -> f64 {
     let region = &scene.inclusions[place].region;
-    let Some((low, high)) = region.bounds() else { return 0.0 };
+    let Some(((low, high), body)) = region.bounds().zip(scene.body.bounds()) else { return 0.0 };
+    if (0..3).any(|k| low[k] <= body.0[k] && high[k] >= body.1[k]) {
+        return 0.0;
+    }
     let all: Vec<Point<3>> = samples(low, high).filter(|x| region.level(x) < 0.0).collect();
     let out = all.iter().filter(|x| scene.body.level(x) > 0.0).count();
     out as f64 / all.len().max(1) as f64
@@ -155,6 +176,23 @@ mod tests {
         *scene
     }
 
+    /// However thin and slanted: half of the block is above z = x, a layer of it 0.065 thick.
+    #[test]
+    fn layers_are_sampled_as_thick_as_they_are() {
+        let layer =
+            |from: f64| format!("{{ half_space = {{ point = [0.0, 0.0, {from:?}], normal = [0.0, 0.0, -1.0] }} }}");
+        let flat = format!("[[inclusion]]\nsolid = {}\nstiffness = 3.0\n", layer(0.935));
+        let slanted = "[[inclusion]]\nsolid = { half_space = { point = [0.0, 0.0, 0.0], normal = [1.0, 0.0, -1.0] } }\nstiffness = 3.0\n";
+        for (text, thick) in [(flat.as_str(), 0.065), (slanted, 0.5)] {
+            let found = sampled_volume(&scene(text), 0).unwrap();
+            assert!((found / thick - 1.0).abs() < 0.04, "{text}: {found}");
+            assert_eq!(outside(&scene(text), 0), 0.0);
+        }
+        // Too thin to say anything of it.
+        let wire = "[[inclusion]]\nsolid = { cylinder = { from = [0.2, 0.2, 0.2], to = [0.7, 0.7, 0.7], radius = 0.005 } }\nstiffness = 3.0\n";
+        assert_eq!(sampled_volume(&scene(wire), 0), None);
+    }
+
     /// A ball that a later box takes an eighth of, and one that half of is in the body.
     #[test]
     fn volumes_are_those_of_geometry() {
@@ -168,6 +206,10 @@ mod tests {
         let whole = 4.0 / 3.0 * std::f64::consts::PI * 1e-3;
         let found = [0, 1, 2].map(|place| (volume(&scene, place), outside(&scene, place)));
         let near = |a: f64, b: f64| (a - b).abs() < 0.01 * whole;
+        for (place, (volume, _)) in found.iter().enumerate() {
+            let sampled = sampled_volume(&scene, place).unwrap();
+            assert!((sampled / volume - 1.0).abs() < 0.02, "{place}: {sampled} {volume}");
+        }
         assert!(near(found[0].0, 7.0 / 8.0 * whole) && found[0].1 == 0.0, "{found:?}");
         assert!(near(found[1].0, 0.5 * whole) && (found[1].1 - 0.5).abs() < 0.01, "{found:?}");
         assert!((found[2].0 - 2e-3).abs() < 1e-12 && found[2].1 == 0.0, "{found:?}");

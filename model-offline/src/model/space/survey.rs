@@ -1,7 +1,7 @@
 //! What can be known of a scene in space without solving: its numbers, its mesh, and what of it is seldom meant.
 
 use super::patches::{Surface, nodes_of, parts};
-use super::seen::{BodySurface, outside, volume};
+use super::seen::{BodySurface, outside, sampled_volume};
 use super::{loose_part, overlapping, patches_of, touching};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::mesh::Element;
@@ -49,6 +49,8 @@ pub struct Survey {
     pub parts: usize,
     /// Paddles on another part than the target's, by index.
     pub apart: Vec<u32>,
+    /// Whether the needle enters another part than the target's.
+    pub needle_apart: bool,
     /// Why there is no model of this scene, although it can be looked at.
     #[serde(skip)]
     pub refused: Option<ModelError>,
@@ -104,9 +106,9 @@ pub struct InclusionSurvey {
     pub stiffness: f64,
     /// Its volume in elements with straight edges, without what later inclusions take.
     pub volume: f64,
-    /// The same of the inclusion itself, sampled.
-    pub true_volume: f64,
-    /// The part of it that is outside of the body, 0 to 1, sampled.
+    /// The same of the inclusion itself, sampled to a few per cent; none of what is too thin to be sampled.
+    pub sampled_volume: Option<f64>,
+    /// The part of it that is outside of the body, 0 to 1, sampled; 0 of what reaches across the body, as layers do.
     pub outside: f64,
     /// Elements that it has.
     pub elements: usize,
@@ -168,7 +170,7 @@ impl Survey {
                 number: i + 1,
                 stiffness: inclusion.stiffness,
                 volume: in_elements,
-                true_volume: volume(scene, i),
+                sampled_volume: sampled_volume(scene, i),
                 outside: outside(scene, i),
                 elements: own().count(),
             }
@@ -178,7 +180,8 @@ impl Survey {
             NeedleSurvey { contact: measured[1].clone(), axis: scene.needle.axis.into(), depth: scene.needle.depth };
         let paddles = scene.paddles.iter().zip(&measured[2..]);
         let overlapping = overlapping(scene, &patches);
-        let (parts, apart) = on_other_parts(scene, mesh, &patches[2..]);
+        let (parts, on_other) = on_other_parts(scene, mesh, &patches[1..]);
+        let apart = scene.paddles.iter().zip(&on_other[1..]).filter(|(_, is_apart)| **is_apart);
         let mut survey = Self {
             low: low.into(),
             high: high.into(),
@@ -192,7 +195,8 @@ impl Survey {
             mesh: MeshSurvey::of(scene, mesh, &volumes),
             overlapping: overlapping.iter().map(|pair| pair.map(|p| scene.paddles[p].index)).collect(),
             parts,
-            apart,
+            apart: apart.map(|(paddle, _)| paddle.index).collect(),
+            needle_apart: on_other[0],
             refused: refused(scene, mesh, &patches),
             warnings: Vec::new(),
         };
@@ -221,20 +225,29 @@ impl Survey {
     }
 }
 
-/// Parts of the body, and indices of the paddles that are not on the target's.
-fn on_other_parts(scene: &SpaceScene, mesh: &TetMesh, paddles: &[Vec<[u32; 3]>]) -> (usize, Vec<u32>) {
+/// Parts of the body, and which of some patches are not on the target's.
+fn on_other_parts(scene: &SpaceScene, mesh: &TetMesh, patches: &[Vec<[u32; 3]>]) -> (usize, Vec<bool>) {
     let part = parts(mesh);
     let count = part.iter().max().map_or(0, |last| *last as usize + 1);
-    let to_target = |node: &u32| (mesh.nodes[*node as usize] - scene.target).norm();
-    let near = |t: usize| mesh.tetrahedra[t].iter().map(to_target).sum::<f64>();
-    let target = (0..part.len()).min_by(|a, b| near(*a).total_cmp(&near(*b))).map(|t| part[t]);
-    let has = |triangle: &[u32; 3]| {
-        let at = mesh.tetrahedra.iter().position(|corners| triangle.iter().all(|node| corners.contains(node)));
-        at.map(|t| part[t])
+    if count <= 1 {
+        return (count, vec![false; patches.len()]);
+    }
+    // The target is a corner of the mesh.
+    let to_target = |t: usize| {
+        let corners = mesh.tetrahedra[t].iter().map(|node| (mesh.nodes[*node as usize] - scene.target).norm());
+        corners.fold(f64::INFINITY, f64::min)
     };
-    let is_apart = |patch: &Vec<[u32; 3]>| count > 1 && patch.iter().all(|triangle| has(triangle) != target);
-    let apart = scene.paddles.iter().zip(paddles).filter(|(_, patch)| is_apart(patch));
-    (count, apart.map(|(paddle, _)| paddle.index).collect())
+    let target = (0..part.len()).min_by(|a, b| to_target(*a).total_cmp(&to_target(*b))).map(|t| part[t]);
+    let sorted = |mut triangle: [u32; 3]| {
+        triangle.sort_unstable();
+        triangle
+    };
+    let mut of: BTreeMap<[u32; 3], u32> = BTreeMap::new();
+    for (&[a, b, c, d], part) in mesh.tetrahedra.iter().zip(&part) {
+        of.extend([[a, b, c], [a, b, d], [a, c, d], [b, c, d]].map(|face| (sorted(face), *part)));
+    }
+    let is_apart = |patch: &Vec<[u32; 3]>| patch.iter().all(|face| of.get(&sorted(*face)).copied() != target);
+    (count, patches.iter().map(is_apart).collect())
 }
 
 /// Why patches cannot move as they should: of elements with straight edges, whose corners any rule holds.

@@ -3,7 +3,7 @@
 //! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
 //! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by the next coarser mesh. From a mesh to
 //! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
-//! is left; it is taken times [`SAFETY`]. The tetrahedra are refined no further than the model that is held against them needs.
+//! is left; it is taken times [`SAFETY`].
 
 use super::rest::SpaceResponse;
 use super::workflow::{Discretised, SpaceErrorEstimate, at_level};
@@ -73,9 +73,9 @@ fn worst(errors: &[f64]) -> f64 {
     errors.iter().copied().fold(0.0, f64::max)
 }
 
-/// Quadratic tetrahedra on a mesh, and what the next coarser one says of their errors.
+/// What quadratic tetrahedra answer on a mesh, and what the next coarser one says of the errors.
 struct Reference {
-    model: SpaceModel,
+    nodes: usize,
     rest: Vec<SpaceResponse>,
     /// Estimated errors of the measures, and of the measures without axial motion, by set.
     errors: Vec<f64>,
@@ -97,8 +97,11 @@ struct Ladder {
     level: i32,
     /// Nodes on patches and answers of the mesh before.
     coarser: Option<(Vec<usize>, Vec<SpaceResponse>)>,
-    /// The reference of the least estimate.
-    best: Option<Reference>,
+    /// The finest of which something is known: where it contradicts what coarser ones agreed on, that was by accident.
+    finest: Option<Reference>,
+    /// Its model, where it is wanted: the next one needs the room.
+    model: Option<SpaceModel>,
+    wants_model: bool,
     /// Why a mesh was left out, and what a finer one had no memory for.
     failed: Option<ModelError>,
     memory: Option<Box<str>>,
@@ -106,20 +109,21 @@ struct Ladder {
 }
 
 impl Ladder {
-    fn new(scene: &SpaceScene) -> Self {
+    fn new(scene: &SpaceScene, wants_model: bool) -> Self {
         let scene = scene.with_method(Method::new(Integration::FemT10));
         let level = *LEVELS.start() - 1;
-        Self { scene, level, coarser: None, best: None, failed: None, memory: None, ended: false }
+        let (coarser, finest, model, failed, memory) = (None, None, None, None, None);
+        Self { scene, level, coarser, finest, model, wants_model, failed, memory, ended: false }
     }
 
     fn open(&self) -> f64 {
-        self.best.as_ref().map_or(f64::INFINITY, Reference::open)
+        self.finest.as_ref().map_or(f64::INFINITY, Reference::open)
     }
 
-    /// Goes on until the estimate is within `open`, or no finer mesh can be afforded.
+    /// Goes on until the estimate is within `open`, or no finer mesh can be had.
     ///
     /// # Errors
-    /// [`ModelError`] where a mesh cannot be modelled for another reason than its size.
+    /// [`ModelError`] where a mesh cannot be modelled for another reason than its size, and nothing is known yet.
     fn climb(&mut self, open: f64) -> Result<(), ModelError> {
         while self.open() > open && !self.ended {
             self.step()?;
@@ -132,6 +136,7 @@ impl Ladder {
         let level = self.level;
         self.level += 1;
         self.ended = self.level > *LEVELS.end();
+        self.model = None;
         let (model, rest) = match at_level(&self.scene, level) {
             Ok(found) => found,
             // The coarsest meshes may not see every patch, the finest may not be affordable.
@@ -146,6 +151,12 @@ impl Ladder {
                 self.failed = Some(error);
                 return Ok(());
             }
+            // What is known already is not lost.
+            Err(error) if self.finest.is_some() => {
+                self.failed = Some(error);
+                self.ended = true;
+                return Ok(());
+            }
             Err(error) => return Err(error),
         };
         let on_patches = model.nodes_on_patches();
@@ -157,11 +168,11 @@ impl Ladder {
             }
             let apart = distances(coarser, &rest);
             let errors = estimates(&apart);
-            if worst(&errors) < self.open() || self.best.is_none() {
-                let full = estimates(&distances_of(|controls| controls.full, coarser, &rest));
-                let decided_by = decided_by(&self.scene, &errors, &apart);
-                self.best = Some(Reference { model, rest: rest.clone(), errors, full, decided_by, level });
-            }
+            let full = estimates(&distances_of(|controls| controls.full, coarser, &rest));
+            let decided_by = decided_by(&self.scene, &errors, &apart);
+            let nodes = model.nodes();
+            self.finest = Some(Reference { nodes, rest: rest.clone(), errors, full, decided_by, level });
+            self.model = Some(model).filter(|_| self.wants_model);
         }
         self.coarser = Some((on_patches, rest));
         Ok(())
@@ -169,11 +180,11 @@ impl Ladder {
 
     /// Why a tolerance cannot be kept with a reference that may take a share of it.
     fn refusal(self, tolerance: f64, share: f64) -> ModelError {
-        match (self.best, self.memory) {
-            (Some(best), memory) => ModelError::ToleranceNotReached {
+        match (self.finest, self.memory) {
+            (Some(finest), memory) => ModelError::ToleranceNotReached {
                 tolerance,
-                reached: best.open() / share,
-                decided_by: best.decided_by.scaled(1.0 / share),
+                reached: finest.open() / share,
+                decided_by: finest.decided_by.scaled(1.0 / share),
                 memory,
                 faster: None,
             },
@@ -191,12 +202,13 @@ impl Ladder {
 /// # Errors
 /// [`ModelError`], among them [`ModelError::ToleranceNotReached`].
 pub(super) fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
-    let mut ladder = Ladder::new(scene);
-    if scene.discretization.method.integration == Integration::FemT10 {
+    let is_reference = scene.discretization.method.integration == Integration::FemT10;
+    let mut ladder = Ladder::new(scene, is_reference);
+    if is_reference {
         ladder.climb(tolerance)?;
-        return match ladder.best {
-            Some(best) if best.open() <= tolerance => Ok(Discretised::of_reference(best)),
-            _ => Err(ladder.refusal(tolerance, 1.0)),
+        return match (ladder.finest.take_if(|finest| finest.open() <= tolerance), ladder.model.take()) {
+            (Some(finest), Some(model)) => Ok(Discretised::of_reference(finest, model)),
+            (finest, _) => Err(Ladder { finest: finest.or(ladder.finest.take()), ..ladder }.refusal(tolerance, 1.0)),
         };
     }
     ladder.climb(FIRST_SHARE * tolerance)?;
@@ -208,18 +220,40 @@ pub(super) fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, 
 }
 
 impl Discretised {
-    fn of_reference(Reference { model, rest, errors, full, level, .. }: Reference) -> Self {
+    fn of_reference(Reference { nodes, rest, errors, full, level, .. }: Reference, model: SpaceModel) -> Self {
         let controllability = worst(&errors);
         let estimate = SpaceErrorEstimate {
             controllability,
             by_set: errors,
             full_by_set: full,
             reference: controllability,
-            reference_nodes: model.nodes(),
+            reference_nodes: nodes,
             level,
         };
         Self { model, rest, estimate: Some(estimate) }
     }
+}
+
+/// Estimated errors of answers that are held against a reference: how far they are from it, and what it leaves open.
+struct Held {
+    errors: Vec<f64>,
+    apart: Vec<f64>,
+    open: f64,
+}
+
+impl Held {
+    fn against(reference: &Reference, found: &[SpaceResponse]) -> Self {
+        let apart = distances(found, &reference.rest);
+        Self { errors: sums(&apart, &reference.errors), apart, open: reference.open() }
+    }
+
+    fn worst(&self) -> f64 {
+        worst(&self.errors)
+    }
+}
+
+fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
 /// Refines a method's own nodes, or the reference, whichever stands in the way. There is a reference.
@@ -235,46 +269,41 @@ fn refine_against(ladder: &mut Ladder, scene: &SpaceScene, tolerance: f64) -> Re
             }
             Err(error) => return Err(error),
         };
-        let mut apart = worst_apart(&rest, ladder);
-        // What the reference leaves open decides: the next mesh of tetrahedra costs less than the next level, and serves all to come.
-        while apart + ladder.open() > tolerance && apart <= (1.0 - LEAST_SHARE) * tolerance && !ladder.ended {
+        let held = loop {
+            let Some(reference) = &ladder.finest else { return Err(ModelError::NothingToCompare) };
+            let held = Held::against(reference, &rest);
+            // Where what the reference leaves open decides, a sharper one serves all levels to come.
+            let is_own = worst(&held.apart) > (1.0 - LEAST_SHARE) * tolerance;
+            if held.worst() <= tolerance {
+                let full = distances_of(|controls| controls.full, &rest, &reference.rest);
+                let estimate = SpaceErrorEstimate {
+                    controllability: held.worst(),
+                    by_set: held.errors,
+                    full_by_set: sums(&full, &reference.full),
+                    reference: reference.open(),
+                    reference_nodes: reference.nodes,
+                    level,
+                };
+                return Ok(Discretised { model, rest, estimate: Some(estimate) });
+            }
+            if is_own || ladder.ended {
+                break held;
+            }
             ladder.step()?;
-            apart = worst_apart(&rest, ladder);
-        }
-        let Some(reference) = &ladder.best else { break };
-        let add = |apart: Vec<f64>, open: &[f64]| apart.iter().zip(open).map(|(a, open)| a + open).collect::<Vec<_>>();
-        let errors = add(distances(&rest, &reference.rest), &reference.errors);
-        let controllability = worst(&errors);
-        if controllability <= tolerance {
-            let full = distances_of(|controls| controls.full, &rest, &reference.rest);
-            let estimate = SpaceErrorEstimate {
-                controllability,
-                by_set: errors,
-                full_by_set: add(full, &reference.full),
-                reference: reference.open(),
-                reference_nodes: reference.model.nodes(),
-                level,
-            };
-            return Ok(Discretised { model, rest, estimate: Some(estimate) });
-        }
-        if best.as_ref().is_none_or(|best| controllability < best.0) {
-            let apart = distances(&rest, &reference.rest);
-            best = Some((controllability, decided_by(scene, &errors, &apart)));
+        };
+        if best.as_ref().is_none_or(|best| held.worst() < best.0) {
+            best = Some((held.worst(), decided_by(scene, &held.errors, &held.apart)));
         }
         // The error falls with the size at the rims, which a level halves: levels that cannot do are not tried.
-        let left = apart / (tolerance - reference.open().min(0.5 * tolerance));
+        let left = worst(&held.apart) / (tolerance - held.open.min(0.5 * tolerance));
         level += (left.log2().floor() as i32).clamp(1, 2);
     }
     let (reached, decided_by) = best.unwrap_or((f64::INFINITY, DecidedBy::Whole));
     // The reference may keep what the method does not.
-    let faster = Box::new(Faster { integration: Integration::FemT10, reached: Some(ladder.open()) });
+    let faster = Box::new(Faster { integration: Integration::FemT10, keeps: true });
     let faster = Some(faster).filter(|_| ladder.open() <= tolerance);
+    let memory = memory.or_else(|| ladder.memory.take());
     Err(ModelError::ToleranceNotReached { tolerance, reached, decided_by, memory, faster })
-}
-
-/// Worst distance of the measures from those of the best reference.
-fn worst_apart(found: &[SpaceResponse], ladder: &Ladder) -> f64 {
-    ladder.best.as_ref().map_or(f64::INFINITY, |reference| worst(&distances(found, &reference.rest)))
 }
 
 #[cfg(test)]
@@ -339,19 +368,41 @@ mod tests {
         );
     }
 
+    fn ladder(errors: &[f64], memory: Option<&str>) -> Ladder {
+        let mut scene = SpaceScene::bundled("block").unwrap();
+        scene.paddles.truncate(2);
+        scene.pairs.clear();
+        let mut ladder = Ladder::new(&scene, false);
+        let decided_by = decided_by(&scene, errors, errors);
+        let errors = errors.to_vec();
+        ladder.finest =
+            Some(Reference { nodes: 9, rest: Vec::new(), full: errors.clone(), errors, decided_by, level: 1 });
+        ladder.memory = memory.map(Into::into);
+        ladder
+    }
+
+    /// What a share of the tolerance was not enough for is told as the tolerance that would have been.
     #[test]
-    fn what_was_not_reached_is_told_with_what_may_be_asked_for() {
-        let decided_by = DecidedBy::Measure { paddles: vec![2, 5], others: Some(0.001) }.scaled(2.0);
-        let memory = Some("to factorise 9 unknowns".into());
-        let faster = Some(Box::new(Faster { integration: Integration::FemT10, reached: Some(0.0036) }));
-        let told = ModelError::ToleranceNotReached { tolerance: 0.004, reached: 0.0114, decided_by, memory, faster };
-        let text = told.to_string();
+    fn a_refusal_says_what_could_be_kept() {
+        let refused = ladder(&[0.006, 0.0015], Some("to factorise 9 unknowns")).refusal(0.004, FIRST_SHARE);
+        let ModelError::ToleranceNotReached { tolerance, reached, .. } = &refused else { panic!("{refused}") };
+        assert!(*tolerance == 0.004 && (reached - 0.008).abs() < 1e-12, "{tolerance} {reached}");
+        let text = refused.to_string();
         assert!(
             text.contains(
-                "0.0114 (of the measure of paddles 2 + 5; 0.002 of all else); a finer model did not fit into memory (to factorise \
-                 9 unknowns); take a larger tolerance, leave that pair out of the scene, or --integration fem-t10, which reaches 0.0036"
-            ),
+                "the best estimate is 0.008 (of the measure of paddle 1; 0.002 of all else); a finer model did not fit into memory \
+                 (to factorise 9 unknowns); take a larger tolerance, leave that paddle out of the scene"
+            ) && !text.contains("--integration"),
             "{text}"
         );
+        // Nobody knows anything.
+        let nothing = |memory: Option<&str>| Ladder { finest: None, ..ladder(&[], memory) }.refusal(0.1, 1.0);
+        assert_eq!(nothing(None), ModelError::NothingToCompare);
+        assert!(nothing(Some("for 9 unknowns")).is_too_large());
+        let faster = Some(Box::new(Faster { integration: Integration::FemT10, keeps: true }));
+        let decided_by = DecidedBy::Whole;
+        let told = ModelError::ToleranceNotReached { tolerance: 0.1, reached: 0.2, decided_by, memory: None, faster }
+            .to_string();
+        assert!(told.ends_with("take a larger tolerance, or --integration fem-t10, which keeps it"), "{told}");
     }
 }

@@ -152,7 +152,8 @@ impl<'a> Bodies<'a> {
         let read = import::labels(&self.folder.join(file.get()));
         let read = read.map_err(|wrong| self.unreadable(file, &wrong, "a NIfTI or NRRD file"))?;
         self.note(file.get(), read.notes);
-        for count in read.value.counts().iter().take(TOLD) {
+        let counts = read.value.counts();
+        for count in counts.iter().take(TOLD) {
             let name = count.name.as_ref().map_or_else(String::new, |name| format!(" ({name})"));
             let told = format!("label {}{name}: {} voxels, {:.0} mm³", count.label, count.voxels, count.volume);
             self.note(file.get(), [told]);
@@ -165,7 +166,7 @@ impl<'a> Bodies<'a> {
             LabelSet::Several(labels) => labels.iter().copied().collect(),
         };
         let region = self.region_of(&read.value, &wanted, body.span())?;
-        let absent = wanted.iter().filter(|label| !read.value.counts().iter().any(|count| count.label == **label));
+        let absent = wanted.iter().filter(|label| !counts.iter().any(|count| count.label == **label));
         self.note(file.get(), absent.map(|label| format!("no voxel has the label {label} that the body is to have")));
         if read.value.reaches_edge(&wanted) {
             let told = "the body reaches the edge of the image, where it is cut off flat".to_owned();
