@@ -63,6 +63,10 @@ impl<'m> Surface<'m> {
         });
         let ends = once.into_iter().filter(|(_, once)| *once);
         let quarter = ends.map(|((a, b), _)| (at(b) - at(a)).norm()).sum::<f64>() / 4.0;
+        // What has no rim, as the whole of a surface or of a void's, has no ends.
+        if quarter == 0.0 {
+            return f64::INFINITY;
+        }
         // The sides are the roots of s² − 2 s · quarter + area; discs have none.
         let side = quarter - (quarter * quarter - area).max(0.0).sqrt();
         let corners = || patch.iter().flatten().map(|n| at(*n));

@@ -189,7 +189,7 @@ mod tests {
             assert_eq!(outside(&scene(text), 0), 0.0);
         }
         // Too thin to say anything of it.
-        let wire = "[[inclusion]]\nsolid = { cylinder = { from = [0.2, 0.2, 0.2], to = [0.7, 0.7, 0.7], radius = 0.005 } }\nstiffness = 3.0\n";
+        let wire = "[[inclusion]]\nsolid = { cylinder = { from = [0.2, 0.2, 0.2], to = [0.7, 0.7, 0.7], radius = 0.02 } }\nstiffness = 3.0\n";
         assert_eq!(sampled_volume(&scene(wire), 0), None);
     }
 

@@ -1,6 +1,7 @@
 //! Placement in space: single paddles and pairs, at rest and along the insertion.
 
 pub mod controllability;
+pub mod discretised;
 pub mod holding;
 pub mod insertion;
 mod refinement;
@@ -9,7 +10,8 @@ pub mod study;
 pub mod workflow;
 
 pub use controllability::Controllability;
+pub use discretised::{Discretised, SpaceErrorEstimate};
 pub use insertion::InsertionModel;
 pub use refinement::{SAFETY, distances};
 pub use study::SpacePlacement;
-pub use workflow::{SpaceErrorEstimate, SpaceStudy};
+pub use workflow::SpaceStudy;

@@ -5,8 +5,8 @@
 //! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
 //! is left; it is taken times [`SAFETY`].
 
+use super::discretised::{Discretised, SpaceErrorEstimate, at_level};
 use super::rest::SpaceResponse;
-use super::workflow::{Discretised, SpaceErrorEstimate, at_level};
 use crate::discretization::{Integration, Method};
 use crate::model::space::SpaceModel;
 use crate::model::{DecidedBy, Faster, ModelError};

@@ -66,6 +66,7 @@ impl Validator<'_> {
             )
         })?;
         let size = self.size(low, high)?;
+        let target = self.target(body.as_ref())?;
         let onto = |region: Solid| region.onto(body.as_ref(), DIGITS * size);
         let mut needle = self.needle(size)?;
         needle.region = onto(needle.region);
@@ -80,7 +81,7 @@ impl Validator<'_> {
             name: file.scene.name.clone(),
             length_unit: file.scene.units.length.clone(),
             stress_unit: file.scene.units.stress.clone(),
-            target: self.target(body.as_ref())?,
+            target,
             material: self.material(&file.material)?,
             inclusions,
             notes: bodies.notes,

@@ -7,7 +7,7 @@ use crate::material::{Law, Material as _, MaterialError};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
 use crate::model::space::meshing::even_mesh;
-use crate::placement::space::workflow::affordable;
+use crate::placement::space::discretised::affordable;
 use crate::scene::space::SpaceScene;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::PI;
