@@ -43,7 +43,7 @@ fn check(scene: &SpaceScene, file: Option<&Path>) -> Result<(), CliError> {
     document["dimension"] = json!(3);
     document["tissue"] = json!(scene.tissue());
     document["units"] = json!({ "length": scene.length_unit, "stress": scene.stress_unit });
-    document["integration"] = json!(scene.discretization.method.integration);
+    document["integration"] = json!(scene.for_placement().discretization.method.integration);
     document["notes"] = json!(scene.notes);
     document["warnings"] = json!(warnings);
     write_json(file, &document)?;
@@ -249,12 +249,14 @@ impl Told<'_> {
     }
 
     fn method(&self) -> String {
-        let integration = self.scene.discretization.method.integration;
+        let method = |scene: &SpaceScene| scene.discretization.method.integration;
+        let (own, placement) = (method(self.scene), method(&self.scene.for_placement()));
+        let followed = if own == placement { String::new() } else { format!(" for placement, {own} for insertions") };
         match self.scene.discretization.resolution {
             Resolution::Tolerance(tolerance) => {
-                format!("{integration}; refined from here to {} %", short(100.0 * tolerance))
+                format!("{placement}{followed}; refined from here to {} %", short(100.0 * tolerance))
             }
-            _ => integration.to_string(),
+            _ => placement.to_string(),
         }
     }
 }

@@ -210,6 +210,7 @@ impl DiscretizationArgs {
         }
         spec.method.support = self.support.unwrap_or(spec.method.support);
         spec.method.basis = self.basis.unwrap_or(spec.method.basis);
+        scene.names_method |= self.integration.is_some() || self.support.is_some() || self.basis.is_some();
         scene.check_discretization()?;
         Ok(scene)
     }

@@ -112,10 +112,11 @@ fn summary(study: &SpaceStudy) -> String {
     let studies = all.iter().map(|(_, answer)| &answer.static_study).chain([&placement.no_paddle.static_study]);
     let digits = decimals(smallest_told(studies.map(|study| study.max_orthogonal)), 6);
     let mut out = format!(
-        "{} · {} tissue · {} nodes · {:.1} s{}\n\n paddles   1/σ_min(NᵀJ)        ±      ‖J⁺N‖        ±   max orthogonal (static)\n",
+        "{} · {} tissue · {} nodes ({}) · {:.1} s{}\n\n paddles   1/σ_min(NᵀJ)        ±      ‖J⁺N‖        ±   max orthogonal (static)\n",
         scene.name,
         scene.tissue(),
         study.model.nodes(),
+        scene.discretization.method.integration,
         study.wall_s,
         in_lengths_of(&scene.length_unit)
     );

@@ -1,6 +1,9 @@
 //! `check`, `solve` and `new` of scenes in space.
 
 use assert_cmd::Command;
+use model_offline::discretization::Resolution;
+use model_offline::placement::space::workflow::insertion_model;
+use model_offline::scene::space::AnyScene;
 use roxmltree::Document;
 use serde_json::{Value, json};
 use std::f64::consts::PI;
@@ -257,6 +260,54 @@ fn a_solution_is_made_of_what_place_finds() {
     let work = 0.5 * 0.02 * number(&alone["base_force"]);
     assert!((work / number(&alone["strain_energy"]) - 1.0).abs() < 1e-9 && work > 0.0, "{work}");
     assert_eq!(alone["jacobian"], Value::Null);
+}
+
+/// What a tolerance alone asks for is kept by quadratic tetrahedra, as in tables; whoever names a method or a resolution has it, and
+/// what follows the needle is meshfree.
+#[test]
+fn placement_takes_quadratic_tetrahedra_where_a_tolerance_is_all_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = include_str!("../../scenes/block.toml").replace("increments = 5", "increments = 1");
+    let from = |index: u32| text.find(&format!("[[paddle]]\nindex = {index}\n")).unwrap();
+    // Paddle 3, which is symmetric about the needle, alone.
+    let alone = format!("{}{}{}", &text[..from(1)], &text[from(3)..from(4)], &text[text.find("[pairs]").unwrap()..]);
+    for (file, added) in [("plain", ""), ("named", "integration = \"mscni\"\n"), ("supported", "support = 1.3\n")] {
+        std::fs::write(folder.path().join(format!("{file}.toml")), format!("{alone}{added}")).unwrap();
+    }
+    for (file, options, expected) in [
+        ("plain.toml", &[][..], "fem-t10"),
+        ("plain.toml", &["--tolerance", "0.2"], "fem-t10"),
+        ("plain.toml", &["--integration", "scni-stabilised"], "scni-stabilised"),
+        ("plain.toml", &["--support", "1.3"], "scni-stabilised"),
+        ("plain.toml", &["--spacing", "0.25"], "scni-stabilised"),
+        ("named.toml", &[], "mscni"),
+        ("supported.toml", &[], "scni-stabilised"),
+    ] {
+        let (code, told, said) = run(&[&["check", file, "--json", "c.json"], options].concat(), folder.path());
+        assert_eq!((code, said.as_str()), (0, ""), "{file} {options:?}");
+        assert_eq!(read("c.json", folder.path())["integration"], expected, "{file} {options:?}");
+        let both = expected == "fem-t10";
+        assert_eq!(told.contains("fem-t10 for placement, scni-stabilised for insertions"), both, "{told}");
+    }
+    let solve = ["solve", "plain.toml", "--depth", "0.01", "--tolerance", "0.5", "--json", "solve.json", "--quiet"];
+    assert_eq!(run(&solve, folder.path()), (0, String::new(), String::new()));
+    assert_eq!(read("solve.json", folder.path())["integration"], "scni-stabilised");
+    let place = ["place", "plain.toml", "--tolerance", "0.2", "--json", "place.json"];
+    let (code, told, said) = run(&place, folder.path());
+    assert_eq!((code, said.as_str()), (0, ""));
+    let place = read("place.json", folder.path());
+    assert_eq!(place["integration"], "fem-t10");
+    assert!(told.contains(&format!("{} nodes (fem-t10)", place["nodes"])), "{told}");
+    // A table of the same scene begins with the same Jacobian.
+    let AnyScene::Space(mut scene) = AnyScene::parse(&alone, "plain").unwrap() else { panic!("in space") };
+    scene.discretization.resolution = Resolution::Tolerance(0.2);
+    let of_tables = insertion_model(&scene).unwrap();
+    let jacobian = &of_tables.rest()[0].jacobian;
+    for (i, row) in place["paddles"][0]["jacobian"].as_array().unwrap().iter().enumerate() {
+        for (j, found) in row.as_array().unwrap().iter().enumerate() {
+            assert_eq!(number(found).to_bits(), jacobian[(i, j)].to_bits(), "{i} {j}");
+        }
+    }
 }
 
 fn array(document: &Document<'_>, name: &str) -> Vec<f64> {

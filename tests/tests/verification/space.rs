@@ -52,7 +52,7 @@ fn worst_of(responses: &[SpaceResponse], limits: &Value) -> f64 {
     errors.fold(0.0, |worst, e| worst.max(e.abs()))
 }
 
-fn responses(scene: &SpaceScene, level: i32) -> (usize, Vec<SpaceResponse>) {
+fn responses(scene: &SpaceScene, level: f64) -> (usize, Vec<SpaceResponse>) {
     let model = SpaceModel::on(scene, &mesh(scene, &MeshSize::level(level)).unwrap()).unwrap();
     (model.nodes(), model_offline::placement::space::rest::rest_responses(&model).unwrap())
 }
@@ -63,11 +63,11 @@ fn quadratic_tetrahedra_reach_the_continuum_limits_of_all_singles_and_pairs() {
     reach(
         Integration::FemT10,
         &[
-            ("block", false, 0, 0.025),
-            ("block", true, 0, 0.025),
-            ("block", false, 1, 0.015),
-            ("mound", true, 1, 0.025),
-            ("mound", false, 1, 0.025),
+            ("block", false, 0.0, 0.025),
+            ("block", true, 0.0, 0.025),
+            ("block", false, 1.0, 0.015),
+            ("mound", true, 1.0, 0.025),
+            ("mound", false, 1.0, 0.025),
         ],
     );
 }
@@ -76,23 +76,26 @@ fn quadratic_tetrahedra_reach_the_continuum_limits_of_all_singles_and_pairs() {
 #[ignore = "minutes and 16 GB"]
 fn fine_meshes_are_within_a_few_percent() {
     parallel::within(parallel::available(), || {
-        reach(Integration::FemT10, &[("block", false, 2, 0.01), ("block", true, 2, 0.01)]);
-        reach(Integration::FemT10, &[("mound", false, 2, 0.02), ("mound", true, 2, 0.02)]);
+        reach(Integration::FemT10, &[("block", false, 2.0, 0.01), ("block", true, 2.0, 0.01)]);
+        reach(Integration::FemT10, &[("mound", false, 2.0, 0.02), ("mound", true, 2.0, 0.02)]);
         reach(
             Integration::ScniStabilised,
             &[
-                ("block", false, 2, 0.04),
-                ("block", true, 2, 0.04),
-                ("block", true, 3, 0.03),
-                ("mound", false, 2, 0.06),
-                ("mound", true, 2, 0.06),
+                ("block", false, 2.0, 0.04),
+                ("block", true, 2.0, 0.04),
+                ("block", true, 3.0, 0.03),
+                ("mound", false, 2.0, 0.06),
+                ("mound", true, 2.0, 0.06),
+                // The finest that is affordable, and what refinement to 5 % ends with.
+                ("mound", false, 2.5, 0.04),
+                ("mound", true, 2.5, 0.04),
             ],
         );
     });
 }
 
 /// Holds a rule on (scene, inclusions, level) to the continuum limits, within so much.
-fn reach(integration: Integration, cases: &[(&str, bool, i32, f64)]) {
+fn reach(integration: Integration, cases: &[(&str, bool, f64, f64)]) {
     for &(name, inclusions, level, within) in cases {
         let (scene, limits) = case(name, inclusions, integration);
         let (nodes, found) = responses(&scene, level);
@@ -101,7 +104,7 @@ fn reach(integration: Integration, cases: &[(&str, bool, i32, f64)]) {
         assert!(errors.iter().all(|e| *e < within), "{name} {inclusions} level {level}: {errors:?}");
         let singles = worst_of(&found[..scene.paddles.len()], &limits["single"]);
         let quadratic = integration == Integration::FemT10;
-        assert!(!quadratic || name == "mound" || level == 0 || singles < 0.01, "{singles}");
+        assert!(!quadratic || name == "mound" || level == 0.0 || singles < 0.01, "{singles}");
         // Without a paddle, too.
         let none = found.last().unwrap().target_per_depth;
         let limit = Vector3::from_fn(|k, _| limits["no_paddle"][k].as_f64().unwrap());
@@ -112,8 +115,8 @@ fn reach(integration: Integration, cases: &[(&str, bool, i32, f64)]) {
 #[test]
 fn the_default_rule_comes_nearer_with_every_level() {
     let (scene, limits) = case("block", false, Integration::ScniStabilised);
-    let (nodes, coarse) = responses(&scene, 0);
-    let (finer_nodes, fine) = responses(&scene, 1);
+    let (nodes, coarse) = responses(&scene, 0.0);
+    let (finer_nodes, fine) = responses(&scene, 1.0);
     let (coarse, fine) = (errors(&coarse, &limits)[0], errors(&fine, &limits)[0]);
     println!("{nodes} nodes {coarse:.4}, {finer_nodes} nodes {fine:.4}");
     assert!(coarse < 0.17 && fine < 0.08 && fine < 0.6 * coarse, "{coarse} {fine}");

@@ -49,14 +49,16 @@ const MEETS: f64 = 1e-4;
 const ACROSS: f64 = 3.0;
 
 impl MeshSize {
-    /// That of a refinement level: each halves the edges at the rims.
-    pub fn level(level: i32) -> Self {
-        let finer = 2.0_f64.powi(-level);
+    /// That of a refinement level: each halves the edges at the rims. Half a level is a size between two; where cells are halved alike
+    /// it is the mesh of one of them.
+    pub fn level(level: impl Into<f64>) -> Self {
+        let level = level.into();
+        let finer = (-level).exp2();
         Self {
             rim: 0.4 * finer,
             inclusion: 0.8 * finer,
             // Coarser meshes are those that insertions are followed on: there nothing is gained by it.
-            target: (level > 0).then(|| 0.2 * finer.sqrt()),
+            target: (level > 0.0).then(|| 0.2 * finer.sqrt()),
             coarsest: 0.2 * finer.sqrt(),
             thickest: finer.sqrt(),
             growth: 0.5,

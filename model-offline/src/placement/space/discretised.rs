@@ -27,8 +27,8 @@ pub struct SpaceErrorEstimate {
     pub reference: f64,
     /// Nodes of the reference.
     pub reference_nodes: usize,
-    /// Refinement level that was accepted.
-    pub level: i32,
+    /// Refinement level that was accepted; of a nodal rule it may be half of one ([`MeshSize::level`]).
+    pub level: f64,
 }
 
 /// A discretised scene with its responses at rest and, where it asks for a tolerance, the estimated error.

@@ -5,10 +5,11 @@
 //! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
 //! is left; it is taken times [`SAFETY`].
 
-use super::discretised::{Discretised, SpaceErrorEstimate, at_level};
+use super::discretised::{Discretised, SpaceErrorEstimate, answering, at_level};
 use super::rest::SpaceResponse;
 use crate::discretization::{Integration, Method};
 use crate::model::space::SpaceModel;
+use crate::model::space::meshing::{MeshSize, mesh};
 use crate::model::{DecidedBy, Faster, ModelError};
 use crate::placement::space::Controllability;
 use crate::scene::space::SpaceScene;
@@ -22,6 +23,8 @@ pub const SAFETY: f64 = 1.5;
 const FIRST_SHARE: f64 = 0.75;
 /// Where the method leaves at least this share to the reference, that is sharpened, and not the method's own nodes refined.
 const LEAST_SHARE: f64 = 0.25;
+/// What a level that is too large is made coarser by.
+const HALF: f64 = 0.5;
 /// Levels that refinement begins with, and ends with.
 pub(super) const LEVELS: std::ops::RangeInclusive<i32> = 0..=5;
 
@@ -228,7 +231,7 @@ impl Discretised {
             full_by_set: full,
             reference: controllability,
             reference_nodes: nodes,
-            level,
+            level: f64::from(level),
         };
         Self { model, rest, estimate: Some(estimate) }
     }
@@ -250,53 +253,108 @@ impl Held {
     fn worst(&self) -> f64 {
         worst(&self.errors)
     }
+
+    fn estimate(self, found: &[SpaceResponse], reference: &Reference, level: f64) -> SpaceErrorEstimate {
+        let full = distances_of(|controls| controls.full, found, &reference.rest);
+        SpaceErrorEstimate {
+            controllability: self.worst(),
+            by_set: self.errors,
+            full_by_set: sums(&full, &reference.full),
+            reference: self.open,
+            reference_nodes: reference.nodes,
+            level,
+        }
+    }
 }
 
 fn sums(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
+impl Ladder {
+    /// Answers of another method held against the finest mesh, after which finer ones where what that leaves open is what stands in the
+    /// way: a sharper reference serves all meshes of the method that come.
+    fn hold(&mut self, found: &[SpaceResponse], tolerance: f64) -> Result<(Held, &Reference), ModelError> {
+        loop {
+            let Some(reference) = &self.finest else { return Err(ModelError::NothingToCompare) };
+            let held = Held::against(reference, found);
+            let is_own = worst(&held.apart) > (1.0 - LEAST_SHARE) * tolerance;
+            if held.worst() <= tolerance || is_own || self.ended {
+                break;
+            }
+            self.step()?;
+        }
+        let reference = self.finest.as_ref().ok_or(ModelError::NothingToCompare)?;
+        Ok((Held::against(reference, found), reference))
+    }
+}
+
+/// The meshes that a method's own nodes are refined on, the next one by what the last one left open; back by halves of a level
+/// where that is too large.
+struct Meshes {
+    level: f64,
+    /// The finest that could be had, and its nodes.
+    finest: Option<(f64, usize)>,
+    /// Nothing finer than a level that was too large is tried.
+    is_bounded: bool,
+}
+
+impl Meshes {
+    /// A level at which there may be a finer mesh than all before.
+    fn next(&self) -> Option<f64> {
+        let is_finer = self.finest.is_none_or(|(level, _)| level < self.level);
+        Some(self.level).filter(|level| is_finer && *level <= f64::from(*LEVELS.end()))
+    }
+
+    /// The next level was too large.
+    fn bound(&mut self) {
+        self.is_bounded = true;
+        self.level -= HALF;
+    }
+
+    /// Whether a mesh of so many nodes is finer than all before, rather than one of them.
+    fn is_finer(&self, nodes: usize) -> bool {
+        self.finest.is_none_or(|(_, finest)| nodes > finest)
+    }
+
+    /// The next level did not do: it was `left` times as far away as it may be. The error falls with the size at the rims, which a level
+    /// halves: levels that cannot do are not tried.
+    fn refine(&mut self, nodes: usize, left: f64) {
+        self.finest = Some((self.level, nodes));
+        if !self.is_bounded {
+            self.level += left.log2().floor().clamp(1.0, 2.0);
+        }
+    }
+}
+
 /// Refines a method's own nodes, or the reference, whichever stands in the way. There is a reference.
 fn refine_against(ladder: &mut Ladder, scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
     let (mut best, mut memory): (Option<(f64, DecidedBy)>, _) = (None, None);
-    let mut level = *LEVELS.start();
-    while level <= *LEVELS.end() {
-        let (model, rest) = match at_level(scene, level) {
+    let mut meshes = Meshes { level: f64::from(*LEVELS.start()), finest: None, is_bounded: false };
+    while let Some(level) = meshes.next() {
+        let mesh = mesh(scene, &MeshSize::level(level));
+        let nodes = mesh.as_ref().map_or(0, |mesh| mesh.nodes.len());
+        if mesh.is_ok() && !meshes.is_finer(nodes) {
+            meshes.refine(nodes, 1.0);
+            continue;
+        }
+        let (model, rest) = match mesh.and_then(|mesh| answering(scene, &mesh)) {
             Ok(found) => found,
             Err(error) if error.is_too_large() && best.is_some() => {
-                memory = error.missing_memory();
-                break;
+                memory = memory.or_else(|| error.missing_memory());
+                meshes.bound();
+                continue;
             }
             Err(error) => return Err(error),
         };
-        let held = loop {
-            let Some(reference) = &ladder.finest else { return Err(ModelError::NothingToCompare) };
-            let held = Held::against(reference, &rest);
-            // Where what the reference leaves open decides, a sharper one serves all levels to come.
-            let is_own = worst(&held.apart) > (1.0 - LEAST_SHARE) * tolerance;
-            if held.worst() <= tolerance {
-                let full = distances_of(|controls| controls.full, &rest, &reference.rest);
-                let estimate = SpaceErrorEstimate {
-                    controllability: held.worst(),
-                    by_set: held.errors,
-                    full_by_set: sums(&full, &reference.full),
-                    reference: reference.open(),
-                    reference_nodes: reference.nodes,
-                    level,
-                };
-                return Ok(Discretised { model, rest, estimate: Some(estimate) });
-            }
-            if is_own || ladder.ended {
-                break held;
-            }
-            ladder.step()?;
-        };
+        let (held, reference) = ladder.hold(&rest, tolerance)?;
+        if held.worst() <= tolerance {
+            return Ok(Discretised { estimate: Some(held.estimate(&rest, reference, level)), model, rest });
+        }
         if best.as_ref().is_none_or(|best| held.worst() < best.0) {
             best = Some((held.worst(), decided_by(scene, &held.errors, &held.apart)));
         }
-        // The error falls with the size at the rims, which a level halves: levels that cannot do are not tried.
-        let left = worst(&held.apart) / (tolerance - held.open.min(0.5 * tolerance));
-        level += (left.log2().floor() as i32).clamp(1, 2);
+        meshes.refine(nodes, worst(&held.apart) / (tolerance - held.open.min(0.5 * tolerance)));
     }
     let (reached, decided_by) = best.unwrap_or((f64::INFINITY, DecidedBy::Whole));
     // The reference may keep what the method does not.
@@ -366,6 +424,41 @@ mod tests {
             told.contains("the best estimate is infinite (of the measure of paddle 2; 0.015 of all else)"),
             "{told}"
         );
+    }
+
+    /// Levels that are tried where nodes of a level are `nodes` of it, more than `most` cannot be had, and each leaves `left`.
+    fn tried(nodes: impl Fn(f64) -> usize, most: usize, left: f64) -> Vec<f64> {
+        let mut meshes = Meshes { level: 0.0, finest: None, is_bounded: false };
+        let mut tried = Vec::new();
+        while let Some(level) = meshes.next() {
+            let nodes = nodes(level);
+            if !meshes.is_finer(nodes) {
+                meshes.refine(nodes, 1.0);
+            } else if nodes > most {
+                meshes.bound();
+            } else {
+                tried.push(level);
+                meshes.refine(nodes, left);
+            }
+        }
+        tried
+    }
+
+    #[test]
+    fn between_a_level_that_does_not_do_and_one_that_is_too_large_there_is_half_a_one() {
+        let nodes = |level: f64| (1000.0 * level.exp2()) as usize;
+        assert_eq!(tried(nodes, 100_000, 1.5), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
+        // What is far away is approached in greater steps.
+        assert_eq!(tried(nodes, 100_000, 9.0), [0.0, 2.0, 4.0]);
+        assert_eq!(tried(nodes, 5_000, 1.5), [0.0, 1.0, 2.0]);
+        assert_eq!(tried(nodes, 6_000, 1.5), [0.0, 1.0, 2.0, 2.5]);
+        // Back by as many halves as it takes.
+        assert_eq!(tried(nodes, 6_000, 9.0), [0.0, 2.0, 2.5]);
+        assert_eq!(tried(nodes, 3_000, 9.0), [0.0, 1.5]);
+        // Halved cells: half a level is the level below.
+        assert_eq!(tried(|level| nodes(level.floor()), 6_000, 1.5), [0.0, 1.0, 2.0]);
+        // A level that changes nothing is passed.
+        assert_eq!(tried(|level| nodes(if level == 1.0 { 0.0 } else { level }), 5_000, 1.5), [0.0, 2.0]);
     }
 
     fn ladder(errors: &[f64], memory: Option<&str>) -> Ladder {

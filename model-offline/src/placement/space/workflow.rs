@@ -33,7 +33,8 @@ pub struct SpaceStudy {
 }
 
 impl SpaceStudy {
-    /// Discretises the scene at its resolution and studies every paddle and pair. `progress` is told how many steps there are,
+    /// Discretises the scene at its resolution, by the method [for placement](SpaceScene::for_placement), and studies every paddle and
+    /// pair. `progress` is told how many steps there are,
     /// and then called for each.
     ///
     /// # Errors
@@ -45,7 +46,7 @@ impl SpaceStudy {
         progress: &(dyn Fn() + Sync),
     ) -> Result<Self, ModelError> {
         let start = Instant::now();
-        let Discretised { model, rest, estimate: error_estimate } = parallel::within(threads, || discretise(scene))?;
+        let Discretised { model, rest, estimate: error_estimate } = parallel::within(threads, || discretise(&scene.for_placement()))?;
         begin(steps(&model));
         let insertions = InsertionModel::new(scene, coarse(scene)?, model.clone(), rest);
         let placement = place_in_space(&insertions, threads, progress)?;
@@ -82,12 +83,13 @@ pub fn at_resolution(scene: &SpaceScene) -> Result<(SpaceModel, Vec<SpaceRespons
     }
 }
 
-/// Index of the single paddle that controls the target best, at rest, by the scene's own discretization.
+/// Index of the single paddle that controls the target best, at rest, by the scene's method [for
+/// placement](SpaceScene::for_placement).
 ///
 /// # Errors
 /// [`ModelError`], as of [`at_resolution`], and [`ModelError::NoPaddleControls`].
 pub fn best_single(scene: &SpaceScene) -> Result<u32, ModelError> {
-    let (_, rest) = at_resolution(scene)?;
+    let (_, rest) = at_resolution(&scene.for_placement())?;
     let singles =
         scene.paddles.iter().zip(&rest).filter_map(|(paddle, r)| Some((paddle.index, r.controllability?.measure)));
     let best = singles.filter(|(_, measure)| measure.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));

@@ -11,11 +11,12 @@ use super::error::{NoSuchPaddle, SceneError, Source};
 use super::limits::{self, LimitError};
 use super::schema::dimension_of;
 use super::{Actuator, BUNDLED, BUNDLED_IN_SPACE, Scene, TissueVariant};
-use crate::discretization::{Discretization, Method};
+use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::Law;
 use nalgebra::Matrix3x2;
 use sha2::{Digest as _, Sha256};
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -98,6 +99,9 @@ pub struct SpaceScene {
     pub actuator: Actuator,
     /// How fine and by which method the tissue is modelled.
     pub discretization: Discretization,
+    /// Whether that method is asked for by name. Otherwise it is the default, and placement may take another
+    /// ([`for_placement`](Self::for_placement)).
+    pub names_method: bool,
     /// SHA-256 over what the scene's text says and its files hold.
     pub(super) content: [u8; 32],
     /// What was changed or assumed in files that the scene names, a sentence each.
@@ -170,7 +174,20 @@ impl SpaceScene {
     /// The same scene by another method.
     #[must_use]
     pub fn with_method(&self, method: Method) -> Self {
-        Self { discretization: Discretization { method, ..self.discretization }, ..self.clone() }
+        Self { discretization: Discretization { method, ..self.discretization }, names_method: true, ..self.clone() }
+    }
+
+    /// The scene by the method that placement takes. Jacobians at rest are linear, and quadratic tetrahedra keep a tolerance of them on
+    /// the cheapest models: where a tolerance is all that is asked for they are taken, as tables do and `fit`. What follows the
+    /// needle keeps the default, whose nodal cells bear deformations that invert quadratic elements.
+    #[must_use]
+    pub fn for_placement(&self) -> Cow<'_, Self> {
+        match self.discretization.resolution {
+            Resolution::Tolerance(_) if !self.names_method => {
+                Cow::Owned(self.with_method(Method::new(Integration::FemT10)))
+            }
+            _ => Cow::Borrowed(self),
+        }
     }
 
     /// Its tissue: whether it has inclusions.

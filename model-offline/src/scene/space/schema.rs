@@ -325,11 +325,18 @@ pub struct DiscretizationSection {
     pub level: Option<Located<i32>>,
     /// Kernel support over local spacing (default: 1.2 for scni-stabilised and mscni, 2 for the others).
     pub support: Option<Located<f64>>,
-    /// Integration rule (default scni-stabilised).
+    /// Integration rule (default: scni-stabilised; placement to a tolerance takes fem-t10).
     pub integration: Option<Located<Integration>>,
     /// Basis of the shape functions (default linear).
     #[serde(default)]
     pub basis: Basis,
+}
+
+impl DiscretizationSection {
+    /// Whether anything of the method is said.
+    pub fn names_method(&self) -> bool {
+        self.integration.is_some() || self.support.is_some() || self.basis != Basis::default()
+    }
 }
 
 /// The JSON Schema of the scene file in space.

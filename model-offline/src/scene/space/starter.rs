@@ -116,7 +116,7 @@ of = "all"
 
 [discretization]                    # how fine: one of tolerance, level and spacing
 tolerance = 0.05                    # relative error of the controllability measures
-integration = "fem-t10"             # quadratic tetrahedra; scni-stabilised (meshfree) is the default
+integration = "fem-t10"             # quadratic tetrahedra; without this line place takes them, and solve scni-stabilised (meshfree)
 "#;
 
 #[cfg(test)]

@@ -91,6 +91,7 @@ impl Validator<'_> {
             pairs: self.pairs(&paddles)?,
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, high - low)?,
+            names_method: file.discretization.get().names_method(),
             needle,
             paddles,
             body,

@@ -249,7 +249,8 @@ fn model_in_space(study: &SpaceStudy) -> FittedModel {
     let found = study.error_estimate.as_ref();
     FittedModel {
         integration: method.integration,
-        level: found.map(|estimate| estimate.level).or(match resolution {
+        // Those of quadratic tetrahedra, which `fit` refines, are whole.
+        level: found.map(|estimate| estimate.level as i32).or(match resolution {
             Resolution::Level(level) => Some(level),
             _ => None,
         }),
