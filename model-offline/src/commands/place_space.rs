@@ -76,7 +76,11 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
             let error = estimate.and_then(|estimate| of(estimate).get(i)).filter(|_| !result[key].is_null());
             result["error"][key] = json!(error);
         }
+        result["error"]["max_orthogonal"] = json!(static_error(study, i));
     }
+    let mut no_paddle = json!(placement.no_paddle);
+    no_paddle["error"] =
+        json!({ "max_orthogonal": static_error(study, placement.paddles.len() + placement.pairs.len()) });
     json!({
         "scene": scene.name,
         "dimension": 3,
@@ -91,11 +95,22 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
         "paddles": paddles,
         "pairs": pairs,
         "overlapping": overlapping(study),
-        "no_paddle": placement.no_paddle,
+        "no_paddle": no_paddle,
         "optimum": placement.optimum,
         "optimum_single": placement.optimum_single,
         "warnings": warnings,
     })
+}
+
+/// Estimated error of the largest orthogonal displacement of the static study of a paddle, then of a pair, then of none: of what is linear
+/// in the depth, and of what is not. None where nothing is known of the model at rest, or the insertion stopped at once.
+fn static_error(study: &SpaceStudy, set: usize) -> Option<f64> {
+    let placement = &study.placement;
+    let singles = placement.paddles.iter().map(|paddle| &paddle.answer.static_study);
+    let pairs = placement.pairs.iter().map(|pair| &pair.answer.static_study);
+    let of = singles.chain(pairs).chain([&placement.no_paddle.static_study]).nth(set)?;
+    let per_depth = study.error_estimate.as_ref()?.per_depth_by_set.get(set)?;
+    (!of.depth.is_empty()).then(|| per_depth * of.max_orthogonal_depth + of.max_orthogonal_nonlinear_error)
 }
 
 /// Pairs of paddles that cannot be attached together, by index.
@@ -141,7 +156,7 @@ fn summary(study: &SpaceStudy) -> String {
             error(by_set, answer.controllability_measure),
             measure(answer.controllability_full),
             error(full_by_set, answer.controllability_full),
-            fixture(&answer.static_study, digits)
+            fixture(&answer.static_study, static_error(study, i), digits)
         );
     }
     if left > 0 {
@@ -150,17 +165,18 @@ fn summary(study: &SpaceStudy) -> String {
     let _ = writeln!(
         out,
         "    none   {NONE:>12}  {NONE:>8} {NONE:>10} {NONE:>8}   {}",
-        fixture(&placement.no_paddle.static_study, digits)
+        fixture(&placement.no_paddle.static_study, static_error(study, all.len()), digits)
     );
-    let words = |paddles: &[u32]| if paddles.is_empty() { NONE.to_owned() } else { named(paddles) };
     for (what, best) in [("single paddle", &placement.optimum_single), ("pair", &placement.optimum)] {
         if what == "pair" && placement.pairs.is_empty() {
             continue;
         }
+        let words = |paddles: &[u32]| if paddles.is_empty() { NONE.to_owned() } else { named(paddles) };
         let _ = writeln!(
             out,
-            "\nbest static {what}: {}; best dynamic {what}: {}",
+            "\nbest static {what}: {}{}; best dynamic {what}: {}",
             words(&best.fixture),
+            as_good(study, &all, &best.fixture),
             words(&best.dynamic)
         );
         let fixture = all.iter().find(|(paddles, _)| *paddles == best.fixture);
@@ -172,11 +188,34 @@ fn summary(study: &SpaceStudy) -> String {
     if placement.profile_nodes != study.model.nodes() {
         let _ = writeln!(
             out,
-            "the insertion was followed on {} nodes: the static column is theirs, and its error is not estimated",
-            placement.profile_nodes
+            "the insertion was followed on {} nodes: what of the static column is not linear in the depth is theirs{}",
+            placement.profile_nodes,
+            if study.error_estimate.is_some() { "" } else { ", and no error of it is estimated" }
         );
     }
     out
+}
+
+/// Which other fixtures of as many paddles the errors leave as good as the best.
+fn as_good(study: &SpaceStudy, all: &[(Vec<u32>, &SpaceAnswer)], best: &[u32]) -> String {
+    let reaches = |i: usize| {
+        let of = &all[i].1.static_study;
+        static_error(study, i).map(|error| (of.reached_depth, of.max_orthogonal - error, of.max_orthogonal + error))
+    };
+    let place = all.iter().position(|(paddles, _)| paddles == best);
+    let Some((depth, _, most)) = place.and_then(reaches) else { return String::new() };
+    let is_alike = |i: &usize| all[*i].0.len() == best.len() && all[*i].0 != best;
+    let is_as_good = |i: &usize| reaches(*i).is_some_and(|(reached, least, _)| reached >= depth && least <= most);
+    let overlapping = overlapping(study);
+    let is_possible = |i: &usize| !overlapping.iter().any(|pair| pair[..] == all[*i].0);
+    let found: Vec<String> =
+        (0..all.len()).filter(is_alike).filter(is_as_good).filter(is_possible).map(|i| named(&all[i].0)).collect();
+    match &found[..] {
+        [] => String::new(),
+        [one] => format!(" (or {one}, within the errors)"),
+        [one, two] => format!(" (or {one}, or {two}, within the errors)"),
+        [first, rest @ ..] => format!(" (or {first}, or {} others, within the errors)", rest.len()),
+    }
 }
 
 /// Says so where even the best fixture moves the target more than no paddle does.
@@ -217,12 +256,13 @@ fn measure(value: f64) -> String {
     if value.is_finite() { format!("{value:.4}") } else { NONE.to_owned() }
 }
 
-fn fixture(study: &SpaceStatic, digits: usize) -> String {
+fn fixture(study: &SpaceStatic, error: Option<f64>, digits: usize) -> String {
     let stopped = study
         .failure
         .as_ref()
         .map_or(String::new(), |f| format!("  stopped at depth {}: {}", length(f.depth), f.reason));
     // Of an insertion that stopped at once nothing is known.
     let largest = study.depth.last().map_or(NONE.to_owned(), |_| format!("{:.digits$}", study.max_orthogonal));
-    format!("{largest}{stopped}")
+    let error = error.map_or(String::new(), |error| format!(" ± {error:.digits$}"));
+    format!("{largest}{error}{stopped}")
 }

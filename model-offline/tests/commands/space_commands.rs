@@ -305,7 +305,7 @@ fn placement_takes_quadratic_tetrahedra_where_a_tolerance_is_all_that_is_asked_f
     let jacobian = &of_tables.rest()[0].jacobian;
     for (i, row) in place["paddles"][0]["jacobian"].as_array().unwrap().iter().enumerate() {
         for (j, found) in row.as_array().unwrap().iter().enumerate() {
-            assert_eq!(number(found).to_bits(), jacobian[(i, j)].to_bits(), "{i} {j}");
+            assert!((number(found) - jacobian[(i, j)]).abs() <= 1e-14 * jacobian.norm(), "{i} {j}: {found} {jacobian}");
         }
     }
 }

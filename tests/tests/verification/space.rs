@@ -11,8 +11,10 @@ use model_offline::mechanics::history::Prestress;
 use model_offline::model::space::SpaceModel;
 use model_offline::model::space::meshing::{MeshSize, mesh};
 use model_offline::parallel;
+use model_offline::placement::space::InsertionModel;
 use model_offline::placement::space::rest::{CondensedRest, SpaceResponse};
-use model_offline::placement::space::workflow::discretise;
+use model_offline::placement::space::study::{SpaceStatic, place_in_space};
+use model_offline::placement::space::workflow::{at_resolution, coarse, discretise};
 use model_offline::scene::space::SpaceScene;
 use model_offline::solver::analysis::Analysis;
 use model_offline::solver::equilibrium::NewtonSettings;
@@ -139,6 +141,15 @@ fn a_tolerance_is_kept_and_its_estimate_is_no_smaller_than_the_error() {
             assert!(*estimate < 0.1, "{} {key}: {estimate}", limit["paddles"]);
         }
     }
+    // And what the needle does to the target orthogonal to its axis, but for what the limits leave open (0.0008 of their length of 0.36).
+    let all = ["single", "pair"].into_iter().flat_map(|kind| limits[kind].as_array().unwrap());
+    let all: Vec<&Value> = all.map(|limit| &limit["target_per_depth"]).chain([&limits["no_paddle"]]).collect();
+    assert_eq!((estimate.per_depth_by_set.len(), all.len()), (found.rest.len(), found.rest.len()));
+    for ((response, limit), estimate) in found.rest.iter().zip(all).zip(&estimate.per_depth_by_set) {
+        let limit = Vector3::from_fn(|k, _| limit[k].as_f64().unwrap());
+        let off = scene.needle.axis.cross(&(response.target_per_depth - limit)).norm();
+        assert!(off < estimate + 0.0008 && *estimate < 0.01, "{off} {estimate}");
+    }
     println!("{error:.4} {}", estimate.controllability);
     assert!(error <= estimate.controllability + 0.003 && estimate.controllability <= 0.05, "{error} {estimate:?}");
 }
@@ -157,6 +168,44 @@ fn a_tolerance_of_the_default_rule_is_kept_with_what_its_reference_leaves_open()
         let error = response.controllability.unwrap().measure / limit["cm"].as_f64().unwrap() - 1.0;
         assert!(error.abs() < estimate + 0.003, "{}: {error} {estimate}", limit["paddles"]);
     }
+}
+
+/// Insertions are followed on a coarse model, which is off beyond rest; by how much is estimated, and finer ones are off by no more.
+#[test]
+fn what_a_coarse_insertion_leaves_open_is_estimated() {
+    let mut effectivities = Vec::new();
+    for (name, depth) in [("block", 0.03), ("mound", 0.4)] {
+        let (mut scene, _) = case(name, true, Integration::FemT10);
+        (scene.needle.depth, scene.needle.increments) = (depth, 2);
+        scene.paddles.truncate(3);
+        scene.pairs = vec![[1, 2]];
+        scene.discretization.resolution = Resolution::Level(0);
+        let (accurate, rest) = at_resolution(&scene).unwrap();
+        let linear = scene.with_method(Method::new(Integration::FemT4));
+        let finer = SpaceModel::on(&linear, &mesh(&linear, &MeshSize::level(1)).unwrap()).unwrap();
+        let [found, finer] = [coarse(&scene).unwrap(), finer].map(|model| {
+            assert!(model.nodes() < 6_000, "{}", model.nodes());
+            let insertions = InsertionModel::new(&scene, model, accurate.clone(), rest.clone());
+            let placement = place_in_space(&insertions, parallel::available(), &|| ()).unwrap();
+            let singles = placement.paddles.into_iter().map(|paddle| paddle.answer.static_study);
+            let pairs = placement.pairs.into_iter().map(|pair| pair.answer.static_study);
+            singles.chain(pairs).chain([placement.no_paddle.static_study]).collect::<Vec<_>>()
+        });
+        for (found, finer) in found.iter().zip(&finer) {
+            assert!(found.failure.is_none() && finer.failure.is_none(), "{name}");
+            assert_eq!(found.max_orthogonal_depth, depth, "{name}: it grows with the depth");
+            let at_depth = |study: &SpaceStatic| Vector3::from(*study.target_displacement.last().unwrap());
+            let off = scene.needle.axis.cross(&(at_depth(found) - at_depth(finer))).norm();
+            println!("{name}: {:e} off {off:e}", found.max_orthogonal_nonlinear_error);
+            assert!(off < found.max_orthogonal_nonlinear_error, "{name}");
+            // What is followed on finer nodes leaves less open.
+            assert!(finer.max_orthogonal_nonlinear_error < 0.75 * found.max_orthogonal_nonlinear_error, "{name}");
+            effectivities.push(found.max_orthogonal_nonlinear_error / off);
+        }
+    }
+    effectivities.sort_by(f64::total_cmp);
+    let median = effectivities[effectivities.len() / 2];
+    assert!(median < 5.0, "{effectivities:?}");
 }
 
 /// What attached paddles do, condensed, is what whole solves with them attached say: a single one, and a pair that touches.

@@ -23,7 +23,9 @@ pub struct SpaceErrorEstimate {
     /// Estimated relative errors of the measures without axial motion, in the same order. No tolerance is kept of them: where the
     /// target hardly follows in one direction they are large.
     pub full_by_set: Vec<f64>,
-    /// The part of it that the reference leaves open; the whole where the model is its own.
+    /// Estimated errors of what the target does orthogonal to the needle, length per depth: in the same order, then without paddles.
+    pub per_depth_by_set: Vec<f64>,
+    /// The part of `controllability` that the reference leaves open; the whole where the model is its own.
     pub reference: f64,
     /// Nodes of the reference.
     pub reference_nodes: usize,

@@ -92,7 +92,7 @@ impl InsertionModel {
     }
 
     /// What the target does at rest per depth, then per displacement of the paddles: 3 rows.
-    fn rest_of(&self, attached: &[usize]) -> Result<DMatrix<f64>, ModelError> {
+    pub(super) fn rest_of(&self, attached: &[usize]) -> Result<DMatrix<f64>, ModelError> {
         let known = all_sets(&self.accurate).iter().position(|set| set == attached);
         match known.and_then(|set| self.rest.get(set)) {
             Some(response) => Ok(response.per_control()),

@@ -14,6 +14,7 @@ use crate::model::{DecidedBy, Faster, ModelError};
 use crate::placement::space::Controllability;
 use crate::scene::space::SpaceScene;
 use crate::solver::equilibrium::{Failure, FailureReason};
+use nalgebra::Vector3;
 
 /// A mesh is finer than another where every patch has so many times its nodes.
 const GROWN: f64 = 1.3;
@@ -49,6 +50,13 @@ fn distance(found: f64, reference: f64) -> f64 {
     }
 }
 
+/// How far the targets of two bodies are apart orthogonal to the needle, per depth; by paddle and pair, then without any.
+fn apart_per_depth(axis: Vector3<f64>, found: &[SpaceResponse], reference: &[SpaceResponse]) -> Vec<f64> {
+    let apart =
+        |(a, b): (&SpaceResponse, &SpaceResponse)| axis.cross(&(a.target_per_depth - b.target_per_depth)).norm();
+    found.iter().zip(reference).map(apart).collect()
+}
+
 /// What is left open on the finer of two meshes whose answers are so far apart. Two meshes may agree by accident (the pair 1 + 2 of
 /// `block` does): nothing is taken to be better than the median.
 fn estimates(distances: &[f64]) -> Vec<f64> {
@@ -80,9 +88,10 @@ fn worst(errors: &[f64]) -> f64 {
 struct Reference {
     nodes: usize,
     rest: Vec<SpaceResponse>,
-    /// Estimated errors of the measures, and of the measures without axial motion, by set.
+    /// Estimated errors of the measures, of the measures without axial motion, and of what the target does per depth, by set.
     errors: Vec<f64>,
     full: Vec<f64>,
+    per_depth: Vec<f64>,
     decided_by: DecidedBy,
     level: i32,
 }
@@ -172,9 +181,10 @@ impl Ladder {
             let apart = distances(coarser, &rest);
             let errors = estimates(&apart);
             let full = estimates(&distances_of(|controls| controls.full, coarser, &rest));
+            let per_depth = estimates(&apart_per_depth(self.scene.needle.axis, coarser, &rest));
             let decided_by = decided_by(&self.scene, &errors, &apart);
             let nodes = model.nodes();
-            self.finest = Some(Reference { nodes, rest: rest.clone(), errors, full, decided_by, level });
+            self.finest = Some(Reference { nodes, rest: rest.clone(), errors, full, per_depth, decided_by, level });
             self.model = Some(model).filter(|_| self.wants_model);
         }
         self.coarser = Some((on_patches, rest));
@@ -223,12 +233,14 @@ pub(super) fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, 
 }
 
 impl Discretised {
-    fn of_reference(Reference { nodes, rest, errors, full, level, .. }: Reference, model: SpaceModel) -> Self {
+    fn of_reference(reference: Reference, model: SpaceModel) -> Self {
+        let Reference { nodes, rest, errors, full, per_depth, level, .. } = reference;
         let controllability = worst(&errors);
         let estimate = SpaceErrorEstimate {
             controllability,
             by_set: errors,
             full_by_set: full,
+            per_depth_by_set: per_depth,
             reference: controllability,
             reference_nodes: nodes,
             level: f64::from(level),
@@ -254,12 +266,19 @@ impl Held {
         worst(&self.errors)
     }
 
-    fn estimate(self, found: &[SpaceResponse], reference: &Reference, level: f64) -> SpaceErrorEstimate {
+    fn estimate(
+        self,
+        found: &[SpaceResponse],
+        reference: &Reference,
+        axis: Vector3<f64>,
+        level: f64,
+    ) -> SpaceErrorEstimate {
         let full = distances_of(|controls| controls.full, found, &reference.rest);
         SpaceErrorEstimate {
             controllability: self.worst(),
             by_set: self.errors,
             full_by_set: sums(&full, &reference.full),
+            per_depth_by_set: sums(&apart_per_depth(axis, found, &reference.rest), &reference.per_depth),
             reference: self.open,
             reference_nodes: reference.nodes,
             level,
@@ -349,7 +368,11 @@ fn refine_against(ladder: &mut Ladder, scene: &SpaceScene, tolerance: f64) -> Re
         };
         let (held, reference) = ladder.hold(&rest, tolerance)?;
         if held.worst() <= tolerance {
-            return Ok(Discretised { estimate: Some(held.estimate(&rest, reference, level)), model, rest });
+            return Ok(Discretised {
+                estimate: Some(held.estimate(&rest, reference, scene.needle.axis, level)),
+                model,
+                rest,
+            });
         }
         if best.as_ref().is_none_or(|best| held.worst() < best.0) {
             best = Some((held.worst(), decided_by(scene, &held.errors, &held.apart)));
@@ -468,8 +491,15 @@ mod tests {
         let mut ladder = Ladder::new(&scene, false);
         let decided_by = decided_by(&scene, errors, errors);
         let errors = errors.to_vec();
-        ladder.finest =
-            Some(Reference { nodes: 9, rest: Vec::new(), full: errors.clone(), errors, decided_by, level: 1 });
+        ladder.finest = Some(Reference {
+            nodes: 9,
+            rest: Vec::new(),
+            full: errors.clone(),
+            per_depth: errors.clone(),
+            errors,
+            decided_by,
+            level: 1,
+        });
         ladder.memory = memory.map(Into::into);
         ladder
     }

@@ -2,6 +2,7 @@
 
 use super::controllability::Controllability;
 use super::insertion::InsertionModel;
+use super::refinement::SAFETY;
 use super::rest::{SpaceResponse, all_sets};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
@@ -25,6 +26,10 @@ pub struct SpaceStatic {
     pub axial: Vec<f64>,
     /// Largest orthogonal displacement.
     pub max_orthogonal: f64,
+    /// The depth at which it is.
+    pub max_orthogonal_depth: f64,
+    /// What is estimated of its error because what is not linear in the depth is of a coarser model.
+    pub max_orthogonal_nonlinear_error: f64,
     /// How far the needle got.
     pub reached_depth: f64,
     /// Why it stopped there; none when it reached the full depth.
@@ -187,17 +192,27 @@ fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
+/// Where a field is off by a small share, what is of second order in it is by twice that.
+const SECOND_ORDER: f64 = 2.0;
+
 /// Follows the insertion at the scene's increments with some paddles attached and still, until it stops.
+///
+/// To first order in the depth the model that goes deep answers as the accurate one; what it adds to that is off, and is judged by how
+/// far its own answer at rest is.
 fn follow(
     insertions: &InsertionModel,
     attached: &[usize],
     progress: &(dyn Fn() + Sync),
 ) -> Result<SpaceStatic, ModelError> {
     let needle = &insertions.scene().needle;
+    let axis = needle.axis;
     // As on graded nodes in the plane: where the law loses its stability matters to an eighth of an increment.
     let mut body = insertions.body(attached, NewtonSettings { max_cutbacks: 3, ..NewtonSettings::default() })?;
     let still = vec![Vector3::zeros(); attached.len()];
     let mut study = SpaceStatic::default();
+    let rest = insertions.rest_of(attached)?.fixed_view::<3, 1>(0, 0).into_owned();
+    let beside = body.beside().map_or_else(Vector3::zeros, |beside| beside.column(0).into_owned());
+    let off = if rest == Vector3::zeros() { 1.0 } else { beside.norm() / rest.norm() };
     for increment in 1..=needle.increments {
         progress();
         let depth = needle.depth * f64::from(increment) / f64::from(needle.increments);
@@ -210,8 +225,13 @@ fn follow(
                 study.target_displacement.push(displacement.into());
                 study.orthogonal.push(orthogonal);
                 study.axial.push(axial);
-                study.max_orthogonal = study.max_orthogonal.max(orthogonal);
                 study.reached_depth = depth;
+                if orthogonal > study.max_orthogonal {
+                    let nonlinear = axis.cross(&(displacement - rest * depth)).norm();
+                    study.max_orthogonal = orthogonal;
+                    study.max_orthogonal_depth = depth;
+                    study.max_orthogonal_nonlinear_error = SAFETY * SECOND_ORDER * off * nonlinear;
+                }
             }
             Err(Failure { reason, detail, .. }) => {
                 study.reached_depth = body.depth();

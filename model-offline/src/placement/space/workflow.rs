@@ -46,7 +46,8 @@ impl SpaceStudy {
         progress: &(dyn Fn() + Sync),
     ) -> Result<Self, ModelError> {
         let start = Instant::now();
-        let Discretised { model, rest, estimate: error_estimate } = parallel::within(threads, || discretise(&scene.for_placement()))?;
+        let Discretised { model, rest, estimate: error_estimate } =
+            parallel::within(threads, || discretise(&scene.for_placement()))?;
         begin(steps(&model));
         let insertions = InsertionModel::new(scene, coarse(scene)?, model.clone(), rest);
         let placement = place_in_space(&insertions, threads, progress)?;
