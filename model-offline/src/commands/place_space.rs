@@ -102,15 +102,25 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
     })
 }
 
-/// Estimated error of the largest orthogonal displacement of the static study of a paddle, then of a pair, then of none: of what is linear
-/// in the depth, and of what is not. None where nothing is known of the model at rest, or the insertion stopped at once.
-fn static_error(study: &SpaceStudy, set: usize) -> Option<f64> {
+/// The static study of a paddle, then of a pair, then of none.
+fn static_study(study: &SpaceStudy, set: usize) -> Option<&SpaceStatic> {
     let placement = &study.placement;
     let singles = placement.paddles.iter().map(|paddle| &paddle.answer.static_study);
     let pairs = placement.pairs.iter().map(|pair| &pair.answer.static_study);
-    let of = singles.chain(pairs).chain([&placement.no_paddle.static_study]).nth(set)?;
+    singles.chain(pairs).chain([&placement.no_paddle.static_study]).nth(set)
+}
+
+/// The same with what is estimated of its error per depth at rest.
+fn static_of(study: &SpaceStudy, set: usize) -> Option<(&SpaceStatic, f64)> {
+    let of = static_study(study, set)?;
     let per_depth = study.error_estimate.as_ref()?.per_depth_by_set.get(set)?;
-    (!of.depth.is_empty()).then(|| per_depth * of.max_orthogonal_depth + of.max_orthogonal_nonlinear_error)
+    // Of an insertion that stopped at once nothing is known.
+    (!of.depth.is_empty()).then_some((of, *per_depth))
+}
+
+/// Estimated error of its largest orthogonal displacement; none where nothing is known of the model at rest.
+fn static_error(study: &SpaceStudy, set: usize) -> Option<f64> {
+    static_of(study, set).map(|(of, per_depth)| of.largest(of.depth.len(), per_depth).1)
 }
 
 /// Pairs of paddles that cannot be attached together, by index.
@@ -179,8 +189,8 @@ fn summary(study: &SpaceStudy) -> String {
             as_good(study, &all, &best.fixture),
             words(&best.dynamic)
         );
-        let fixture = all.iter().find(|(paddles, _)| *paddles == best.fixture);
-        out.extend(fixture.and_then(|(_, answer)| harms(what, answer, &placement.no_paddle.static_study)));
+        let fixture = all.iter().position(|(paddles, _)| *paddles == best.fixture);
+        out.extend(fixture.and_then(|place| harms(what, study, place)));
     }
     if let Some(line) = second_pays(study) {
         let _ = writeln!(out, "{line}");
@@ -196,20 +206,25 @@ fn summary(study: &SpaceStudy) -> String {
     out
 }
 
-/// Which other fixtures of as many paddles the errors leave as good as the best.
+/// Which other fixtures of as many paddles the errors leave as good as the best, to the depth that both reached; none that stopped where
+/// the best did not.
 fn as_good(study: &SpaceStudy, all: &[(Vec<u32>, &SpaceAnswer)], best: &[u32]) -> String {
-    let reaches = |i: usize| {
-        let of = &all[i].1.static_study;
-        static_error(study, i).map(|error| (of.reached_depth, of.max_orthogonal - error, of.max_orthogonal + error))
+    let Some(place) = all.iter().position(|(paddles, _)| paddles == best) else { return String::new() };
+    let Some((of_best, best_per_depth)) = static_of(study, place) else { return String::new() };
+    let is_as_good = |i: usize| {
+        static_of(study, i).is_some_and(|(other, per_depth)| {
+            let common = other.depth.len().min(of_best.depth.len());
+            let (largest, error) = other.largest(common, per_depth);
+            let (least, its_error) = of_best.largest(common, best_per_depth);
+            (other.failure.is_none() || of_best.failure.is_some()) && largest - error <= least + its_error
+        })
     };
-    let place = all.iter().position(|(paddles, _)| paddles == best);
-    let Some((depth, _, most)) = place.and_then(reaches) else { return String::new() };
-    let is_alike = |i: &usize| all[*i].0.len() == best.len() && all[*i].0 != best;
-    let is_as_good = |i: &usize| reaches(*i).is_some_and(|(reached, least, _)| reached >= depth && least <= most);
     let overlapping = overlapping(study);
-    let is_possible = |i: &usize| !overlapping.iter().any(|pair| pair[..] == all[*i].0);
-    let found: Vec<String> =
-        (0..all.len()).filter(is_alike).filter(is_as_good).filter(is_possible).map(|i| named(&all[i].0)).collect();
+    let is_alike = |paddles: &[u32]| {
+        paddles.len() == best.len() && paddles != best && !overlapping.iter().any(|pair| pair[..] == *paddles)
+    };
+    let alike = all.iter().enumerate().filter(|(i, (paddles, _))| is_alike(paddles) && is_as_good(*i));
+    let found: Vec<String> = alike.map(|(_, (paddles, _))| named(paddles)).collect();
     match &found[..] {
         [] => String::new(),
         [one] => format!(" (or {one}, within the errors)"),
@@ -218,12 +233,20 @@ fn as_good(study: &SpaceStudy, all: &[(Vec<u32>, &SpaceAnswer)], best: &[u32]) -
     }
 }
 
-/// Says so where even the best fixture moves the target more than no paddle does.
-fn harms(what: &str, best: &SpaceAnswer, no_paddle: &SpaceStatic) -> Option<String> {
-    let factor = best.static_study.over(no_paddle)?;
-    (factor > 1.0).then(|| {
-        format!("no static {what} helps: the best moves the target {factor:.2} times as far as no paddle does\n")
-    })
+/// Says so where even the best fixture, which is set `place`, moves the target more than no paddle does.
+fn harms(what: &str, study: &SpaceStudy, place: usize) -> Option<String> {
+    let none = study.placement.paddles.len() + study.placement.pairs.len();
+    let (of, of_none) = (static_study(study, place)?, static_study(study, none)?);
+    let factor = of.over(of_none).filter(|factor| *factor > 1.0)?;
+    let common = of.depth.len().min(of_none.depth.len());
+    let within = |set: usize| static_of(study, set).map(|(of, per_depth)| of.largest(common, per_depth));
+    let is_open = within(place)
+        .zip(within(none))
+        .is_some_and(|((largest, error), (least, its_error))| largest - error <= least + its_error);
+    let open = if is_open { ", which the errors leave open" } else { "" };
+    Some(format!(
+        "no static {what} helps: the best moves the target {factor:.2} times as far as no paddle does{open}\n"
+    ))
 }
 
 /// Whether the second paddle buys anything at rest.

@@ -298,6 +298,14 @@ fn placement_takes_quadratic_tetrahedra_where_a_tolerance_is_all_that_is_asked_f
     let place = read("place.json", folder.path());
     assert_eq!(place["integration"], "fem-t10");
     assert!(told.contains(&format!("{} nodes (fem-t10)", place["nodes"])), "{told}");
+    // One increment: what is off at rest is so in proportion to the depth, and what is not linear comes on top.
+    let by_set = place["error_estimate"]["per_depth_by_set"].as_array().unwrap();
+    assert_eq!(by_set.len(), 2);
+    for (of, per_depth) in [&place["paddles"][0], &place["no_paddle"]].into_iter().zip(by_set) {
+        let nonlinear = number(&of["static"]["nonlinear_error"][0]);
+        let expected = 0.05 * number(per_depth) + nonlinear;
+        assert!(nonlinear > 0.0 && (number(&of["error"]["max_orthogonal"]) / expected - 1.0).abs() < 1e-12, "{of}");
+    }
     // A table of the same scene begins with the same Jacobian.
     let AnyScene::Space(mut scene) = AnyScene::parse(&alone, "plain").unwrap() else { panic!("in space") };
     scene.discretization.resolution = Resolution::Tolerance(0.2);

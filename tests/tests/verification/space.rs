@@ -193,19 +193,20 @@ fn what_a_coarse_insertion_leaves_open_is_estimated() {
         });
         for (found, finer) in found.iter().zip(&finer) {
             assert!(found.failure.is_none() && finer.failure.is_none(), "{name}");
-            assert_eq!(found.max_orthogonal_depth, depth, "{name}: it grows with the depth");
             let at_depth = |study: &SpaceStatic| Vector3::from(*study.target_displacement.last().unwrap());
             let off = scene.needle.axis.cross(&(at_depth(found) - at_depth(finer))).norm();
-            println!("{name}: {:e} off {off:e}", found.max_orthogonal_nonlinear_error);
-            assert!(off < found.max_orthogonal_nonlinear_error, "{name}");
+            let [estimate, finer] = [found, finer].map(|study| *study.nonlinear_error.last().unwrap());
+            println!("{name}: {estimate:e} off {off:e}");
+            // The finer one is off itself, by about half as much.
+            assert!(1.5 * off < estimate, "{name}");
             // What is followed on finer nodes leaves less open.
-            assert!(finer.max_orthogonal_nonlinear_error < 0.75 * found.max_orthogonal_nonlinear_error, "{name}");
-            effectivities.push(found.max_orthogonal_nonlinear_error / off);
+            assert!(finer < 0.75 * estimate, "{name}");
+            effectivities.push(estimate / off);
         }
     }
     effectivities.sort_by(f64::total_cmp);
     let median = effectivities[effectivities.len() / 2];
-    assert!(median < 5.0, "{effectivities:?}");
+    assert!(median < 8.0, "{effectivities:?}");
 }
 
 /// What attached paddles do, condensed, is what whole solves with them attached say: a single one, and a pair that touches.

@@ -359,7 +359,8 @@ fn refine_against(ladder: &mut Ladder, scene: &SpaceScene, tolerance: f64) -> Re
         }
         let (model, rest) = match mesh.and_then(|mesh| answering(scene, &mesh)) {
             Ok(found) => found,
-            Err(error) if error.is_too_large() && best.is_some() => {
+            // Half a level is tried unasked: what is wrong with it is no answer.
+            Err(error) if best.is_some() && (error.is_too_large() || meshes.is_bounded) => {
                 memory = memory.or_else(|| error.missing_memory());
                 meshes.bound();
                 continue;

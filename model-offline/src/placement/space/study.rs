@@ -2,7 +2,6 @@
 
 use super::controllability::Controllability;
 use super::insertion::InsertionModel;
-use super::refinement::SAFETY;
 use super::rest::{SpaceResponse, all_sets};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
@@ -26,10 +25,8 @@ pub struct SpaceStatic {
     pub axial: Vec<f64>,
     /// Largest orthogonal displacement.
     pub max_orthogonal: f64,
-    /// The depth at which it is.
-    pub max_orthogonal_depth: f64,
-    /// What is estimated of its error because what is not linear in the depth is of a coarser model.
-    pub max_orthogonal_nonlinear_error: f64,
+    /// Estimated errors of `orthogonal` because what is not linear in the depth is of a coarser model.
+    pub nonlinear_error: Vec<f64>,
     /// How far the needle got.
     pub reached_depth: f64,
     /// Why it stopped there; none when it reached the full depth.
@@ -41,6 +38,16 @@ impl SpaceStatic {
     /// have no depth in common, or the other one does not move the target.
     pub fn over(&self, other: &Self) -> Option<f64> {
         fixture::over(&self.orthogonal, &other.orthogonal)
+    }
+
+    /// Largest orthogonal displacement of the first increments, with its estimated error, where the response at rest is off by
+    /// `per_depth`; the largest may be at another depth than it seems.
+    pub fn largest(&self, increments: usize, per_depth: f64) -> (f64, f64) {
+        let errors = self.depth.iter().zip(&self.nonlinear_error).map(|(depth, error)| per_depth * depth + error);
+        let of_all = self.orthogonal.iter().copied().zip(errors).take(increments);
+        let (largest, its_error) = of_all.clone().max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or_default();
+        let at_most = of_all.map(|(orthogonal, error)| orthogonal + error).fold(0.0, f64::max);
+        (largest, its_error.max(at_most - largest))
     }
 }
 
@@ -192,8 +199,9 @@ fn rows(m: &DMatrix<f64>) -> Vec<Vec<f64>> {
     m.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
-/// Where a field is off by a small share, what is of second order in it is by twice that.
-const SECOND_ORDER: f64 = 2.0;
+/// Where a field is off by a small share, what is of second order in it is by twice that; and twice again, because what was left to
+/// meshes of five to eight times the nodes, which are off themselves, was up to 2.5 times that share (`block`, `mound`, two more bodies).
+const BEYOND_REST: f64 = 4.0;
 
 /// Follows the insertion at the scene's increments with some paddles attached and still, until it stops.
 ///
@@ -212,7 +220,7 @@ fn follow(
     let mut study = SpaceStatic::default();
     let rest = insertions.rest_of(attached)?.fixed_view::<3, 1>(0, 0).into_owned();
     let beside = body.beside().map_or_else(Vector3::zeros, |beside| beside.column(0).into_owned());
-    let off = if rest == Vector3::zeros() { 1.0 } else { beside.norm() / rest.norm() };
+    let off = if beside.norm() < rest.norm() { beside.norm() / rest.norm() } else { 1.0 };
     for increment in 1..=needle.increments {
         progress();
         let depth = needle.depth * f64::from(increment) / f64::from(needle.increments);
@@ -225,13 +233,10 @@ fn follow(
                 study.target_displacement.push(displacement.into());
                 study.orthogonal.push(orthogonal);
                 study.axial.push(axial);
+                let nonlinear = axis.cross(&(displacement - rest * depth)).norm();
+                study.nonlinear_error.push(BEYOND_REST * off * nonlinear);
+                study.max_orthogonal = study.max_orthogonal.max(orthogonal);
                 study.reached_depth = depth;
-                if orthogonal > study.max_orthogonal {
-                    let nonlinear = axis.cross(&(displacement - rest * depth)).norm();
-                    study.max_orthogonal = orthogonal;
-                    study.max_orthogonal_depth = depth;
-                    study.max_orthogonal_nonlinear_error = SAFETY * SECOND_ORDER * off * nonlinear;
-                }
             }
             Err(Failure { reason, detail, .. }) => {
                 study.reached_depth = body.depth();

@@ -84,13 +84,12 @@ pub fn at_resolution(scene: &SpaceScene) -> Result<(SpaceModel, Vec<SpaceRespons
     }
 }
 
-/// Index of the single paddle that controls the target best, at rest, by the scene's method [for
-/// placement](SpaceScene::for_placement).
+/// Index of the single paddle that controls the target best, at rest, by the scene's own discretization.
 ///
 /// # Errors
 /// [`ModelError`], as of [`at_resolution`], and [`ModelError::NoPaddleControls`].
 pub fn best_single(scene: &SpaceScene) -> Result<u32, ModelError> {
-    let (_, rest) = at_resolution(&scene.for_placement())?;
+    let (_, rest) = at_resolution(scene)?;
     let singles =
         scene.paddles.iter().zip(&rest).filter_map(|(paddle, r)| Some((paddle.index, r.controllability?.measure)));
     let best = singles.filter(|(_, measure)| measure.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));

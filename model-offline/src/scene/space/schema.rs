@@ -328,14 +328,13 @@ pub struct DiscretizationSection {
     /// Integration rule (default: scni-stabilised; placement to a tolerance takes fem-t10).
     pub integration: Option<Located<Integration>>,
     /// Basis of the shape functions (default linear).
-    #[serde(default)]
-    pub basis: Basis,
+    pub basis: Option<Basis>,
 }
 
 impl DiscretizationSection {
     /// Whether anything of the method is said.
     pub fn names_method(&self) -> bool {
-        self.integration.is_some() || self.support.is_some() || self.basis != Basis::default()
+        self.integration.is_some() || self.support.is_some() || self.basis.is_some()
     }
 }
 

@@ -363,7 +363,7 @@ impl Validator<'_> {
         };
         let integration = section.integration.as_ref().map_or_else(Integration::default, |i| *i.get());
         let support = section.support.as_ref().map_or_else(|| integration.default_support_in_space(), |s| *s.get());
-        let method = Method { support, basis: section.basis, ..Method::new(integration) };
+        let method = Method { support, basis: section.basis.unwrap_or_default(), ..Method::new(integration) };
         let discretization = Discretization::new(resolution, method);
         limits::check_in_space(&discretization, extent).map_err(|error| {
             let span = match error {
