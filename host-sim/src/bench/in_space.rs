@@ -19,10 +19,11 @@ use model_offline::reduction::{TabulatedBody, TabulationReport};
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
-use model_offline::table::{TableBuildError, TableOptions};
+use model_offline::table::{BuiltTable, TableBuildError, TableOptions};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::comparison::ends_early;
 use super::error::SimError;
 use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
 use super::insertion::{Extras, Label};
@@ -147,6 +148,9 @@ pub struct SpaceTableResult {
     pub bytes: usize,
     /// Deepest knot, length.
     pub depth_end: f64,
+    /// Where and why it ends before the needle does; results of older versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ends_early: Option<String>,
 }
 
 /// One simulated insertion.
@@ -375,7 +379,7 @@ impl<'a> SpaceComparison<'a> {
         let Some(&(tissue, table_tissue)) = self.wanted.last() else { return Ok(None) };
         let (world, believed) = (self.of(tissue), self.of(table_tissue));
         let repeated = signals::ends_at_once(|| -> Result<_, SimError> {
-            let table = table_of(believed, self.simulation)?;
+            let table = table_of(believed, self.simulation)?.table;
             let body = PreparedBody::new(&world.model, &table.paddles(), true, self.options.threads)?;
             Ok((body, table.to_bytes()?))
         });
@@ -453,9 +457,9 @@ fn bodies_of(model: &InsertionModel, case: &SpaceCase) -> CaseBodies {
 }
 
 /// The table of the paddles that control a tissue best.
-fn table_of(believed: &Tissue, simulation: &Simulation) -> Result<SpaceTable, SimError> {
+fn table_of(believed: &Tissue, simulation: &Simulation) -> Result<BuiltTable<SpaceTable>, SimError> {
     let options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
-    Ok(SpaceTable::build(&believed.model, &believed.optimum.dynamic, &options)?)
+    Ok(SpaceTable::build_as_deep_as_it_goes(&believed.model, &believed.optimum.dynamic, &options)?)
 }
 
 fn case(
@@ -473,9 +477,9 @@ fn case(
         Insertion { body: &body, simulation, label, extras, spectator: None, is_held_against_full: true }
             .uncontrolled(artifacts)
     };
-    let (table, none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
-        let table = table_of(believed, simulation)?;
-        Ok((table, still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
+    let ((table, ended), none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
+        let BuiltTable { table, ended } = table_of(believed, simulation)?;
+        Ok(((table, ended), still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
     })?;
     let bytes = table.to_bytes()?;
     let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
@@ -499,6 +503,7 @@ fn case(
             paddles: table.paddles(),
             bytes: bytes.len(),
             depth_end: table.validity().depth_end,
+            ends_early: ends_early(table.validity().depth_end, simulation.needle.depth(), ended.as_ref()),
         },
         improvement: fixture.max_orthogonal_error / dynamic.max_orthogonal_error,
         improvement_over_none: none.max_orthogonal_error / dynamic.max_orthogonal_error,

@@ -285,6 +285,9 @@ pub struct TableResult {
     pub depth: Vec<f64>,
     /// Feed-forward path of the paddle, length.
     pub paddle_path: Vec<[f64; 2]>,
+    /// Where and why it ends before the needle does; results of older versions do not say.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ends_early: Option<String>,
 }
 
 /// What was compared. Absent strategies were not asked for.
@@ -393,6 +396,28 @@ pub struct StrategyResult {
     /// Which model answered for the tissue, and how well; results of older versions do not say.
     #[serde(default)]
     pub plant: PlantAccount,
+}
+
+/// Part of the largest error by which its tissue may be off before the error is one of the tissue's model.
+const MOST_OFF: f64 = 0.25;
+
+impl StrategyResult {
+    /// Part of the largest error by which the tissue was off, where that is too much to go by; infinite where a model stood in for the
+    /// full one, which could not go the same way.
+    pub fn tissue_off(&self) -> Option<f64> {
+        let off = if self.plant.not_verified.is_some() { f64::INFINITY } else { self.plant.off()? };
+        let share = off / self.max_orthogonal_error;
+        (share > MOST_OFF).then_some(share)
+    }
+
+    /// The same in words.
+    pub(crate) fn tissue_off_in_words(&self) -> Option<String> {
+        let share = self.tissue_off()?;
+        Some(match share.is_finite() {
+            true => format!("its tissue is up to {:.0} % of that off", 100.0 * share),
+            false => "how far its tissue is off is not known".to_owned(),
+        })
+    }
 }
 
 /// The body at one moment of the insertion.

@@ -192,7 +192,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<(), SimError> {
 
 /// Goes on inserting under the page's knobs.
 fn go_on(args: &RunArgs, view: &View, comparison: &Comparison<'_>) -> Result<(), SimError> {
-    let Some((scene, table_tissue, EncodedTable { table, bytes })) = comparison.last_case() else { return Ok(()) };
+    let Some((scene, table_tissue, EncodedTable { table, bytes, .. })) = comparison.last_case() else { return Ok(()) };
     let options = comparison.options();
     let basis = InsertionBasis {
         program: &options.program,

@@ -11,6 +11,7 @@ mod fuzz;
 mod missing;
 mod mistakes;
 mod needle_signals;
+mod off_the_planned_way;
 mod options;
 mod other_scene;
 #[path = "../scenes/mod.rs"]

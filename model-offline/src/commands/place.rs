@@ -5,13 +5,14 @@ use super::error::CliError;
 use super::json::write_json;
 use super::place_space;
 use super::place_text;
+use super::table::early_end;
 use model_offline::model::ModelError;
 use model_offline::output;
 use model_offline::output::check_outputs;
 use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;
-use model_offline::table::{self, TableOptions};
+use model_offline::table::{self, BuiltTable, EndedEarly, TableOptions};
 use model_offline::tell;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -53,13 +54,23 @@ pub(super) fn run(args: &PlaceArgs) -> Result<(), CliError> {
 
 /// A study whose JSON and text are out; the table, or why there is none, is left.
 struct Placed {
-    table: Option<Result<Vec<u8>, CliError>>,
+    table: Option<Result<MadeTable, CliError>>,
 }
+
+/// The bytes of a table, and why it ends before the insertion does.
+type MadeTable = (Vec<u8>, Option<EndedEarly>);
 
 impl Placed {
     fn finish(self, args: &PlaceArgs) -> Result<(), CliError> {
         match (self.table, &args.table) {
-            (Some(table), Some(path)) => Ok(output::write_whole(path, &table?)?),
+            (Some(table), Some(path)) => {
+                let (bytes, ended) = table?;
+                output::write_whole(path, &bytes)?;
+                if !args.run.quiet {
+                    tell!("{}", early_end(ended));
+                }
+                Ok(())
+            }
             _ => Ok(()),
         }
     }
@@ -84,9 +95,10 @@ fn place(scene: &Scene, args: &PlaceArgs) -> Result<Placed, CliError> {
 }
 
 /// The controller table of the best dynamic paddle.
-fn table_of(study: &PlacementStudy) -> Result<Vec<u8>, CliError> {
+fn table_of(study: &PlacementStudy) -> Result<MadeTable, CliError> {
     let paddle = study.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
-    Ok(table::to_bytes(&table::build(&study.model, paddle, &TableOptions::default())?)?)
+    let BuiltTable { table, ended } = table::build_as_deep_as_it_goes(&study.model, paddle, &TableOptions::default())?;
+    Ok((table::to_bytes(&table)?, ended))
 }
 
 type AccuracyOutcome = Result<StudyAccuracy, ModelError>;
@@ -94,7 +106,7 @@ type AccuracyOutcome = Result<StudyAccuracy, ModelError>;
 fn document(
     study: &PlacementStudy,
     accuracy: Option<&AccuracyOutcome>,
-    table: Option<&Result<Vec<u8>, CliError>>,
+    table: Option<&Result<MadeTable, CliError>>,
 ) -> Value {
     let scene = study.model.scene();
     let known = accuracy.and_then(|a| a.as_ref().ok());

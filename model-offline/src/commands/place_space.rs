@@ -17,6 +17,8 @@ use std::path::Path;
 
 /// What stands where there is no number.
 const NONE: &str = "–";
+/// What is said of a difference that is smaller than the errors.
+const LEFT_OPEN: &str = ", which the errors leave open";
 /// Pairs that are listed; all are in the JSON.
 const LISTED: usize = 10;
 
@@ -37,7 +39,7 @@ fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), C
     bar.finish();
     write_json(json, &document(&study, &warnings))?;
     if !run.quiet {
-        for [a, b] in overlapping(&study) {
+        for [a, b] in study.overlapping() {
             eprintln!("note: paddles {a} and {b} overlap, and cannot be attached together: no such pair is the best");
         }
         tell!("{}{}", summary(&study), warned(&warnings));
@@ -67,6 +69,7 @@ fn full_by_set(estimate: &SpaceErrorEstimate) -> &Vec<f64> {
 
 fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
     let (scene, placement) = (study.model.scene(), &study.placement);
+    let static_error = |set| study.uncertain().and_then(|uncertain| uncertain.static_error(set));
     let (mut paddles, mut pairs) = (json!(placement.paddles), json!(placement.pairs));
     let results = paddles.as_array_mut().into_iter().flatten().chain(pairs.as_array_mut().into_iter().flatten());
     for (i, result) in results.enumerate() {
@@ -76,11 +79,12 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
             let error = estimate.and_then(|estimate| of(estimate).get(i)).filter(|_| !result[key].is_null());
             result["error"][key] = json!(error);
         }
-        result["error"]["max_orthogonal"] = json!(static_error(study, i));
+        result["error"]["max_orthogonal"] = json!(static_error(i));
     }
     let mut no_paddle = json!(placement.no_paddle);
-    no_paddle["error"] =
-        json!({ "max_orthogonal": static_error(study, placement.paddles.len() + placement.pairs.len()) });
+    no_paddle["error"] = json!({ "max_orthogonal": static_error(placement.without()) });
+    let overlapping = study.overlapping();
+    let as_good = |best| study.uncertain().map(|uncertain| uncertain.as_good(best, &overlapping));
     json!({
         "scene": scene.name,
         "dimension": 3,
@@ -94,46 +98,21 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
         "static_nodes": placement.profile_nodes,
         "paddles": paddles,
         "pairs": pairs,
-        "overlapping": overlapping(study),
+        "overlapping": overlapping,
         "no_paddle": no_paddle,
         "optimum": placement.optimum,
         "optimum_single": placement.optimum_single,
+        "as_good": as_good(&placement.optimum),
+        "as_good_single": as_good(&placement.optimum_single),
         "warnings": warnings,
     })
-}
-
-/// The static study of a paddle, then of a pair, then of none.
-fn static_study(study: &SpaceStudy, set: usize) -> Option<&SpaceStatic> {
-    let placement = &study.placement;
-    let singles = placement.paddles.iter().map(|paddle| &paddle.answer.static_study);
-    let pairs = placement.pairs.iter().map(|pair| &pair.answer.static_study);
-    singles.chain(pairs).chain([&placement.no_paddle.static_study]).nth(set)
-}
-
-/// The same with what is estimated of its error per depth at rest.
-fn static_of(study: &SpaceStudy, set: usize) -> Option<(&SpaceStatic, f64)> {
-    let of = static_study(study, set)?;
-    let per_depth = study.error_estimate.as_ref()?.per_depth_by_set.get(set)?;
-    // Of an insertion that stopped at once nothing is known.
-    (!of.depth.is_empty()).then_some((of, *per_depth))
-}
-
-/// Estimated error of its largest orthogonal displacement; none where nothing is known of the model at rest.
-fn static_error(study: &SpaceStudy, set: usize) -> Option<f64> {
-    static_of(study, set).map(|(of, per_depth)| of.largest(of.depth.len(), per_depth).1)
-}
-
-/// Pairs of paddles that cannot be attached together, by index.
-fn overlapping(study: &SpaceStudy) -> Vec<[u32; 2]> {
-    study.model.overlapping().iter().map(|pair| pair.map(|p| study.model.scene().paddles[p].index)).collect()
 }
 
 /// The study on a screen.
 fn summary(study: &SpaceStudy) -> String {
     let (scene, placement) = (study.model.scene(), &study.placement);
-    let singles = placement.paddles.iter().map(|p| (vec![p.index], &p.answer));
-    let pairs = placement.pairs.iter().map(|p| (p.paddles.to_vec(), &p.answer));
-    let all: Vec<(Vec<u32>, &SpaceAnswer)> = singles.chain(pairs).collect();
+    let all: Vec<(&[u32], &SpaceAnswer)> = placement.sets().collect();
+    let static_error = |set| study.uncertain().and_then(|uncertain| uncertain.static_error(set));
     let studies = all.iter().map(|(_, answer)| &answer.static_study).chain([&placement.no_paddle.static_study]);
     let digits = decimals(smallest_told(studies.map(|study| study.max_orthogonal)), 6);
     let mut out = format!(
@@ -162,11 +141,15 @@ fn summary(study: &SpaceStudy) -> String {
             "{:>8}   {:>12}{} {:>8} {:>10} {:>8}   {}",
             named(paddles),
             measure(answer.controllability_measure),
-            if [&placement.optimum.dynamic, &placement.optimum_single.dynamic].contains(&paddles) { '*' } else { ' ' },
+            if [&placement.optimum.dynamic, &placement.optimum_single.dynamic].iter().any(|best| best == paddles) {
+                '*'
+            } else {
+                ' '
+            },
             error(by_set, answer.controllability_measure),
             measure(answer.controllability_full),
             error(full_by_set, answer.controllability_full),
-            fixture(&answer.static_study, static_error(study, i), digits)
+            fixture(&answer.static_study, static_error(i), digits)
         );
     }
     if left > 0 {
@@ -175,22 +158,24 @@ fn summary(study: &SpaceStudy) -> String {
     let _ = writeln!(
         out,
         "    none   {NONE:>12}  {NONE:>8} {NONE:>10} {NONE:>8}   {}",
-        fixture(&placement.no_paddle.static_study, static_error(study, all.len()), digits)
+        fixture(&placement.no_paddle.static_study, static_error(placement.without()), digits)
     );
     for (what, best) in [("single paddle", &placement.optimum_single), ("pair", &placement.optimum)] {
         if what == "pair" && placement.pairs.is_empty() {
             continue;
         }
+        let as_good = study.uncertain().map(|uncertain| uncertain.as_good(best, &study.overlapping()));
+        let as_good = as_good.unwrap_or_default();
         let words = |paddles: &[u32]| if paddles.is_empty() { NONE.to_owned() } else { named(paddles) };
         let _ = writeln!(
             out,
-            "\nbest static {what}: {}{}; best dynamic {what}: {}",
+            "\nbest static {what}: {}{}; best dynamic {what}: {}{}",
             words(&best.fixture),
-            as_good(study, &all, &best.fixture),
-            words(&best.dynamic)
+            or_others(&as_good.fixtures),
+            words(&best.dynamic),
+            or_others(&as_good.dynamic)
         );
-        let fixture = all.iter().position(|(paddles, _)| *paddles == best.fixture);
-        out.extend(fixture.and_then(|place| harms(what, study, place)));
+        out.extend(harms(what, study, &best.fixture));
     }
     if let Some(line) = second_pays(study) {
         let _ = writeln!(out, "{line}");
@@ -206,44 +191,24 @@ fn summary(study: &SpaceStudy) -> String {
     out
 }
 
-/// Which other fixtures of as many paddles the errors leave as good as the best, to the depth that both reached; none that stopped where
-/// the best did not.
-fn as_good(study: &SpaceStudy, all: &[(Vec<u32>, &SpaceAnswer)], best: &[u32]) -> String {
-    let Some(place) = all.iter().position(|(paddles, _)| paddles == best) else { return String::new() };
-    let Some((of_best, best_per_depth)) = static_of(study, place) else { return String::new() };
-    let is_as_good = |i: usize| {
-        static_of(study, i).is_some_and(|(other, per_depth)| {
-            let common = other.depth.len().min(of_best.depth.len());
-            let (largest, error) = other.largest(common, per_depth);
-            let (least, its_error) = of_best.largest(common, best_per_depth);
-            (other.failure.is_none() || of_best.failure.is_some()) && largest - error <= least + its_error
-        })
-    };
-    let overlapping = overlapping(study);
-    let is_alike = |paddles: &[u32]| {
-        paddles.len() == best.len() && paddles != best && !overlapping.iter().any(|pair| pair[..] == *paddles)
-    };
-    let alike = all.iter().enumerate().filter(|(i, (paddles, _))| is_alike(paddles) && is_as_good(*i));
-    let found: Vec<String> = alike.map(|(_, (paddles, _))| named(paddles)).collect();
-    match &found[..] {
+/// Others that the errors leave as good as the best.
+fn or_others(others: &[Vec<u32>]) -> String {
+    match others {
         [] => String::new(),
-        [one] => format!(" (or {one}, within the errors)"),
-        [one, two] => format!(" (or {one}, or {two}, within the errors)"),
-        [first, rest @ ..] => format!(" (or {first}, or {} others, within the errors)", rest.len()),
+        [one] => format!(" (or {}, within the errors)", named(one)),
+        [one, two] => format!(" (or {}, or {}, within the errors)", named(one), named(two)),
+        [first, rest @ ..] => format!(" (or {}, or {} others, within the errors)", named(first), rest.len()),
     }
 }
 
-/// Says so where even the best fixture, which is set `place`, moves the target more than no paddle does.
-fn harms(what: &str, study: &SpaceStudy, place: usize) -> Option<String> {
-    let none = study.placement.paddles.len() + study.placement.pairs.len();
-    let (of, of_none) = (static_study(study, place)?, static_study(study, none)?);
+/// Says so where even the best fixture moves the target more than no paddle does.
+fn harms(what: &str, study: &SpaceStudy, best: &[u32]) -> Option<String> {
+    let placement = &study.placement;
+    let (held, without) = (placement.sets().position(|(paddles, _)| paddles == best)?, placement.without());
+    let (of, of_none) = (placement.static_study(held)?, placement.static_study(without)?);
     let factor = of.over(of_none).filter(|factor| *factor > 1.0)?;
-    let common = of.depth.len().min(of_none.depth.len());
-    let within = |set: usize| static_of(study, set).map(|(of, per_depth)| of.largest(common, per_depth));
-    let is_open = within(place)
-        .zip(within(none))
-        .is_some_and(|((largest, error), (least, its_error))| largest - error <= least + its_error);
-    let open = if is_open { ", which the errors leave open" } else { "" };
+    let is_open = study.uncertain().and_then(|uncertain| uncertain.may_hold_as_well(held, without)) == Some(true);
+    let open = if is_open { LEFT_OPEN } else { "" };
     Some(format!(
         "no static {what} helps: the best moves the target {factor:.2} times as far as no paddle does{open}\n"
     ))
@@ -252,15 +217,22 @@ fn harms(what: &str, study: &SpaceStudy, place: usize) -> Option<String> {
 /// Whether the second paddle buys anything at rest.
 fn second_pays(study: &SpaceStudy) -> Option<String> {
     let placement = &study.placement;
-    let least = |measures: &mut dyn Iterator<Item = f64>| measures.min_by(f64::total_cmp).filter(|m| m.is_finite());
-    let single = least(&mut placement.paddles.iter().map(|p| p.answer.controllability_measure))?;
-    let pair = least(&mut placement.pairs.iter().map(|p| p.answer.controllability_measure))?;
+    let place = |best: &[u32]| placement.sets().position(|(paddles, _)| paddles == best);
+    let [alone, together] = [&placement.optimum_single, &placement.optimum].map(|best| place(&best.dynamic));
+    let (alone, together) = alone.zip(together).filter(|_| !placement.pairs.is_empty())?;
+    let [single, pair] = [alone, together].map(|set| placement.sets().nth(set).map(|(_, a)| a.controllability_measure));
+    let (single, pair) = single.zip(pair)?;
+    let is_open = study.uncertain().is_some_and(|uncertain| {
+        let ranges = uncertain.measure_range(alone).zip(uncertain.measure_range(together));
+        ranges.is_some_and(|([least, _], [_, most])| least <= most)
+    });
     let way = "the way for the worst direction";
     let gain = 100.0 * (1.0 - pair / single);
     // What would be told as nothing is nothing.
     Some(match format!("{gain:.1}") {
         told if gain > 0.0 && told != "0.0" => {
-            format!("a second paddle shortens {way} by {told} % ({single:.3} to {pair:.3})")
+            let open = if is_open { LEFT_OPEN } else { "" };
+            format!("a second paddle shortens {way} by {told} % ({single:.3} to {pair:.3}){open}")
         }
         _ => format!("a second paddle does not shorten {way} ({single:.3} to {pair:.3})"),
     })

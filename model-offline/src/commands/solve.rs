@@ -7,7 +7,7 @@ use super::json::write_json;
 use super::solve_space::{self, SpaceArgs};
 use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{EnergyAccount, Inserted, SlippingNeedle, Way, insert};
-use model_offline::number::length;
+use model_offline::number::{in_unit, length};
 use model_offline::output;
 use model_offline::output::vtu::{self, Shown};
 use model_offline::output::{Geometry, NodalFields, State, body, check_outputs, has_stress};
@@ -33,7 +33,8 @@ pub(super) struct SolveArgs {
     /// Needle depth, length units.
     #[arg(long)]
     depth: f64,
-    /// Paddle displacement, length units; in space three numbers, and once for every paddle, in their order.
+    /// Paddle displacement, length units; in space three numbers, and once for every paddle, in their order. The paddle goes there
+    /// along with the needle; the Jacobian is that of a paddle that moves once both are there. Where the needle slips these differ.
     #[arg(
         long,
         requires = "paddle",
@@ -107,6 +108,11 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
         ));
     }
     note_what_is_too_deep(&scene, args.depth);
+    let (gone, available) = (displacement.norm(), scene.actuator.max_displacement);
+    if gone > available {
+        let [gone, available] = [gone, available].map(|length| in_unit(length, &scene.length_unit));
+        eprintln!("note: the paddle is {gone} from rest, and [actuator] max_displacement is {available}");
+    }
     check_all_outputs(&[&args.scene.scene], args)?;
     solve(&scene, Held { paddle, displacement }, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
 }
@@ -292,7 +298,7 @@ fn print(scene: &Scene, solved: &Solved<'_>, held: Held, args: &SolveArgs) {
                 length(needle.cut_length()),
                 length(needle.depth_of_target())
             );
-            print_balance(needle.energy());
+            print_balance(needle.energy(), scene.relaxes());
         }
     }
 }
@@ -301,10 +307,11 @@ fn print(scene: &Scene, solved: &Solved<'_>, held: Held, args: &SolveArgs) {
 const BALANCED: f64 = 0.01;
 
 /// Where the work at base and paddle went, and whether it is all there.
-fn print_balance(energy: EnergyAccount) {
+fn print_balance(energy: EnergyAccount, relaxes: bool) {
     let EnergyAccount { stored, friction, cutting, .. } = energy;
     let done = energy.work + energy.paddle + energy.base;
-    say!("work {done:.6}: stored {stored:.6}, friction {friction:.6}, cutting {cutting:.6}");
+    let kept = if relaxes { "stored or lost by relaxing" } else { "stored" };
+    say!("work {done:.6}: {kept} {stored:.6}, friction {friction:.6}, cutting {cutting:.6}");
     let imbalance = energy.imbalance();
     if imbalance.abs() > BALANCED {
         say!(
@@ -347,6 +354,15 @@ fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveA
     if let Solved::Within(needle, _) = solved {
         document["strain_energy"] = needle.energy().stored.into();
         document["energy_imbalance"] = needle.energy().imbalance().into();
+    }
+    if scene.relaxes() {
+        // What an increment's potential is of tissue that relaxes is no energy, and what a slipping needle's work went into is not told
+        // apart from what is lost: nothing is left to balance it with.
+        document["strain_energy"] = serde_json::Value::Null;
+        if let Solved::Within(needle, _) = solved {
+            document["stored_or_lost"] = needle.energy().stored.into();
+            document["energy_imbalance"] = serde_json::Value::Null;
+        }
     }
     let _together = output::together();
     write_json(args.json.as_deref(), &document)?;

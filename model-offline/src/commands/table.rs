@@ -2,6 +2,8 @@
 
 use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
 use super::error::CliError;
+use firmware::contract::Table;
+use model_offline::number::length;
 use model_offline::output::check_outputs;
 use model_offline::output::{self, space_table_text, table_text};
 use model_offline::parallel;
@@ -10,7 +12,7 @@ use model_offline::placement::space::workflow::insertion_model;
 use model_offline::say;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
-use model_offline::table::{self, TableBuildError, TableOptions};
+use model_offline::table::{self, BuiltTable, EndedEarly, TableBuildError, TableOptions};
 use std::path::PathBuf;
 
 /// Options of `table`.
@@ -46,11 +48,13 @@ pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
     let (model, paddle) = model_with_paddle(&scene, paddle)?;
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
-    let table = table::build(&model, paddle, &options)?;
+    let BuiltTable { table, ended } = table::build_as_deep_as_it_goes(&model, paddle, &options)?;
     let bytes = table::to_bytes(&table)?;
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
-        say!("{}: {} bytes\n{}", args.output.display(), bytes.len(), table_text::summary(&table));
+        let summary = table_text::summary(&table);
+        let steep = too_steep(&table, scene.needle.speed);
+        say!("{}: {} bytes\n{summary}{}{steep}", args.output.display(), bytes.len(), early_end(ended));
     }
     Ok(())
 }
@@ -64,11 +68,38 @@ fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
         false => args.paddle.clone(),
     };
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
-    let table = SpaceTable::build(&model, &paddles, &options)?;
+    let BuiltTable { table, ended } = SpaceTable::build_as_deep_as_it_goes(&model, &paddles, &options)?;
     let bytes = table.to_bytes()?;
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
-        say!("{}: {} bytes\n{}", args.output.display(), bytes.len(), space_table_text::summary(&table));
+        let summary = space_table_text::summary(&table);
+        say!("{}: {} bytes\n{summary}{}", args.output.display(), bytes.len(), early_end(ended));
     }
     Ok(())
+}
+
+/// A warning where a paddle cannot follow the path while the needle goes at this speed.
+fn too_steep(table: &Table<f64, 2>, speed: f64) -> String {
+    let (from, slope) = table::steepest_path(table);
+    let rate = table.paddles.first().map_or(f64::INFINITY, |paddle| paddle.max_rate);
+    if slope * speed <= rate {
+        return String::new();
+    }
+    let [wanted, rate, from] = [slope * speed, rate, from].map(length);
+    format!(
+        "\nwarning: from depth {from} on the path asks for {wanted} per s at the scene's needle speed of {}, and the actuator has {rate}: \
+         the target is not held there; insert more slowly, or choose another paddle\n",
+        length(speed)
+    )
+}
+
+/// A warning where the table is not as deep as the insertion.
+pub(super) fn early_end(ended: Option<EndedEarly>) -> String {
+    let told = |ended| {
+        format!(
+            "\nwarning: {ended}; beyond that no controller has anything to go by: choose another paddle, insert less deep, or where \
+             contact and paddle end nodes may be too close for the law: another --integration, or fewer nodes\n"
+        )
+    };
+    ended.map_or_else(String::new, told)
 }

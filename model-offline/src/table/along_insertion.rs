@@ -1,6 +1,6 @@
 //! Knots of tissue whose state depends on its past: along the insertion that the scene says, at its speed.
 
-use super::{TableBuildError, check};
+use super::{Followed, TableBuildError, check};
 use crate::model::{ModelError, Pose, TissueModel};
 use crate::needle::Course;
 use crate::placement::controllability::best_direction;
@@ -21,11 +21,7 @@ const STEPS: usize = 4;
 ///
 /// # Errors
 /// [`TableBuildError`] where there are not two.
-pub(super) fn knots(
-    model: &TissueModel,
-    position: usize,
-    count: usize,
-) -> Result<heapless::Vec<Knot<f64, 2>, MAX_KNOTS>, TableBuildError> {
+pub(super) fn knots(model: &TissueModel, position: usize, count: usize) -> Result<Followed<2, 1>, TableBuildError> {
     let scene = model.scene();
     let (normal, depth) = (scene.needle.orthogonal(), scene.needle.depth);
     let interval = depth / (count - 1) as f64;
@@ -63,11 +59,14 @@ pub(super) fn knots(
                 let _ = knots.push(knot);
             }
             Err(error) if knots.len() < 2 => return Err(error),
-            Err(_) => break,
+            Err(error) => {
+                slopes(&mut knots);
+                return Ok(Followed { knots, ended: Some(error) });
+            }
         }
     }
     slopes(&mut knots);
-    Ok(knots)
+    Ok(Followed { knots, ended: None })
 }
 
 /// How a paddle is steered.

@@ -7,6 +7,7 @@ pub mod space;
 use self::amplification::largest_amplification;
 use crate::model::{Body, ModelError, TissueModel};
 use crate::needle::NeedleError;
+use crate::number::length;
 use crate::placement::controllability::best_direction;
 use crate::scene::Actuator;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
@@ -123,22 +124,71 @@ impl TableBuildError {
     }
 }
 
+/// A table ends before the insertion of its scene does.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("the table ends at depth {}, of {} that the scene's needle goes: {source}", length(*reached), length(*wanted))]
+pub struct EndedEarly {
+    /// Depth of the last knot.
+    pub reached: f64,
+    /// Depth of the insertion.
+    pub wanted: f64,
+    /// Why there is no further one.
+    pub source: TableBuildError,
+}
+
+/// A table, and why it ends early where it does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BuiltTable<T> {
+    /// The table.
+    pub table: T,
+    /// Why it is not as deep as the insertion.
+    pub ended: Option<EndedEarly>,
+}
+
+/// Knots, and why there are no further ones where the insertion goes on.
+struct Followed<const D: usize, const P: usize> {
+    knots: heapless::Vec<Knot<f64, D, P>, MAX_KNOTS>,
+    ended: Option<TableBuildError>,
+}
+
+impl<const D: usize, const P: usize> Followed<D, P> {
+    /// That they end early in an insertion so deep.
+    fn ended(&mut self, wanted: f64) -> Option<EndedEarly> {
+        let reached = self.knots.last().map_or(0.0, |knot| knot.depth);
+        self.ended.take().map(|source| EndedEarly { reached, wanted, source })
+    }
+}
+
 /// Builds the table of one paddle. When the tissue loses stability on the way, the table ends at the last knot reached
 /// (its validity range says so).
 ///
 /// # Errors
 /// [`TableBuildError`].
 pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> Result<Table<f64, 2>, TableBuildError> {
+    build_as_deep_as_it_goes(model, paddle_index, options).map(|built| built.table)
+}
+
+/// The same, with why the table ends where it ends early.
+///
+/// # Errors
+/// [`TableBuildError`].
+pub fn build_as_deep_as_it_goes(
+    model: &TissueModel,
+    paddle_index: u32,
+    options: &TableOptions,
+) -> Result<BuiltTable<Table<f64, 2>>, TableBuildError> {
     if !(2..=MAX_KNOTS).contains(&options.knots) {
         return Err(TableBuildError::Knots(options.knots));
     }
     let scene = model.scene();
     let position = scene.paddle_position(paddle_index).map_err(ModelError::from)?;
     let slips_or_relaxes = scene.needle.shaft.is_some() || scene.relaxes();
-    let knots = match slips_or_relaxes {
+    let mut followed = match slips_or_relaxes {
         true => along_insertion::knots(model, position, options.knots)?,
         false => knots_of_states(model, position, options.knots)?,
     };
+    let ended = followed.ended(scene.needle.depth);
+    let knots = followed.knots;
     let amplification = match slips_or_relaxes {
         true => 1.0,
         false => largest_amplification(model, position, &knots).map_err(ModelError::from)?,
@@ -155,7 +205,7 @@ pub fn build(model: &TissueModel, paddle_index: u32, options: &TableOptions) -> 
         target: scene.target,
         delay_samples: scene.sensor.delay_samples(),
     };
-    of.table([paddle], knots, lambda_max, options)
+    Ok(BuiltTable { table: of.table([paddle], knots, lambda_max, options)?, ended })
 }
 
 /// What a table says of its scene.
@@ -206,6 +256,16 @@ impl<const D: usize, const N: usize> Described<'_, D, N> {
     }
 }
 
+/// Where a table's path is steepest: depth at which that begins, and how far a paddle has to go for each of the needle's depth.
+pub fn steepest_path<const D: usize, const N: usize, const P: usize>(table: &Table<f64, D, N, P>) -> (f64, f64) {
+    let slopes = table.knots.windows(2).map(|pair| {
+        let gone = pair[1].paddle_path - pair[0].paddle_path;
+        let farthest = gone.column_iter().map(|paddle| paddle.norm()).fold(0.0, f64::max);
+        (pair[0].depth, farthest / (pair[1].depth - pair[0].depth))
+    });
+    slopes.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
+}
+
 /// Refuses a knot that no controller can work with.
 fn check(knot: &Knot<f64, 2>, paddle: u32, available: f64) -> Result<(), TableBuildError> {
     let Knot { depth, jacobian: [jacobian], paddle_path, .. } = knot;
@@ -221,11 +281,7 @@ fn check(knot: &Knot<f64, 2>, paddle: u32, available: f64) -> Result<(), TableBu
 }
 
 /// Knots of tissue whose state is that of needle and paddle, down to where it is stable.
-fn knots_of_states(
-    model: &TissueModel,
-    position: usize,
-    count: usize,
-) -> Result<heapless::Vec<Knot<f64, 2>, MAX_KNOTS>, TableBuildError> {
+fn knots_of_states(model: &TissueModel, position: usize, count: usize) -> Result<Followed<2, 1>, TableBuildError> {
     let scene = model.scene();
     let (paddle, available) = (scene.paddles[position].index, scene.actuator.max_displacement);
     let settings = NewtonSettings::default();
@@ -242,10 +298,10 @@ fn knots_of_states(
                 let _ = knots.push(knot);
             }
             Err(error) if knots.len() < 2 => return Err(TableBuildError::at_knot(&[paddle], depth, error)),
-            Err(_) => break,
+            Err(error) => return Ok(Followed { knots, ended: Some(error.into()) }),
         }
     }
-    Ok(knots)
+    Ok(Followed { knots, ended: None })
 }
 
 /// The bytes of a table file.

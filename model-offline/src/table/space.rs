@@ -1,6 +1,6 @@
 //! Tables in space: one paddle or two that hold the target together.
 
-use super::{Described, TableBuildError, TableOptions, to_bytes};
+use super::{BuiltTable, Described, Followed, TableBuildError, TableOptions, to_bytes};
 use crate::geometry::Implicit as _;
 use crate::model::space::SpaceBody;
 use crate::model::{ModelError, control_derivatives};
@@ -28,11 +28,30 @@ impl SpaceTable {
     /// # Errors
     /// [`TableBuildError`].
     pub fn build(model: &InsertionModel, paddles: &[u32], options: &TableOptions) -> Result<Self, TableBuildError> {
-        match *paddles {
-            [one] => Ok(Self::One(Box::new(build(model, [one], options)?))),
-            [one, other] => Ok(Self::Two(Box::new(build(model, [one, other], options)?))),
-            _ => Err(TableBuildError::Paddles(paddles.len())),
-        }
+        Self::build_as_deep_as_it_goes(model, paddles, options).map(|built| built.table)
+    }
+
+    /// The same, with why the table ends where it ends early.
+    ///
+    /// # Errors
+    /// [`TableBuildError`].
+    pub fn build_as_deep_as_it_goes(
+        model: &InsertionModel,
+        paddles: &[u32],
+        options: &TableOptions,
+    ) -> Result<BuiltTable<Self>, TableBuildError> {
+        let (table, ended) = match *paddles {
+            [one] => {
+                let BuiltTable { table, ended } = build(model, [one], options)?;
+                (Self::One(Box::new(table)), ended)
+            }
+            [one, other] => {
+                let BuiltTable { table, ended } = build(model, [one, other], options)?;
+                (Self::Two(Box::new(table)), ended)
+            }
+            _ => return Err(TableBuildError::Paddles(paddles.len())),
+        };
+        Ok(BuiltTable { table, ended })
     }
 
     /// Reads and checks a table file of either scalar type.
@@ -84,7 +103,7 @@ fn build<const P: usize>(
     model: &InsertionModel,
     indices: [u32; P],
     options: &TableOptions,
-) -> Result<SpatialTable<f64, P>, TableBuildError> {
+) -> Result<BuiltTable<SpatialTable<f64, P>>, TableBuildError> {
     if !(2..=MAX_KNOTS).contains(&options.knots) {
         return Err(TableBuildError::Knots(options.knots));
     }
@@ -93,7 +112,9 @@ fn build<const P: usize>(
     for (place, index) in attached.iter_mut().zip(indices) {
         *place = scene.paddle_position(index).map_err(ModelError::from)?;
     }
-    let knots = knots(model, attached, options.knots)?;
+    let mut followed = knots(model, attached, options.knots)?;
+    let ended = followed.ended(scene.needle.depth);
+    let knots = followed.knots;
     let lambda_max = options.lambda_max.max(mistaken(model, &attached, &knots[0])?);
     let extents = indices.map(|index| {
         let region = scene.paddles.iter().find(|paddle| paddle.index == index).map(|paddle| &paddle.region);
@@ -110,14 +131,14 @@ fn build<const P: usize>(
         target: scene.target,
         delay_samples: IDEAL_DELAY_SAMPLES,
     };
-    of.table(extents, knots, lambda_max, options)
+    Ok(BuiltTable { table: of.table(extents, knots, lambda_max, options)?, ended })
 }
 
 fn knots<const P: usize>(
     model: &InsertionModel,
     attached: [usize; P],
     count: usize,
-) -> Result<heapless::Vec<Knot<f64, 3, P>, MAX_KNOTS>, TableBuildError> {
+) -> Result<Followed<3, P>, TableBuildError> {
     let scene = model.scene();
     let settings = NewtonSettings::default();
     let mut still = model.body(&attached, settings)?;
@@ -136,10 +157,10 @@ fn knots<const P: usize>(
                 let _ = knots.push(knot);
             }
             Err(error) if knots.len() < 2 => return Err(error.into()),
-            Err(_) => break,
+            Err(error) => return Ok(Followed { knots, ended: Some(error.into()) }),
         }
     }
-    Ok(knots)
+    Ok(Followed { knots, ended: None })
 }
 
 /// One knot: takes both bodies to the depth, the one with its paddles where they hold the target.

@@ -94,7 +94,10 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
     let tip = |length: f64| format!("{SHAFT}kinetic_friction = 0.2\ntip_length = {length}\n");
     type Case<'a> = (&'a [(&'a str, &'a str)], &'a [&'a str]);
     let tolerance = ("spacing = 5.0", "tolerance = 0.05");
-    let cases: [Case<'_>; 27] = [
+    let moved = |amplitude: f64| {
+        format!("[motion]\nbreathing = {{ period = 4.0, amplitude = {amplitude}, direction = [0.0, 1.0] }}\n[immobile]")
+    };
+    let cases: [Case<'_>; 31] = [
         (&[(AXIS, "axis = [0.0, 1.0]")], &["points out of the body: 180°", "turn the axis round"]),
         (&[(AXIS, "axis = [0.5, 1.0]")], &["points out of the body: 153°"]),
         (&[(AXIS, "axis = [1.0, -0.1]")], &["along the surface: 5.7°", "turn the axis inwards"]),
@@ -204,6 +207,20 @@ fn every_warning_is_given_with_its_numbers_where_it_is_due() {
             &["inclusion 1 does nothing: inclusion 2 covers it"],
         ),
         (
+            &[(DEPTH, &tip(20.5))],
+            &["the tip is 20.5 mm long, and the needle goes 20 mm deep: its cutting force is never reached"],
+        ),
+        (
+            // On nodes 5 mm apart tissue bears what it does beside a tip as long, and twice that hides it.
+            &[(DEPTH, &tip(1.0).replace("cutting_force = 1.0", "cutting_force = 21.0"))],
+            &["the tip is 1 mm long, and tissue bears the cutting force of the needle from 10.5 mm on"],
+        ),
+        (
+            &[(DEPTH, "depth = 20.0\nspeed = 2e5")],
+            &["the needle goes 200000 mm in a second, through a body of 116.6 mm in less than a millisecond"],
+        ),
+        (&[("[immobile]", &moved(60.0))], &["[motion] moves the body by up to 60 mm, and it is 116.6 mm across"]),
+        (
             // Inside, with the paddle on the skin above.
             &[
                 (CONTACT, "[[50.0, 50.0], [50.0, 40.0]]"),
@@ -242,7 +259,14 @@ fn names_and_units_have_no_characters_that_a_terminal_obeys() {
 /// What is not unusual, though near to it.
 #[test]
 fn what_is_meant_is_not_warned_of() {
-    let fine: [&[(&str, &str)]; 7] = [
+    let tip = format!("{SHAFT}kinetic_friction = 0.2\ntip_length = 20.0\n");
+    let presses = tip.replace("cutting_force = 1.0", "cutting_force = 19.0").replace("= 20.0\n", "= 1.0\n");
+    let moved = "[motion]\nbreathing = { period = 4.0, amplitude = 50.0, direction = [0.0, 1.0] }\n[immobile]";
+    let fine: [&[(&str, &str)]; 11] = [
+        &[(DEPTH, &tip)],
+        &[(DEPTH, &presses)],
+        &[(DEPTH, "depth = 20.0\nspeed = 1e5")],
+        &[("[immobile]", moved)],
         // Less deep than half the way, past the target on purpose, as in `breast`.
         &[(AXIS, "axis = [0.5, -1.0]"), (DEPTH, "depth = 10.0")],
         // To the target itself.

@@ -44,6 +44,8 @@ fn a_study_in_space_is_written_as_the_contract_says() {
     }
     assert_eq!(study["pairs"][1]["paddles"], serde_json::json!([3, 6]));
     assert_eq!(study["optimum"]["dynamic"].as_array().unwrap().len(), 2);
+    // Of numbers without errors nobody knows who is as good.
+    assert!(study["as_good"].is_null() && study["as_good_single"].is_null());
     // The paddle on the needle's side of the target, as in the continuum.
     assert_eq!(study["optimum_single"]["dynamic"], serde_json::json!([3]));
 }
@@ -66,6 +68,10 @@ fn a_tolerance_comes_with_the_errors_of_both_measures() {
         }
     }
     assert!(estimate["by_set"] != estimate["full_by_set"]);
+    // Who is as good as the best, of whom is known what its errors leave open: 3 alone controls best by far.
+    assert_eq!(study["as_good_single"]["dynamic"], serde_json::json!([]));
+    let [one, two] = ["as_good_single", "as_good"].map(|key| study[key]["static"].as_array().unwrap().len());
+    assert!(one > 0 && two == 0, "{one} {two}");
 }
 
 #[test]

@@ -154,6 +154,18 @@ fn a_tolerance_is_kept_and_its_estimate_is_no_smaller_than_the_error() {
     assert!(error <= estimate.controllability + 0.003 && estimate.controllability <= 0.05, "{error} {estimate:?}");
 }
 
+/// A bundled scene as its user has it: at its own tolerance, by the method that `place` takes, against the continuum limits.
+#[test]
+fn a_bundled_body_is_placed_at_its_own_tolerance() {
+    let scene = SpaceScene::bundled("mound").unwrap();
+    let Resolution::Tolerance(tolerance) = scene.discretization.resolution else { panic!("a tolerance") };
+    let limits = golden()["mound"]["inclusion"].take();
+    let placed = parallel::within(parallel::available(), || discretise(&scene.for_placement())).unwrap();
+    let (error, estimate) = (errors(&placed.rest, &limits)[0], placed.estimate.unwrap().controllability);
+    println!("{} nodes, {error:.4}, estimated {estimate:.4}", placed.model.nodes());
+    assert!(error <= tolerance && estimate <= tolerance, "{error} {estimate} {tolerance}");
+}
+
 /// The default rule is held against quadratic tetrahedra, which are refined as far as it needs.
 #[test]
 fn a_tolerance_of_the_default_rule_is_kept_with_what_its_reference_leaves_open() {

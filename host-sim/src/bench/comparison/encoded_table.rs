@@ -3,7 +3,9 @@
 use std::path::Path;
 
 use firmware::contract::{Table, decode};
+use model_offline::number::length;
 use model_offline::scene::Scene;
+use model_offline::table::EndedEarly;
 
 use crate::bench::error::SimError;
 use crate::record::files::read_bytes;
@@ -16,7 +18,7 @@ use model_offline::scene::TissueVariant;
 pub fn read_table(path: &Path) -> Result<EncodedTable, SimError> {
     let bytes = read_bytes(path)?;
     let table = decode(&bytes).map_err(|source| SimError::Table { path: path.to_owned(), source })?;
-    Ok(EncodedTable { table, bytes })
+    Ok(EncodedTable { table, bytes, ended: None })
 }
 
 /// A table, and the bytes that the controller decodes.
@@ -26,6 +28,19 @@ pub struct EncodedTable {
     pub table: Table<f64, 2>,
     /// Its bytes in the controller's number type.
     pub bytes: Vec<u8>,
+    /// Why it is not as deep as its scene's insertion, where it was built here and ended early.
+    pub ended: Option<EndedEarly>,
+}
+
+/// Says so where a table ends before the needle does, both depths as lengths, and why where that is known.
+pub(in crate::bench) fn ends_early(depth_end: f64, needle_depth: f64, ended: Option<&EndedEarly>) -> Option<String> {
+    // As deep but for rounding.
+    if depth_end >= needle_depth * (1.0 - 1e-9) {
+        return None;
+    }
+    let plainly =
+        || format!("the table ends at depth {}, and the needle goes to {}", length(depth_end), length(needle_depth));
+    Some(ended.map_or_else(plainly, ToString::to_string))
 }
 
 /// Refuses a table in other units of length and stress than `expected`.

@@ -6,9 +6,12 @@ use super::{Comparison, EncodedTable};
 use crate::bench::error::SimError;
 use crate::bench::insertion::{MeasuredInsertion, SimulatedInsertion};
 use crate::bench::strategy::Strategy;
+use crate::runtime::error::RuntimeError;
 use crate::runtime::plant::observer::Spectator;
 use crate::runtime::signals;
 use crate::runtime::time::mode::RunMode;
+use crate::world::simulation::Simulation;
+use crate::world::tissue::WantedPlant;
 
 impl Comparison<'_> {
     /// The dynamic strategy of all cases in lockstep; none where only free-run is asked for. Who looks on sees one after
@@ -32,26 +35,76 @@ impl Comparison<'_> {
         if spectator.is_some() {
             let watched = |(i, table): (usize, &EncodedTable)| {
                 self.progress.say(&format!("{}: dynamic, {}", self.cases[i].tissue, RunMode::Lockstep));
-                insertion(i).controlled(&self.controller(table, RunMode::Lockstep, spectator)).map(Some)
+                insertion(i).controlled(&self.controller(table, RunMode::Lockstep, spectator))
             };
-            return self.tables.iter().enumerate().map(watched).collect();
+            let measured = self.tables.iter().enumerate().map(watched).collect::<Result<Vec<_>, _>>()?;
+            return self.in_full_where_off(measured);
         }
+        let all: Vec<usize> = (0..self.cases.len()).collect();
+        let measured = self.side_by_side(&all, &self.simulation, &step)?;
+        self.in_full_where_off(measured.into_iter().collect::<Result<Vec<_>, _>>()?)
+    }
+
+    /// The dynamic strategy of these cases, in their order, each with what became of it.
+    ///
+    /// What leaves nothing to tidy up ends at once with a signal; the runs themselves look at signals, and each tidies up its link.
+    /// One must not end while another runs: hence one step after the other. Plants are made in order: cases share reduced models,
+    /// and one is trained on all threads.
+    ///
+    /// # Errors
+    /// [`SimError`] where a plant cannot be made.
+    fn side_by_side(
+        &self,
+        cases: &[usize],
+        simulation: &Simulation,
+        step: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Result<MeasuredInsertion, SimError>>, SimError> {
+        let step = || step();
+        let insertion = |i: usize| -> SimulatedInsertion<'_> {
+            let label = self.cases[i].label(Strategy::dynamic(RunMode::Lockstep));
+            SimulatedInsertion { simulation, ..self.insertion(&self.cases[i], label, &step) }
+        };
         let controller = |i: usize| self.controller(&self.tables[i], RunMode::Lockstep, None);
-        // What leaves nothing to tidy up ends at once with a signal; the runs themselves look at signals, and each tidies
-        // up its link. One must not end while another runs: hence one step after the other. Plants are made in order:
-        // cases share reduced models, and one is trained on all threads.
         let plants = signals::ends_at_once(|| {
-            (0..self.cases.len())
-                .map(|i| Ok((i, insertion(i).plant(&controller(i))?)))
-                .collect::<Result<Vec<_>, SimError>>()
+            cases.iter().map(|&i| Ok((i, insertion(i).plant(&controller(i))?))).collect::<Result<Vec<_>, SimError>>()
         })?;
         let finished = parallel::map_each(plants, self.options.threads, |(i, plant)| {
-            Ok((i, insertion(i).with_controller(&controller(i), plant)?))
+            (i, insertion(i).with_controller(&controller(i), plant))
         });
-        let finished = finished.into_iter().collect::<Result<Vec<_>, SimError>>()?;
-        let measured = signals::ends_at_once(|| {
-            parallel::map_each(finished, self.options.threads, |(i, run)| insertion(i).measured(&controller(i), run))
-        });
-        measured.into_iter().map(|measured| measured.map(Some)).collect()
+        Ok(signals::ends_at_once(|| {
+            parallel::map_each(finished, self.options.threads, |(i, run)| {
+                run.and_then(|run| insertion(i).measured(&controller(i), run))
+            })
+        }))
+    }
+
+    /// Tissue that has a past is simulated by the neighbourhood of the way that its paddle is planned to go, unless somebody says
+    /// otherwise. A controller that goes elsewhere leaves it: where that makes the tissue off by much of the error, the insertion is
+    /// simulated once more with the full model, which takes longer.
+    fn in_full_where_off(&self, measured: Vec<MeasuredInsertion>) -> Result<Vec<Option<MeasuredInsertion>>, SimError> {
+        let mut measured: Vec<Option<MeasuredInsertion>> = measured.into_iter().map(Some).collect();
+        let off = |near: &MeasuredInsertion| near.result.tissue_off_in_words();
+        let again: Vec<(usize, String)> = match self.simulation.plant {
+            Some(_) => Vec::new(),
+            None => measured.iter().enumerate().filter_map(|(i, near)| Some((i, off(near.as_ref()?)?))).collect(),
+        };
+        let Some((first, why)) = again.first() else { return Ok(measured) };
+        self.progress.say(&format!("{}: the full model, because {why}", self.cases[*first].tissue));
+        let cases: Vec<usize> = again.iter().map(|(i, _)| *i).collect();
+        let simulation = Simulation { plant: Some(WantedPlant::Full), ..self.simulation.clone() };
+        for (outcome, (i, why)) in self.side_by_side(&cases, &simulation, &|| ())?.into_iter().zip(again) {
+            match outcome {
+                Ok(mut full) => {
+                    let peak = measured[i].as_ref().map_or(0.0, |near| near.result.max_orthogonal_error);
+                    full.result.plant.first_fallback =
+                        Some(format!("near the planned way {peak:.1e} came out, and {why}"));
+                    measured[i] = Some(full);
+                }
+                // Where the full model cannot go, the other one's answer is all there is, and is said not to be trusted.
+                Err(SimError::Runtime(RuntimeError::World(_))) => {}
+                Err(error) => return Err(error),
+            }
+        }
+        Ok(measured)
     }
 }

@@ -19,10 +19,11 @@ use model_offline::parallel;
 use model_offline::placement::study::steps;
 use model_offline::placement::{PlacementOptions, PlacementStudy, discretise};
 use model_offline::scene::{Scene, TableScalar};
-use model_offline::table::{TableBuildError, TableOptions, build, to_bytes};
+use model_offline::table::{BuiltTable, TableBuildError, TableOptions, build_as_deep_as_it_goes, to_bytes};
 use sha2::{Digest, Sha256};
 
 use self::cases::{Case, cases};
+pub(super) use self::encoded_table::ends_early;
 pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
 use self::forecast::Forecast;
 pub use self::progress::{Progress, Silent};
@@ -360,13 +361,13 @@ impl<'p> Comparison<'p> {
             .iter()
             .map(|case| {
                 let known = given.or_else(|| computed_for(case.table_tissue));
-                let EncodedTable { table, bytes } = known.expect("given, or computed for every tissue").clone();
+                let EncodedTable { table, bytes, ended } = known.expect("given, or computed for every tissue").clone();
                 // Refused settings are bad input: found before anything runs.
                 Controller::new(&table, &loop_settings.settings(table.validity.depth_end))?;
                 let scalar = self.options.scalar;
                 let bytes = encode_in(scalar, &table, bytes);
                 let bytes = bytes.map_err(|source| SimError::TableScalar { scalar, source })?;
-                Ok(EncodedTable { table, bytes })
+                Ok(EncodedTable { table, bytes, ended })
             })
             .collect()
     }
@@ -381,9 +382,10 @@ impl<'p> Comparison<'p> {
             let instead = self.other_alone(tissue);
             SimError::TissueTable { tissue, paddle, instead, source: Box::new(source) }
         };
-        let table = build(model, paddle, &TableOptions { needle_speed, ..TableOptions::default() }).map_err(failed)?;
+        let options = TableOptions { needle_speed, ..TableOptions::default() };
+        let BuiltTable { table, ended } = build_as_deep_as_it_goes(model, paddle, &options).map_err(failed)?;
         let bytes = to_bytes(&table).map_err(failed)?;
-        Ok(EncodedTable { table, bytes })
+        Ok(EncodedTable { table, bytes, ended })
     }
 
     /// `none` and `static` of all cases, on all threads: nothing in them runs in real time.
@@ -480,7 +482,7 @@ impl<'p> Comparison<'p> {
     }
 
     fn case_result(&self, case: &Case, encoded: &EncodedTable, strategies: Strategies) -> Result<CaseResult, SimError> {
-        let EncodedTable { table, bytes } = encoded;
+        let EncodedTable { table, bytes, ended } = encoded;
         let settings = self.simulation.loop_settings.settings(table.validity.depth_end);
         let controller = Controller::new(table, &settings)?;
         let dynamic = strategies.controlled();
@@ -505,6 +507,7 @@ impl<'p> Comparison<'p> {
                 delay_samples: controller.delay_samples(),
                 depth: table.knots.iter().map(|knot| knot.depth).collect(),
                 paddle_path: table.knots.iter().map(|knot| knot.paddle_path.into()).collect(),
+                ends_early: ends_early(table.validity.depth_end, self.simulation.needle.depth(), ended.as_ref()),
             },
             strategies,
             improvement,

@@ -1,7 +1,8 @@
-//! What to conclude from a run, in three sentences: where the paddle belongs, what it brings, and whether to believe it.
+//! What to conclude from a run, in three sentences and what stands in the way: where the paddle belongs, what it brings, and whether to believe it.
 
 use firmware::{Faults, Mode};
 use model_offline::output::chart::number::{number, plain};
+use model_offline::scene::TissueVariant;
 
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
@@ -16,7 +17,14 @@ use crate::runtime::time::mode::RunMode;
 pub(super) fn sentences(run: &RunResult) -> Vec<String> {
     let controlled: Vec<_> = run.results().filter_map(Controlled::in_plane).collect();
     let trust = trust(&controlled, run.settings.rate_hz);
-    [placement(run), reduction(run), trust].into_iter().flatten().collect()
+    let ends = early_ends(run.cases.iter().map(|case| (case.tissue, case.table.ends_early.as_deref())));
+    [placement(run), reduction(run), ends, trust].into_iter().flatten().collect()
+}
+
+/// Which tables end before the needle does.
+fn early_ends<'r>(tables: impl Iterator<Item = (TissueVariant, Option<&'r str>)>) -> Option<String> {
+    let ends: Vec<String> = tables.filter_map(|(tissue, ends)| Some(format!("tissue {tissue}, {}", ends?))).collect();
+    (!ends.is_empty()).then(|| format!("Beyond its table the controller does not run: {}.", ends.join("; ")))
 }
 
 /// The best paddles, held and controlled.
@@ -55,7 +63,19 @@ fn reduction(run: &RunResult) -> Option<String> {
         }
         () => "",
     };
-    (!both.is_empty()).then(|| format!("The dynamic paddle's largest error is {}{why}{advice}.", both.join(" and ")))
+    let off = tissue_off(run).map_or_else(String::new, |off| format!(" {off}"));
+    (!both.is_empty())
+        .then(|| format!("The dynamic paddle's largest error is {}{why}{advice}.{off}", both.join(" and ")))
+}
+
+/// Says so where the tissue of a case was off by so much of the error that the error says little of the loop.
+fn tissue_off(run: &RunResult) -> Option<String> {
+    let worst = run.cases.iter().filter_map(|case| case.strategies.controlled()).max_by(|a, b| {
+        let share = |result: &StrategyResult| result.tissue_off().unwrap_or(0.0);
+        share(a).total_cmp(&share(b))
+    })?;
+    let off = worst.tissue_off_in_words()?;
+    Some(format!("That is not to be trusted: {off}; simulate it with --plant full."))
 }
 
 /// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.
@@ -93,7 +113,8 @@ pub(super) fn sentences_in_space(run: &SpaceRun) -> Vec<String> {
         .filter_map(Controlled::in_space)
         .collect();
     let trust = trust(&controlled, run.rate_hz);
-    [placement_in_space(run), reduction_in_space(run), trust].into_iter().flatten().collect()
+    let ends = early_ends(run.cases.iter().map(|case| (case.tissue, case.table.ends_early.as_deref())));
+    [placement_in_space(run), reduction_in_space(run), ends, trust].into_iter().flatten().collect()
 }
 
 fn placement_in_space(run: &SpaceRun) -> Option<String> {

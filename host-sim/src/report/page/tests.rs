@@ -161,6 +161,7 @@ fn run(scene: &str) -> RunResult {
             delay_samples: 1,
             depth: vec![0.0, 0.1],
             paddle_path: vec![[0.0; 2]; 2],
+            ends_early: None,
         },
         strategies: Strategies {
             none: Some(strategy(RunMode::Lockstep, None, 2e-3)),
@@ -398,6 +399,27 @@ fn the_conclusion_says_what_spoils_it() {
         (strategy.run_share, strategy.outside_run_for) = (Some(0.834), Faults::NEEDLE_STALE);
     });
     assert!(said(&run).contains("in RUN for only 83 % of an insertion (free-run, NEEDLE_STALE)"), "{}", said(&run));
+    // What answered for the tissue, and a table that is too short.
+    let off = |share: f64, why: Option<&str>| {
+        let mut run = good.clone();
+        let plant = &mut run.cases[1].strategies.dynamic.as_mut().unwrap().plant;
+        (plant.extrapolation_error, plant.not_verified) = (Some(share * 1e-5), why.map(str::to_owned));
+        said(&run)
+    };
+    assert!(
+        off(0.3, None).contains("That is not to be trusted: its tissue is up to 30 % of that off"),
+        "{}",
+        off(0.3, None)
+    );
+    assert!(!off(0.2, None).contains("trusted"), "{}", off(0.2, None));
+    assert!(
+        off(0.2, Some("no way")).contains("how far its tissue is off is not known"),
+        "{}",
+        off(0.2, Some("no way"))
+    );
+    let mut run = good.clone();
+    run.cases[1].table.ends_early = Some("it ends".to_owned());
+    assert!(said(&run).contains("Beyond its table the controller does not run: tissue "), "{}", said(&run));
     let mut run = good.clone();
     free_run(&mut run, |strategy| strategy.plant_timing.as_mut().unwrap().deadline_misses = 2);
     assert!(said(&run).contains("2 of 12 deadlines were MISSED"), "{}", said(&run));

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::summary::{FreeRun, share, write_free_runs, write_ledgers};
+use super::summary::{FreeRun, share, write_early_end, write_free_runs, write_ledgers};
 use crate::bench::in_space::{SpaceRun, SpaceStrategyResult};
 use crate::report::below_noise::below_noise_in_space;
 use crate::runtime::time::mode::RunMode;
@@ -47,6 +47,8 @@ pub fn summary(run: &SpaceRun, directory: &Path) -> String {
             share(case.improvement, "the best static paddles' error"),
             share(case.improvement_over_none, "that of none")
         );
+        // A string takes everything.
+        let _ = write_early_end(&mut out, case.tissue, case.table.ends_early.as_deref());
         let plant = &case.dynamic.plant;
         let checked = plant.largest_error.map_or_else(|| "not checked".to_owned(), |error| in_unit(error, unit));
         let _ = writeln!(

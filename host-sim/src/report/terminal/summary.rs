@@ -70,6 +70,9 @@ fn write_all(text: &mut String, run: &RunResult, directory: &Path) -> std::fmt::
     for case in &run.cases {
         write_case(text, run, case, digits)?;
     }
+    for case in &run.cases {
+        write_early_end(text, case.tissue, case.table.ends_early.as_deref())?;
+    }
     if let Some(why) = below_noise(run) {
         writeln!(text, "  {why}")?;
     }
@@ -139,10 +142,17 @@ fn write_case(text: &mut String, run: &RunResult, case: &CaseResult, digits: usi
         (Some(factor), Some(dynamic)) => {
             let none =
                 case.improvement_over_none.map_or_else(String::new, |factor| format!("{}, ", share(factor, "none")));
-            writeln!(text, "   {}, {none}{}", share(factor, "static"), state(dynamic))
+            let off =
+                dynamic.tissue_off_in_words().map_or_else(String::new, |off| format!("; NOT TO BE TRUSTED: {off}"));
+            writeln!(text, "   {}, {none}{}{off}", share(factor, "static"), state(dynamic))
         }
         _ => writeln!(text),
     }
+}
+
+/// Says so where a table ends before the needle does.
+pub(super) fn write_early_end(text: &mut String, tissue: TissueVariant, ends: Option<&str>) -> std::fmt::Result {
+    ends.map_or(Ok(()), |ends| writeln!(text, "  {tissue}: beyond its table the controller does not run: {ends}"))
 }
 
 /// What the controller's error is made of, where that was asked for.

@@ -58,6 +58,17 @@ pub struct PlantAccount {
     pub largest_error: Option<f64>,
 }
 
+impl PlantAccount {
+    /// How far the target was from where the full model has it, length, as far as it is known: found by going the same way in
+    /// full, or where that could not be done, what the model takes itself to be off.
+    pub fn off(&self) -> Option<f64> {
+        match self.not_verified {
+            Some(_) => self.largest_estimate,
+            None => self.extrapolation_error.into_iter().chain(self.largest_error).reduce(f64::max),
+        }
+    }
+}
+
 impl Default for PlantAccount {
     /// The full model, which has nothing to account for.
     fn default() -> Self {

@@ -7,6 +7,7 @@ pub mod insertion;
 mod refinement;
 pub mod rest;
 pub mod study;
+pub mod uncertainty;
 pub mod workflow;
 
 pub use controllability::Controllability;
@@ -14,4 +15,5 @@ pub use discretised::{Discretised, SpaceErrorEstimate};
 pub use insertion::InsertionModel;
 pub use refinement::{SAFETY, distances};
 pub use study::SpacePlacement;
+pub use uncertainty::Uncertain;
 pub use workflow::SpaceStudy;

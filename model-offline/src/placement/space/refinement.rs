@@ -102,13 +102,22 @@ impl Reference {
     }
 }
 
+/// The finest of meshes, nodes on patches and answers of which are given coarsest first, that is coarser than what now has so many
+/// nodes on every patch. Where a level's sizes change nothing on a patch, nothing is learnt of it: two answers with one error agree.
+/// The mesh just before may be such a one, and the one before that be needlessly coarse.
+fn coarser_on_all<'a, T>(meshes: &'a [(Vec<usize>, T)], now: &[usize]) -> Option<&'a T> {
+    let is_coarser =
+        |on_patches: &[usize]| on_patches.iter().zip(now).all(|(before, now)| *now as f64 >= GROWN * *before as f64);
+    meshes.iter().rfind(|(on_patches, _)| is_coarser(on_patches)).map(|(_, answers)| answers)
+}
+
 /// Quadratic tetrahedra on finer and finer meshes.
 struct Ladder {
     scene: SpaceScene,
     /// The level that is next.
     level: i32,
-    /// Nodes on patches and answers of the mesh before.
-    coarser: Option<(Vec<usize>, Vec<SpaceResponse>)>,
+    /// Nodes on patches and answers of the meshes before, coarsest first.
+    coarser: Vec<(Vec<usize>, Vec<SpaceResponse>)>,
     /// The finest of which something is known: where it contradicts what coarser ones agreed on, that was by accident.
     finest: Option<Reference>,
     /// Its model, where it is wanted: the next one needs the room.
@@ -124,8 +133,8 @@ impl Ladder {
     fn new(scene: &SpaceScene, wants_model: bool) -> Self {
         let scene = scene.with_method(Method::new(Integration::FemT10));
         let level = *LEVELS.start() - 1;
-        let (coarser, finest, model, failed, memory) = (None, None, None, None, None);
-        Self { scene, level, coarser, finest, model, wants_model, failed, memory, ended: false }
+        let (finest, model, failed, memory) = (None, None, None, None);
+        Self { scene, level, coarser: Vec::new(), finest, model, wants_model, failed, memory, ended: false }
     }
 
     fn open(&self) -> f64 {
@@ -152,12 +161,12 @@ impl Ladder {
         let (model, rest) = match at_level(&self.scene, level) {
             Ok(found) => found,
             // The coarsest meshes may not see every patch, the finest may not be affordable.
-            Err(error) if error.is_too_large() && self.coarser.is_some() => {
+            Err(error) if error.is_too_large() && !self.coarser.is_empty() => {
                 self.memory = error.missing_memory();
                 self.ended = true;
                 return Ok(());
             }
-            Err(_) if self.coarser.is_none() && level <= *LEVELS.start() => return Ok(()),
+            Err(_) if self.coarser.is_empty() && level <= *LEVELS.start() => return Ok(()),
             // One level may meet what is near a surface badly where the next does not.
             Err(error @ ModelError::Mesh(_)) => {
                 self.failed = Some(error);
@@ -172,12 +181,7 @@ impl Ladder {
             Err(error) => return Err(error),
         };
         let on_patches = model.nodes_on_patches();
-        if let Some((before, coarser)) = &self.coarser {
-            // Where a level's sizes change nothing on a patch, nothing is learnt of it: two answers with one error
-            // agree.
-            if before.iter().zip(&on_patches).any(|(before, now)| (*now as f64) < GROWN * *before as f64) {
-                return Ok(());
-            }
+        if let Some(coarser) = coarser_on_all(&self.coarser, &on_patches) {
             let apart = distances(coarser, &rest);
             let errors = estimates(&apart);
             let full = estimates(&distances_of(|controls| controls.full, coarser, &rest));
@@ -187,7 +191,7 @@ impl Ladder {
             self.finest = Some(Reference { nodes, rest: rest.clone(), errors, full, per_depth, decided_by, level });
             self.model = Some(model).filter(|_| self.wants_model);
         }
-        self.coarser = Some((on_patches, rest));
+        self.coarser.push((on_patches, rest));
         Ok(())
     }
 
@@ -406,6 +410,19 @@ mod tests {
         let nobody = SpaceResponse { controllability: None, ..with(1.0) };
         let found = distances(&[with(1.5), with(f64::INFINITY), nobody.clone()], &[with(1.0), with(3.0), nobody]);
         assert_eq!(found, [0.5, f64::INFINITY]);
+    }
+
+    #[test]
+    fn a_mesh_is_held_against_the_finest_that_is_coarser_on_every_patch() {
+        let meshes = [(vec![100, 50], "first"), (vec![200, 55], "second"), (vec![300, 100], "third")];
+        // The second changed little on the second patch: it is not held against the first, and the third is held against it.
+        assert_eq!(coarser_on_all(&meshes[..1], &meshes[1].0), None);
+        assert_eq!(coarser_on_all(&meshes[..2], &meshes[2].0), Some(&"second"));
+        // Finer than the second on the first patch only, than the first on both.
+        assert_eq!(coarser_on_all(&meshes[..2], &[400, 70]), Some(&"first"));
+        assert_eq!(coarser_on_all(&meshes, &[1000, 129]), Some(&"second"));
+        assert_eq!(coarser_on_all(&meshes, &[1000, 130]), Some(&"third"));
+        assert_eq!(coarser_on_all::<&str>(&[], &[1]), None);
     }
 
     fn unit() -> crate::placement::space::Controllability {

@@ -131,6 +131,24 @@ pub struct SpacePlacement {
     pub profile_nodes: usize,
 }
 
+impl SpacePlacement {
+    /// What paddles, then pairs do, in the scene's order, with their indices.
+    pub fn sets(&self) -> impl Iterator<Item = (&[u32], &SpaceAnswer)> {
+        let singles = self.paddles.iter().map(|paddle| (std::slice::from_ref(&paddle.index), &paddle.answer));
+        singles.chain(self.pairs.iter().map(|pair| (&pair.paddles[..], &pair.answer)))
+    }
+
+    /// Insertions with paddles, then pairs, then none held still, by place in this order.
+    pub fn static_study(&self, set: usize) -> Option<&SpaceStatic> {
+        self.sets().map(|(_, answer)| &answer.static_study).chain([&self.no_paddle.static_study]).nth(set)
+    }
+
+    /// Number of sets; the place of none.
+    pub fn without(&self) -> usize {
+        self.paddles.len() + self.pairs.len()
+    }
+}
+
 /// Number of times [`place_in_space`] calls its progress function.
 pub fn steps(model: &SpaceModel) -> u64 {
     all_sets(model).len() as u64 * u64::from(model.scene().needle.increments)

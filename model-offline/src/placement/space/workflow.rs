@@ -7,6 +7,7 @@ use super::insertion::InsertionModel;
 use super::refinement::{LEVELS, refine};
 use super::rest::{SpaceResponse, rest_responses};
 use super::study::{SpacePlacement, place_in_space, steps};
+use super::uncertainty::Uncertain;
 use crate::discretization::{Integration, Method, Resolution};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
@@ -52,6 +53,16 @@ impl SpaceStudy {
         let insertions = InsertionModel::new(scene, coarse(scene)?, model.clone(), rest);
         let placement = place_in_space(&insertions, threads, progress)?;
         Ok(Self { model, placement, error_estimate, wall_s: start.elapsed().as_secs_f64() })
+    }
+
+    /// The placement with the estimated errors of it, where the scene asks for a tolerance.
+    pub fn uncertain(&self) -> Option<Uncertain<'_>> {
+        self.error_estimate.as_ref().map(|estimate| Uncertain { placement: &self.placement, estimate })
+    }
+
+    /// Pairs of paddles that cannot be attached together, by index.
+    pub fn overlapping(&self) -> Vec<[u32; 2]> {
+        self.model.overlapping().iter().map(|pair| pair.map(|p| self.model.scene().paddles[p].index)).collect()
     }
 }
 

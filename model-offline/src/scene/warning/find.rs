@@ -30,6 +30,12 @@ const SHORT_OVERLAP: f64 = 0.02;
 const BESIDE_NEEDLE: f64 = 0.01;
 /// Part of the body's size below which a length is hardly meant.
 const TINY: f64 = 1e-3;
+/// How much more than by the rule a tip may press on nodes that are given by their spacing, which may hide it.
+const HIDDEN: f64 = 2.0;
+/// Sizes of the body per second above which a speed is hardly meant.
+const FASTEST: f64 = 1e3;
+/// Part of the body's size above which a motion is hardly meant.
+const FARTHEST_MOVED: f64 = 0.5;
 /// Part of the body's size within which what cannot move holds a target as well.
 const HELD: f64 = 0.01;
 
@@ -47,6 +53,9 @@ impl Scene {
         found.extend(rules.contact());
         found.extend(rules.friction());
         found.extend(rules.tip());
+        found.extend(rules.tip_never_in());
+        found.extend(rules.needle_fast());
+        found.extend(rules.motion());
         found.extend(rules.target());
         found.extend(rules.paddles());
         found
@@ -226,10 +235,31 @@ impl Rules<'_> {
             .collect()
     }
 
+    fn tip_never_in(&self) -> Option<SceneWarning> {
+        let (shaft, depth) = (self.scene.needle.shaft?, self.scene.needle.depth);
+        let tip_length = shaft.tip_length;
+        (tip_length > depth).then_some(SceneWarning::TipNeverIn { tip_length, depth })
+    }
+
+    fn needle_fast(&self) -> Option<SceneWarning> {
+        let (speed, size) = (self.scene.needle.speed, self.size);
+        (speed > FASTEST * size).then_some(SceneWarning::NeedleFast { speed, size })
+    }
+
+    fn motion(&self) -> Option<SceneWarning> {
+        let motion = &self.scene.motion;
+        let breath = motion.breathing.map_or(0.0, |breathing| breathing.amplitude.abs());
+        let surge = motion.surge.map_or(0.0, |surge| surge.amplitude.abs());
+        let recorded = motion.recorded.iter().map(|(_, moved)| moved.norm()).fold(0.0, f64::max);
+        let distance = breath.max(surge).max(recorded);
+        (distance > FARTHEST_MOVED * self.size).then_some(SceneWarning::MotionLarge { distance, size: self.size })
+    }
+
     /// Tissue beside a tip bears about twice its shear modulus per length of it, found by trial; nodes that are further apart
-    /// than the tip is long do not see more.
+    /// than the tip is long do not see more, and bear it on the length of their spacing.
     fn tip(&self) -> Vec<SceneWarning> {
-        let (Some(shaft), None) = (self.scene.needle.shaft, self.spacing) else { return Vec::new() };
+        let Some(shaft) = self.scene.needle.shaft else { return Vec::new() };
+        let bearing = self.spacing.map_or(shaft.tip_length, |spacing| HIDDEN * shaft.tip_length.max(spacing));
         let of_inclusions = self.scene.inclusions.iter().enumerate().map(|(i, inclusion)| {
             let law = inclusion.material.as_ref().unwrap_or(&self.scene.material);
             let resistance = inclusion.resistance.unwrap_or(shaft.resistance);
@@ -239,7 +269,7 @@ impl Rules<'_> {
         let too_short = places.filter_map(|(inclusion, law, stiffness, resistance)| {
             let shear_modulus = stiffness * Material::<2>::rest_shear_modulus(law);
             let (tip_length, least) = (shaft.tip_length, resistance.cutting_force / (2.0 * shear_modulus));
-            (tip_length < least).then_some(SceneWarning::TipTooShort { inclusion, tip_length, least })
+            (bearing < least).then_some(SceneWarning::TipTooShort { inclusion, tip_length, least })
         });
         too_short.collect()
     }

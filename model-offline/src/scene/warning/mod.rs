@@ -81,6 +81,27 @@ pub enum SceneWarning {
         /// Length from which on tissue bears it.
         least: f64,
     },
+    /// The tip is longer than the needle goes, and its cutting force is never reached.
+    TipNeverIn {
+        /// Length that the cutting force is spread over.
+        tip_length: f64,
+        /// Depth of the needle.
+        depth: f64,
+    },
+    /// The needle is through the body in next to no time.
+    NeedleFast {
+        /// Its speed, length per second.
+        speed: f64,
+        /// The body's size: the diagonal of its bounding box.
+        size: f64,
+    },
+    /// The immobile part moves about as far as the body is large.
+    MotionLarge {
+        /// Largest distance that breath, cough or recording moves it.
+        distance: f64,
+        /// The body's size: the diagonal of its bounding box.
+        size: f64,
+    },
     /// Something is so small beside the body that its unit may be another one.
     Tiny {
         /// What it is.
@@ -239,6 +260,20 @@ impl SceneWarning {
                 let (whose, on, from) = (whose(inclusion), long(tip_length), long(least));
                 format!("the tip is {on} long, and tissue bears the cutting force of {whose} from {from} on")
             }
+            Self::TipNeverIn { tip_length, depth } => {
+                format!(
+                    "the tip is {} long, and the needle goes {} deep: its cutting force is never reached",
+                    long(tip_length),
+                    long(depth)
+                )
+            }
+            Self::NeedleFast { speed, size } => {
+                let [speed, size] = [speed, size].map(long);
+                format!("the needle goes {speed} in a second, through a body of {size} in less than a millisecond")
+            }
+            Self::MotionLarge { distance, size } => {
+                format!("[motion] moves the body by up to {}, and it is {} across", long(distance), long(size))
+            }
             Self::Tiny { what, length, size } => {
                 format!("{}, in a body of {}", what.told(&long(length)), long(size))
             }
@@ -293,9 +328,11 @@ impl SceneWarning {
             Self::Tiny { .. } => {
                 "check the numbers and their unit; where it is meant so, a tolerance takes many nodes there"
             }
+            Self::TipNeverIn { .. } => "give a shorter tip_length",
+            Self::NeedleFast { .. } | Self::MotionLarge { .. } => "check the number and its unit",
             Self::FrictionOnlySticks { .. } => "give kinetic_friction too",
             Self::TipTooShort { .. } => {
-                "give a longer tip_length, or a spacing in place of the tolerance: on fine nodes there may be no equilibrium"
+                "give a longer tip_length, or less force; coarse nodes, by a spacing in place of the tolerance, hide it: on fine ones there may be no equilibrium"
             }
             Self::TargetNearBoundary { .. } => "take a smaller spacing, or move the target inwards",
             Self::TargetNearImmobile { .. } => "move it away: hardly any paddle moves what is held so near",

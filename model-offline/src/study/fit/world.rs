@@ -235,10 +235,14 @@ impl World {
         let [chosen, finer] = self.end_to_end.nodes;
         let _ = match (&self.end_to_end.change, &self.end_to_end.failure) {
             (Some(change), _) => {
-                let beyond = match self.end_to_end.is_coarser {
-                    true => " (coarser than the chosen ones, which take too long to follow)",
-                    false if change.worst() <= tolerance => "",
-                    false => ": ABOVE the tolerance",
+                let beyond = match (self.end_to_end.is_coarser, change.worst() <= tolerance) {
+                    (true, true) => " (coarser than the chosen ones, which take too long to follow)",
+                    (true, false) => {
+                        ": ABOVE the tolerance, on nodes that are coarser than the chosen ones; these take too long to follow, \
+                         and whether they keep it is not known"
+                    }
+                    (false, true) => "",
+                    (false, false) => ": ABOVE the tolerance",
                 };
                 writeln!(out, "{chosen} nodes with these effects against {finer} with all: {change}{beyond}")
             }
