@@ -177,9 +177,7 @@ fn summary(study: &SpaceStudy) -> String {
         );
         out.extend(harms(what, study, &best.fixture));
     }
-    if let Some(line) = second_pays(study) {
-        let _ = writeln!(out, "{line}");
-    }
+    out.extend(second_pays(study));
     if placement.profile_nodes != study.model.nodes() {
         let _ = writeln!(
             out,
@@ -232,9 +230,9 @@ fn second_pays(study: &SpaceStudy) -> Option<String> {
     Some(match format!("{gain:.1}") {
         told if gain > 0.0 && told != "0.0" => {
             let open = if is_open { LEFT_OPEN } else { "" };
-            format!("a second paddle shortens {way} by {told} % ({single:.3} to {pair:.3}){open}")
+            format!("a second paddle shortens {way} by {told} % ({single:.3} to {pair:.3}){open}\n")
         }
-        _ => format!("a second paddle does not shorten {way} ({single:.3} to {pair:.3})"),
+        _ => format!("a second paddle does not shorten {way} ({single:.3} to {pair:.3})\n"),
     })
 }
 

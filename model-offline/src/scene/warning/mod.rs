@@ -232,12 +232,7 @@ impl SceneWarning {
                 "the needle does not go towards the target: its line misses it by {}, {degrees:.0}° off the way there",
                 long(miss)
             ),
-            Self::NeedlePassesBeside { miss, depth, nearest_at } => {
-                let [miss, depth, at] = [miss, depth, nearest_at].map(long);
-                format!(
-                    "the needle goes beside the target: at depth {at} it is nearest, {miss} off; it goes to {depth}"
-                )
-            }
+            Self::NeedlePassesBeside { miss, depth, nearest_at } => passes_beside([miss, depth, nearest_at].map(long)),
             Self::DeeperThanTarget { depth, nearest_at } => {
                 let [depth, nearest_at] = [depth, nearest_at].map(long);
                 format!("the needle goes deeper than the target: depth {depth}, the target lies at {nearest_at}")
@@ -260,17 +255,8 @@ impl SceneWarning {
                 let (whose, on, from) = (whose(inclusion), long(tip_length), long(least));
                 format!("the tip is {on} long, and tissue bears the cutting force of {whose} from {from} on")
             }
-            Self::TipNeverIn { tip_length, depth } => {
-                format!(
-                    "the tip is {} long, and the needle goes {} deep: its cutting force is never reached",
-                    long(tip_length),
-                    long(depth)
-                )
-            }
-            Self::NeedleFast { speed, size } => {
-                let [speed, size] = [speed, size].map(long);
-                format!("the needle goes {speed} in a second, through a body of {size} in less than a millisecond")
-            }
+            Self::TipNeverIn { tip_length, depth } => never_in([tip_length, depth].map(long)),
+            Self::NeedleFast { speed, size } => fast([speed, size].map(long)),
             Self::MotionLarge { distance, size } => {
                 format!("[motion] moves the body by up to {}, and it is {} across", long(distance), long(size))
             }
@@ -306,11 +292,7 @@ impl SceneWarning {
                 let [gap, depth] = [gap, depth].map(long);
                 format!("paddle {index} is {gap} beside the needle's contact, which is pushed by {depth}")
             }
-            Self::PaddleInTheWay { index, at } => {
-                let where_it_is =
-                    if at < 0.0 { format!("{} before its entry", long(-at)) } else { format!("at depth {}", long(at)) };
-                format!("paddle {index} is in the needle's way, {where_it_is}")
-            }
+            Self::PaddleInTheWay { index, at } => in_the_way(index, at, &long(at.abs())),
         }
     }
 
@@ -359,6 +341,23 @@ impl SceneWarning {
     pub fn told(&self, unit: &str) -> String {
         format!("{}; {}", self.message(unit), self.help())
     }
+}
+
+fn passes_beside([miss, depth, at]: [String; 3]) -> String {
+    format!("the needle goes beside the target: at depth {at} it is nearest, {miss} off; it goes to {depth}")
+}
+
+fn never_in([tip, depth]: [String; 2]) -> String {
+    format!("the tip is {tip} long, and the needle goes {depth} deep: its cutting force is never reached")
+}
+
+fn fast([speed, size]: [String; 2]) -> String {
+    format!("the needle goes {speed} in a second, through a body of {size} in less than a millisecond")
+}
+
+fn in_the_way(index: u32, at: f64, distance: &str) -> String {
+    let place = if at < 0.0 { format!("{distance} before its entry") } else { format!("at depth {distance}") };
+    format!("paddle {index} is in the needle's way, {place}")
 }
 
 impl fmt::Display for SceneWarning {
