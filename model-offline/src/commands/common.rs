@@ -227,6 +227,7 @@ impl RunArgs {
 }
 
 /// Progress of a study: what comes before and after the steps that are counted is told in words.
+#[derive(Debug)]
 pub(super) struct StudyProgress(ProgressBar);
 
 impl StudyProgress {
@@ -250,6 +251,17 @@ impl StudyProgress {
         self.0.inc(1);
         let is_last = self.0.length().is_some_and(|steps| self.0.position() >= steps);
         self.0.set_message(if is_last { "estimating errors" } else { "following the insertion" });
+    }
+
+    /// One insertion in so many increments comes, or in who knows how many.
+    pub(super) fn follow(&self, increments: u32) {
+        self.0.set_length(u64::from(increments));
+        self.0.set_message("following the insertion");
+    }
+
+    /// An increment of it is done.
+    pub(super) fn increment(&self) {
+        self.0.inc(1);
     }
 
     /// Nothing of it is left on a terminal.

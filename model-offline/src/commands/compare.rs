@@ -1,6 +1,6 @@
 //! `model-offline compare`: which effects a scene needs.
 
-use super::common::{DiscretizationArgs, RunArgs, SceneArgs};
+use super::common::{DiscretizationArgs, RunArgs, SceneArgs, StudyProgress};
 use super::error::CliError;
 use super::json::write_json;
 use model_offline::output::{self, check_outputs};
@@ -41,7 +41,10 @@ pub(super) fn run(args: &CompareArgs) -> Result<(), CliError> {
     }
     let outputs = [("--json", args.json.as_deref()), ("--svg", args.svg.as_deref()), ("--csv", args.csv.as_deref())];
     check_outputs(&[&args.scene.scene], &outputs)?;
+    let progress = StudyProgress::new(&args.run, scene.discretization.resolution);
+    progress.follow(0);
     let found = effects::compare(&scene, args.effect_tolerance, args.run.threads())?;
+    progress.finish();
     let together = output::together();
     write_json(args.json.as_deref(), &found)?;
     if let Some(path) = &args.svg {

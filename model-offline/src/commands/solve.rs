@@ -1,6 +1,6 @@
 //! `model-offline solve`: one equilibrium.
 
-use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
+use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs, StudyProgress};
 use super::error::CliError;
 use super::for_paraview::ForParaView;
 use super::json::write_json;
@@ -149,6 +149,7 @@ fn in_space(scene: &SpaceScene, args: &SolveArgs) -> Result<(), CliError> {
         svg: args.svg.as_deref(),
         threads: args.run.threads(),
         quiet: args.run.quiet,
+        progress: &StudyProgress::new(&args.run, scene.discretization.resolution),
     };
     solve_space::run(scene, asked)
 }
@@ -161,6 +162,7 @@ struct Held {
 }
 
 fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
+    let progress = StudyProgress::new(&args.run, scene.discretization.resolution);
     let (model, _) = discretise(scene)?;
     let Held { paddle, displacement } = held;
     let position = paddle.map(|index| scene.paddle_position(index)).transpose().map_err(ModelError::from)?;
@@ -169,6 +171,7 @@ fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
     // In pieces of the scene's increment: the path matters near the limits of stability, and to a needle that slips.
     let increments = (depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
     let way = Way { depth, paddle: displacement, increments, seconds: args.depth / scene.needle.speed };
+    progress.follow(increments);
     let mut solved = match scene.needle.shaft {
         Some(_) => match insert(&model, position, way)? {
             Inserted::Pushing(body) => Solved::Pushing(body),
@@ -182,11 +185,13 @@ fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
                 if let Err(failure) = body.take_in(pose, way.seconds / f64::from(increments)) {
                     return Err(CliError::Solve { failure, depth: body.depth() });
                 }
+                progress.increment();
             }
             Solved::Pushing(Box::new(body))
         }
     };
     solved.dwell(args.dwell)?;
+    progress.finish();
     write(&model, &mut solved, held, args)?;
     if !args.run.quiet {
         print(scene, &solved, held, args);

@@ -1,6 +1,6 @@
 //! `model-offline solve` of a scene in space: one equilibrium, with as many paddles as are named.
 
-use super::common::check_displacements;
+use super::common::{StudyProgress, check_displacements};
 use super::error::CliError;
 use super::for_paraview::ForParaView;
 use super::json::write_json;
@@ -38,6 +38,8 @@ pub(super) struct SpaceArgs<'a> {
     pub(super) threads: usize,
     /// No summary.
     pub(super) quiet: bool,
+    /// Who is told how far it is.
+    pub(super) progress: &'a StudyProgress,
 }
 
 /// A paddle by its place in the scene's list, and how far it is displaced.
@@ -80,13 +82,16 @@ fn solve(scene: &SpaceScene, paddles: &[Displaced], args: SpaceArgs<'_>) -> Resu
     let mut body = model.body(&attached, NewtonSettings::default()).map_err(ModelError::from)?;
     // In pieces of the scene's increment: the path matters near the limits of stability.
     let increments = (args.depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
+    args.progress.follow(increments);
     for increment in 1..=increments {
         let part = f64::from(increment) / f64::from(increments);
         let at: Vec<Vector3<f64>> = paddles.iter().map(|(_, displacement)| displacement * part).collect();
         if let Err(failure) = body.drive(args.depth * part, &at) {
             return Err(CliError::Solve { failure, depth: body.depth() });
         }
+        args.progress.increment();
     }
+    args.progress.finish();
     write(&model, &mut body, paddles, args)?;
     if !args.quiet {
         tell!("{}", text(&model, &body, paddles, args));

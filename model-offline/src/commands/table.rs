@@ -1,6 +1,6 @@
 //! `model-offline table`: the controller table of one paddle, in space of one or two.
 
-use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs};
+use super::common::{self, DiscretizationArgs, RunArgs, SceneArgs, StudyProgress};
 use super::error::CliError;
 use firmware::contract::Table;
 use model_offline::number::length;
@@ -46,10 +46,13 @@ pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
     };
     let scene = args.discretization.over(args.scene.read_still()?)?;
     check_outputs(&[&args.scene.scene], &[("--output", Some(&args.output))])?;
+    let progress = StudyProgress::new(&args.run, scene.discretization.resolution);
     let (model, paddle) = model_with_paddle(&scene, paddle)?;
+    progress.follow(0);
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
     let BuiltTable { table, ended } = table::build_as_deep_as_it_goes(&model, paddle, &options)?;
     let bytes = table::to_bytes(&table)?;
+    progress.finish();
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
         let summary = table_text::summary(&table);
@@ -62,7 +65,9 @@ pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
 /// A table in space, of the model that insertions are followed on.
 fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
     check_outputs(&args.scene.files(&scene), &[("--output", Some(&args.output))])?;
+    let progress = StudyProgress::new(&args.run, scene.discretization.resolution);
     let model = parallel::within(args.run.threads(), || insertion_model(&scene))?;
+    progress.follow(0);
     let paddles = match args.paddle.is_empty() {
         true => model.best_to_control()?,
         false => args.paddle.clone(),
@@ -70,6 +75,7 @@ fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
     let options = TableOptions { knots: args.knots, ..TableOptions::default() };
     let BuiltTable { table, ended } = SpaceTable::build_as_deep_as_it_goes(&model, &paddles, &options)?;
     let bytes = table.to_bytes()?;
+    progress.finish();
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
         let summary = space_table_text::summary(&table);

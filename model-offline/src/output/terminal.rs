@@ -137,7 +137,12 @@ fn with_lines(steps: u64, left: TimeLeft) -> ProgressBar {
 fn progress_line(bar: &ProgressBar, left_s: Option<f64>) -> String {
     let (done, of) = (bar.position(), bar.length().unwrap_or(0).max(1));
     let (after, left) = (bar.elapsed().as_secs(), in_words(left_s));
-    format!("{:3} % of the steps after {after} s{left}  {}", 100 * done / of, bar.message())
+    let message = bar.message();
+    // Nothing is known of the part that is not counted in steps, and more steps than were foretold are still no more than all.
+    if done == 0 {
+        return format!("after {after} s{left}  {message}");
+    }
+    format!("{:3} % of the steps after {after} s{left}  {message}", (100 * done / of).min(100))
 }
 
 fn in_words(left_s: Option<f64>) -> String {
@@ -252,7 +257,12 @@ mod tests {
         let line = progress_line(&bar, None);
         assert!(line.trim_start().starts_with("25 % of the steps") && line.ends_with("controller tables"), "{line}");
         // Nothing is known of how many there will be.
-        assert!(progress_line(&ProgressBar::hidden(), None).trim_start().starts_with("0 %"));
+        assert_eq!(progress_line(&ProgressBar::hidden(), None), "after 0 s  ");
+        let early = ProgressBar::with_draw_target(Some(40), ProgressDrawTarget::hidden()).with_message("meshing");
+        assert_eq!(progress_line(&early, None), "after 0 s  meshing");
+        // More than were foretold.
+        early.set_position(41);
+        assert!(progress_line(&early, None).starts_with("100 % of the steps"), "{}", progress_line(&early, None));
         assert!(progress_line(&bar, Some(7.2)).contains(", about 8 s left  controller"));
     }
 }

@@ -259,3 +259,30 @@ impl World {
         out
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// On nodes coarser than the chosen ones nothing was said of a tolerance that they do not keep.
+    #[test]
+    fn what_is_above_the_tolerance_is_said_on_whatever_nodes_it_was_found() {
+        let summary = |controllability: f64, is_coarser: bool| {
+            let change = Change { target: 0.01, controllability };
+            let end_to_end = WorldEndToEnd { change: Some(change), nodes: [616, 941], is_coarser, failure: None };
+            let change = Change { target: 0.0, controllability: 0.0 };
+            let (needed, left_out) = (vec![Shaft], Vec::new());
+            World { needed, left_out, change, share: 0.0075, paddle: 1, nodes: 9, is_table_fitted: true, end_to_end }
+                .summary(0.05)
+        };
+        let told = |controllability, is_coarser| {
+            let text = summary(controllability, is_coarser);
+            ["ABOVE the tolerance", "coarser than the chosen ones", "is not known"].map(|part| text.contains(part))
+        };
+        assert_eq!(told(0.049, false), [false, false, false]);
+        assert_eq!(told(0.051, false), [true, false, false]);
+        assert_eq!(told(0.049, true), [false, true, false]);
+        assert_eq!(told(0.051, true), [true, true, true]);
+        assert_eq!(told(f64::NAN, true), [true, true, true]);
+    }
+}
