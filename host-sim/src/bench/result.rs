@@ -330,6 +330,11 @@ impl Strategies {
     pub fn controlled(&self) -> Option<&StrategyResult> {
         self.dynamic.as_ref().or(self.dynamic_free_run.as_ref())
     }
+
+    /// Whether the controlled insertion left the neighbourhood of its planned way, and was simulated again in full.
+    pub(crate) fn left_the_way(&self) -> bool {
+        self.dynamic.as_ref().is_some_and(|dynamic| dynamic.plant.left_the_way)
+    }
 }
 
 /// One simulated insertion.
@@ -405,17 +410,18 @@ impl StrategyResult {
     /// Part of the largest error by which the tissue was off, where that is too much to go by; infinite where a model stood in for the
     /// full one, which could not go the same way.
     pub fn tissue_off(&self) -> Option<f64> {
-        let off = if self.plant.not_verified.is_some() { f64::INFINITY } else { self.plant.off()? };
-        let share = off / self.max_orthogonal_error;
+        let share = self.plant.off()? / self.max_orthogonal_error;
         (share > MOST_OFF).then_some(share)
     }
 
     /// The same in words.
     pub(crate) fn tissue_off_in_words(&self) -> Option<String> {
         let share = self.tissue_off()?;
-        Some(match share.is_finite() {
-            true => format!("its tissue is up to {:.0} % of that off", 100.0 * share),
-            false => "how far its tissue is off is not known".to_owned(),
+        Some(match &self.plant.not_verified {
+            None => format!("its tissue is up to {:.0} % of that off", 100.0 * share),
+            Some(why) => {
+                format!("how far its tissue is off is not known, because the full model cannot go the same way ({why})")
+            }
         })
     }
 }

@@ -5,14 +5,14 @@ use super::error::CliError;
 use super::json::write_json;
 use super::place_space;
 use super::place_text;
-use super::table::early_end;
+use super::table::warnings;
 use model_offline::model::ModelError;
 use model_offline::output;
 use model_offline::output::check_outputs;
 use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PlacementOptions, PlacementStudy, study};
 use model_offline::scene::Scene;
-use model_offline::table::{self, BuiltTable, EndedEarly, TableOptions};
+use model_offline::table::{self, BuiltTable, TableOptions};
 use model_offline::tell;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -57,17 +57,17 @@ struct Placed {
     table: Option<Result<MadeTable, CliError>>,
 }
 
-/// The bytes of a table, and why it ends before the insertion does.
-type MadeTable = (Vec<u8>, Option<EndedEarly>);
+/// The bytes of a table, and what is to be said of it.
+type MadeTable = (Vec<u8>, String);
 
 impl Placed {
     fn finish(self, args: &PlaceArgs) -> Result<(), CliError> {
         match (self.table, &args.table) {
             (Some(table), Some(path)) => {
-                let (bytes, ended) = table?;
+                let (bytes, warnings) = table?;
                 output::write_whole(path, &bytes)?;
                 if !args.run.quiet {
-                    tell!("{}", early_end(ended));
+                    tell!("{warnings}");
                 }
                 Ok(())
             }
@@ -98,7 +98,7 @@ fn place(scene: &Scene, args: &PlaceArgs) -> Result<Placed, CliError> {
 fn table_of(study: &PlacementStudy) -> Result<MadeTable, CliError> {
     let paddle = study.placement.optimum.dynamic_paddle.ok_or(ModelError::NoPaddleControls)?;
     let BuiltTable { table, ended } = table::build_as_deep_as_it_goes(&study.model, paddle, &TableOptions::default())?;
-    Ok((table::to_bytes(&table)?, ended))
+    Ok((table::to_bytes(&table)?, warnings(&table, ended, study.model.scene().needle.speed)))
 }
 
 type AccuracyOutcome = Result<StudyAccuracy, ModelError>;

@@ -56,8 +56,8 @@ pub(super) fn run(args: &TableArgs) -> Result<(), CliError> {
     output::write_whole(&args.output, &bytes)?;
     if !args.run.quiet {
         let summary = table_text::summary(&table);
-        let steep = too_steep(&table, scene.needle.speed);
-        say!("{}: {} bytes\n{summary}{}{steep}", args.output.display(), bytes.len(), early_end(ended));
+        let warnings = warnings(&table, ended, scene.needle.speed);
+        say!("{}: {} bytes\n{summary}{warnings}", args.output.display(), bytes.len());
     }
     Ok(())
 }
@@ -84,6 +84,11 @@ fn in_space(args: &TableArgs, scene: SpaceScene) -> Result<(), CliError> {
     Ok(())
 }
 
+/// What is to be said of a table for a needle at this speed.
+pub(super) fn warnings(table: &Table<f64, 2>, ended: Option<EndedEarly>, speed: f64) -> String {
+    early_end(ended) + &too_steep(table, speed)
+}
+
 /// A warning where a paddle cannot follow the path while the needle goes at this speed.
 fn too_steep(table: &Table<f64, 2>, speed: f64) -> String {
     let (from, slope) = table::steepest_path(table);
@@ -100,7 +105,7 @@ fn too_steep(table: &Table<f64, 2>, speed: f64) -> String {
 }
 
 /// A warning where the table is not as deep as the insertion.
-pub(super) fn early_end(ended: Option<EndedEarly>) -> String {
+fn early_end(ended: Option<EndedEarly>) -> String {
     let told = |ended| {
         format!(
             "\nwarning: {ended}; beyond that no controller has anything to go by: choose another paddle, insert less deep, or where \

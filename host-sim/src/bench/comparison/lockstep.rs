@@ -83,7 +83,10 @@ impl Comparison<'_> {
     /// simulated once more with the full model, which takes longer.
     fn in_full_where_off(&self, measured: Vec<MeasuredInsertion>) -> Result<Vec<Option<MeasuredInsertion>>, SimError> {
         let mut measured: Vec<Option<MeasuredInsertion>> = measured.into_iter().map(Some).collect();
-        let off = |near: &MeasuredInsertion| near.result.tissue_off_in_words();
+        let off = |near: &MeasuredInsertion| {
+            let is_near_a_way = near.result.plant.path_knots.is_some();
+            near.result.tissue_off_in_words().filter(|_| is_near_a_way)
+        };
         let again: Vec<(usize, String)> = match self.simulation.plant {
             Some(_) => Vec::new(),
             None => measured.iter().enumerate().filter_map(|(i, near)| Some((i, off(near.as_ref()?)?))).collect(),
@@ -98,10 +101,14 @@ impl Comparison<'_> {
                     let peak = measured[i].as_ref().map_or(0.0, |near| near.result.max_orthogonal_error);
                     full.result.plant.first_fallback =
                         Some(format!("near the planned way {peak:.1e} came out, and {why}"));
+                    full.result.plant.left_the_way = true;
                     measured[i] = Some(full);
                 }
                 // Where the full model cannot go, the other one's answer is all there is, and is said not to be trusted.
-                Err(SimError::Runtime(RuntimeError::World(_))) => {}
+                Err(SimError::Runtime(RuntimeError::World(error))) => {
+                    let near = measured[i].as_mut().map(|near| &mut near.result.plant.not_verified);
+                    near.into_iter().for_each(|known| *known = Some(error.to_string()));
+                }
                 Err(error) => return Err(error),
             }
         }

@@ -75,7 +75,8 @@ fn tissue_off(run: &RunResult) -> Option<String> {
         share(a).total_cmp(&share(b))
     })?;
     let off = worst.tissue_off_in_words()?;
-    Some(format!("That is not to be trusted: {off}; simulate it with --plant full."))
+    let advice = if worst.plant.not_verified.is_none() { "; simulate it with --plant full" } else { "" };
+    Some(format!("That is not to be trusted: {off}{advice}."))
 }
 
 /// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.

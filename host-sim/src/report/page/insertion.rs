@@ -232,12 +232,13 @@ pub(super) fn cause_panel(run: &RunResult, case: &CaseResult) -> Option<Panel> {
 pub(super) fn cause_table(run: &RunResult, case: &CaseResult) -> Option<Markup> {
     let causes = case.causes.as_ref()?;
     let unit = &run.units[0];
+    let near = if case.strategies.left_the_way() { ", near the planned way, which it left" } else { "" };
     let row = |name: &str, errors: &Errors| {
         html! { tr { td.left { (name) } td { (number(errors.peak, 3)) } td { (number(errors.rms, 3)) } } }
     };
     Some(html! {
         div.scroll { table {
-            caption { span { "What is left of the controlled insertion's error without each of its causes, in lockstep" } }
+            caption { span { "What is left of the controlled insertion's error without each of its causes, in lockstep" (near) } }
             thead { tr { th.left { "without" } th { (in_unit("largest", unit)) } th { (in_unit("RMS", unit)) } } }
             tbody {
                 (row("nothing: as it is", &causes.whole))

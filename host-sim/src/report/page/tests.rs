@@ -14,7 +14,7 @@ use crate::runtime::time::mode::RunMode;
 use firmware::{Discard, Faults};
 use model_offline::discretization::Integration;
 use model_offline::needle::StationState;
-use model_offline::scene::TissueVariant;
+use model_offline::scene::{PlantModel, TissueVariant};
 use model_offline::solver::equilibrium::FailureReason;
 
 const EVIL: &str = "<script>alert(\"x\")</script>&'";
@@ -403,6 +403,7 @@ fn the_conclusion_says_what_spoils_it() {
     let off = |share: f64, why: Option<&str>| {
         let mut run = good.clone();
         let plant = &mut run.cases[1].strategies.dynamic.as_mut().unwrap().plant;
+        plant.model = PlantModel::Reduced;
         (plant.extrapolation_error, plant.not_verified) = (Some(share * 1e-5), why.map(str::to_owned));
         said(&run)
     };
@@ -417,6 +418,11 @@ fn the_conclusion_says_what_spoils_it() {
         "{}",
         off(0.2, Some("no way"))
     );
+    assert!(!off(0.3, Some("no way")).contains("--plant full"), "{}", off(0.3, Some("no way")));
+    // Between its solves the full model is as exact as is asked for, and where next to nothing is left that is much of it.
+    let mut run = good.clone();
+    run.cases[1].strategies.dynamic.as_mut().unwrap().plant.extrapolation_error = Some(4e-5);
+    assert!(!said(&run).contains("trusted"), "{}", said(&run));
     let mut run = good.clone();
     run.cases[1].table.ends_early = Some("it ends".to_owned());
     assert!(said(&run).contains("Beyond its table the controller does not run: tissue "), "{}", said(&run));

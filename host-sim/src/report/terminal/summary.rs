@@ -165,9 +165,10 @@ fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::
             true => "nothing that can be taken away".to_owned(),
             false => format!("is left: {}; {:.digits$} without any of it", left.join(", "), causes.without_all.peak),
         };
+        let near = if case.strategies.left_the_way() { "near the planned way, which it left, " } else { "" };
         writeln!(
             text,
-            "  {}, of the dynamic error {left}; with this sensor no controller could leave less on average than {:.digits$}, \
+            "  {}, of the dynamic error {near}{left}; with this sensor no controller could leave less on average than {:.digits$}, \
              with the paddle's rate none less than {:.digits$}",
             case.tissue, causes.bound.sensor.peak, causes.bound.paddle
         )?;

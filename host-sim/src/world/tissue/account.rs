@@ -21,6 +21,9 @@ pub struct PlantAccount {
     /// Why, the first time; or why there is no reduced model.
     #[serde(default)]
     pub first_fallback: Option<String>,
+    /// Whether the insertion was simulated near its planned way first, left that, and is of the full model therefore.
+    #[serde(default)]
+    pub left_the_way: bool,
     /// What a step of the full model takes, µs, where the reduced one stands in because that is too long.
     #[serde(default)]
     pub full_step_us: Option<f64>,
@@ -59,11 +62,12 @@ pub struct PlantAccount {
 }
 
 impl PlantAccount {
-    /// How far the target was from where the full model has it, length, as far as it is known: found by going the same way in
-    /// full, or where that could not be done, what the model takes itself to be off.
+    /// How far the target was from where the full model has it, length, where another one stood in for it: found by going the same way
+    /// in full, infinite where that could not be done. None of the full model, which is as exact between its solves as is asked for.
     pub fn off(&self) -> Option<f64> {
         match self.not_verified {
-            Some(_) => self.largest_estimate,
+            _ if self.model == PlantModel::Full => None,
+            Some(_) => Some(f64::INFINITY),
             None => self.extrapolation_error.into_iter().chain(self.largest_error).reduce(f64::max),
         }
     }
@@ -78,6 +82,7 @@ impl Default for PlantAccount {
             points: None,
             fallbacks: 0,
             first_fallback: None,
+            left_the_way: false,
             full_step_us: None,
             largest_estimate: None,
             path_knots: None,

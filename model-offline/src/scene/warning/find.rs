@@ -251,7 +251,8 @@ impl Rules<'_> {
         let breath = motion.breathing.map_or(0.0, |breathing| breathing.amplitude.abs());
         let surge = motion.surge.map_or(0.0, |surge| surge.amplitude.abs());
         let recorded = motion.recorded.iter().map(|(_, moved)| moved.norm()).fold(0.0, f64::max);
-        let distance = breath.max(surge).max(recorded);
+        // They add up.
+        let distance = breath + surge + recorded;
         (distance > FARTHEST_MOVED * self.size).then_some(SceneWarning::MotionLarge { distance, size: self.size })
     }
 

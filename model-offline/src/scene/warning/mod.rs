@@ -97,7 +97,7 @@ pub enum SceneWarning {
     },
     /// The immobile part moves about as far as the body is large.
     MotionLarge {
-        /// Largest distance that breath, cough or recording moves it.
+        /// Largest distance that breath, cough and recording move it together.
         distance: f64,
         /// The body's size: the diagonal of its bounding box.
         size: f64,
@@ -314,7 +314,7 @@ impl SceneWarning {
             Self::NeedleFast { .. } | Self::MotionLarge { .. } => "check the number and its unit",
             Self::FrictionOnlySticks { .. } => "give kinetic_friction too",
             Self::TipTooShort { .. } => {
-                "give a longer tip_length, or less force; coarse nodes, by a spacing in place of the tolerance, hide it: on fine ones there may be no equilibrium"
+                "give a longer tip_length, or less force: on fine nodes there may be no equilibrium, and coarse ones hide it"
             }
             Self::TargetNearBoundary { .. } => "take a smaller spacing, or move the target inwards",
             Self::TargetNearImmobile { .. } => "move it away: hardly any paddle moves what is held so near",
