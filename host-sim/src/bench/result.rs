@@ -424,6 +424,13 @@ impl StrategyResult {
             }
         })
     }
+
+    /// The same with what to do.
+    pub(crate) fn distrust(&self) -> Option<String> {
+        let off = self.tissue_off_in_words()?;
+        let advice = if self.plant.not_verified.is_none() { "; simulate it with --plant full" } else { "" };
+        Some(off + advice)
+    }
 }
 
 /// The body at one moment of the insertion.

@@ -77,7 +77,7 @@ pub(crate) struct WorldArgs {
     #[arg(long, default_value_t = 0, value_name = "TICKS")]
     pub(crate) paddle_delay: u32,
     /// What answers for the tissue at every tick [default: full; reduced in free-run where full cannot keep the period, and for
-    /// tissue that has a past]
+    /// tissue that has a past, in lockstep again in full where that was far off]
     #[arg(long, value_enum)]
     pub(crate) plant: Option<WantedPlant>,
     /// Part of its command that the paddle reaches

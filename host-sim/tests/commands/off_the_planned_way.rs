@@ -44,7 +44,7 @@ fn where_the_learnt_neighbourhood_is_left_the_full_model_answers() {
     let off = plant(&near, "extrapolation_error").as_f64().unwrap();
     assert!(off > 0.25 * peak(&near), "{off} {}", peak(&near));
     let told = format!("its tissue is up to {:.0} % of that off", 100.0 * off / peak(&near));
-    assert!(said.contains(&format!("NOT TO BE TRUSTED: {told}")), "{said}");
+    assert!(said.contains(&format!("NOT TO BE TRUSTED: {told}; simulate it with --plant full")), "{said}");
     assert!(page.contains(&format!("That is not to be trusted: {told}; simulate it with --plant full.")), "{told}");
     // In full.
     let (said, full, page) = run(folder.path(), "--plant full");

@@ -13,6 +13,9 @@ use crate::runtime::time::mode::RunMode;
 use crate::world::simulation::Simulation;
 use crate::world::tissue::WantedPlant;
 
+/// Nodes times ticks of the largest insertion that is simulated again in full: a minute or so, at 5 to 13 µs each.
+const MOST_WORK: u64 = 5_000_000;
+
 impl Comparison<'_> {
     /// The dynamic strategy of all cases in lockstep; none where only free-run is asked for. Who looks on sees one after
     /// the other.
@@ -80,17 +83,16 @@ impl Comparison<'_> {
 
     /// Tissue that has a past is simulated by the neighbourhood of the way that its paddle is planned to go, unless somebody says
     /// otherwise. A controller that goes elsewhere leaves it: where that makes the tissue off by much of the error, the insertion is
-    /// simulated once more with the full model, which takes longer.
+    /// simulated once more with the full model, unless that takes long.
     fn in_full_where_off(&self, measured: Vec<MeasuredInsertion>) -> Result<Vec<Option<MeasuredInsertion>>, SimError> {
         let mut measured: Vec<Option<MeasuredInsertion>> = measured.into_iter().map(Some).collect();
-        let off = |near: &MeasuredInsertion| {
-            let is_near_a_way = near.result.plant.path_knots.is_some();
-            near.result.tissue_off_in_words().filter(|_| is_near_a_way)
+        let off = |i: usize, near: &MeasuredInsertion| {
+            let is_near_a_way = near.result.plant.path_knots.is_some() && self.simulation.plant.is_none();
+            let work = self.studied(self.cases[i].tissue).plant().nodes() as u64 * self.simulation.ticks();
+            near.result.tissue_off_in_words().filter(|_| is_near_a_way && work <= MOST_WORK)
         };
-        let again: Vec<(usize, String)> = match self.simulation.plant {
-            Some(_) => Vec::new(),
-            None => measured.iter().enumerate().filter_map(|(i, near)| Some((i, off(near.as_ref()?)?))).collect(),
-        };
+        let all = measured.iter().enumerate();
+        let again: Vec<(usize, String)> = all.filter_map(|(i, near)| Some((i, off(i, near.as_ref()?)?))).collect();
         let Some((first, why)) = again.first() else { return Ok(measured) };
         self.progress.say(&format!("{}: the full model, because {why}", self.cases[*first].tissue));
         let cases: Vec<usize> = again.iter().map(|(i, _)| *i).collect();

@@ -74,9 +74,7 @@ fn tissue_off(run: &RunResult) -> Option<String> {
         let share = |result: &StrategyResult| result.tissue_off().unwrap_or(0.0);
         share(a).total_cmp(&share(b))
     })?;
-    let off = worst.tissue_off_in_words()?;
-    let advice = if worst.plant.not_verified.is_none() { "; simulate it with --plant full" } else { "" };
-    Some(format!("That is not to be trusted: {off}{advice}."))
+    Some(format!("That is not to be trusted: {}.", worst.distrust()?))
 }
 
 /// How many times smaller, or larger, the dynamic paddle's largest error is than another one, over all cases.

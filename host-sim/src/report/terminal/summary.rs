@@ -142,8 +142,7 @@ fn write_case(text: &mut String, run: &RunResult, case: &CaseResult, digits: usi
         (Some(factor), Some(dynamic)) => {
             let none =
                 case.improvement_over_none.map_or_else(String::new, |factor| format!("{}, ", share(factor, "none")));
-            let off =
-                dynamic.tissue_off_in_words().map_or_else(String::new, |off| format!("; NOT TO BE TRUSTED: {off}"));
+            let off = dynamic.distrust().map_or_else(String::new, |off| format!("; NOT TO BE TRUSTED: {off}"));
             writeln!(text, "   {}, {none}{}{off}", share(factor, "static"), state(dynamic))
         }
         _ => writeln!(text),

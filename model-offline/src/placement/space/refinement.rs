@@ -1,7 +1,7 @@
 //! Refinement of a body in space to a tolerance of its controllability measures.
 //!
 //! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
-//! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by the next coarser mesh. From a mesh to
+//! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by a coarser mesh. From a mesh to
 //! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
 //! is left; it is taken times [`SAFETY`].
 
