@@ -418,7 +418,8 @@ impl StrategyResult {
     pub(crate) fn tissue_off_in_words(&self) -> Option<String> {
         let share = self.tissue_off()?;
         Some(match &self.plant.not_verified {
-            None => format!("its tissue is up to {:.0} % of that off", 100.0 * share),
+            None if share < 10.0 => format!("its tissue is up to {:.0} % of that off", 100.0 * share),
+            None => "its tissue is off by more than ten times that".to_owned(),
             Some(why) => {
                 format!("how far its tissue is off is not known, because the full model cannot go the same way ({why})")
             }
@@ -428,8 +429,12 @@ impl StrategyResult {
     /// The same with what to do.
     pub(crate) fn distrust(&self) -> Option<String> {
         let off = self.tissue_off_in_words()?;
-        let advice = if self.plant.not_verified.is_none() { "; simulate it with --plant full" } else { "" };
-        Some(off + advice)
+        let advice = match (&self.plant.not_in_full, &self.plant.not_verified) {
+            (Some(why), _) => format!("; the full model was tried and ended ({why})"),
+            (None, Some(_)) => String::new(),
+            (None, None) => "; simulate it with --plant full".to_owned(),
+        };
+        Some(off + &advice)
     }
 }
 

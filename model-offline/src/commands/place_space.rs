@@ -8,7 +8,7 @@ use super::place_text::in_lengths_of;
 use model_offline::number::{decimals, length, smallest_told};
 use model_offline::parallel;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
-use model_offline::placement::space::{SpaceErrorEstimate, SpaceStudy};
+use model_offline::placement::space::{SecondPaddle, SpaceErrorEstimate, SpaceStudy};
 use model_offline::scene::space::SpaceScene;
 use model_offline::tell;
 use serde_json::{Value, json};
@@ -104,6 +104,7 @@ fn document(study: &SpaceStudy, warnings: &[String]) -> Value {
         "optimum_single": placement.optimum_single,
         "as_good": as_good(&placement.optimum),
         "as_good_single": as_good(&placement.optimum_single),
+        "second_paddle": study.second_paddle(),
         "warnings": warnings,
     })
 }
@@ -214,22 +215,13 @@ fn harms(what: &str, study: &SpaceStudy, best: &[u32]) -> Option<String> {
 
 /// Whether the second paddle buys anything at rest.
 fn second_pays(study: &SpaceStudy) -> Option<String> {
-    let placement = &study.placement;
-    let place = |best: &[u32]| placement.sets().position(|(paddles, _)| paddles == best);
-    let [alone, together] = [&placement.optimum_single, &placement.optimum].map(|best| place(&best.dynamic));
-    let (alone, together) = alone.zip(together).filter(|_| !placement.pairs.is_empty())?;
-    let [single, pair] = [alone, together].map(|set| placement.sets().nth(set).map(|(_, a)| a.controllability_measure));
-    let (single, pair) = single.zip(pair)?;
-    let is_open = study.uncertain().is_some_and(|uncertain| {
-        let ranges = uncertain.measure_range(alone).zip(uncertain.measure_range(together));
-        ranges.is_some_and(|([least, _], [_, most])| least <= most)
-    });
+    let SecondPaddle { single, pair, gain, left_open } = study.second_paddle()?;
     let way = "the way for the worst direction";
-    let gain = 100.0 * (1.0 - pair / single);
+    let gain = 100.0 * gain.unwrap_or(0.0);
     // What would be told as nothing is nothing.
     Some(match format!("{gain:.1}") {
         told if gain > 0.0 && told != "0.0" => {
-            let open = if is_open { LEFT_OPEN } else { "" };
+            let open = if left_open == Some(true) { LEFT_OPEN } else { "" };
             format!("a second paddle shortens {way} by {told} % ({single:.3} to {pair:.3}){open}\n")
         }
         _ => format!("a second paddle does not shorten {way} ({single:.3} to {pair:.3})\n"),

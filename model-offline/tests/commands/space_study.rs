@@ -46,6 +46,15 @@ fn a_study_in_space_is_written_as_the_contract_says() {
     assert_eq!(study["optimum"]["dynamic"].as_array().unwrap().len(), 2);
     // Of numbers without errors nobody knows who is as good.
     assert!(study["as_good"].is_null() && study["as_good_single"].is_null());
+    let second = &study["second_paddle"];
+    let measure = |of: &str, k: usize| study[of][k]["controllability_measure"].as_f64().unwrap();
+    let best = |of: &str| {
+        let all = 0..study[of].as_array().unwrap().len();
+        all.map(|k| measure(of, k)).fold(f64::INFINITY, f64::min)
+    };
+    let [single, pair] = ["single", "pair"].map(|key| second[key].as_f64().unwrap());
+    assert!(single == best("paddles") && pair == best("pairs") && second["left_open"].is_null(), "{second}");
+    assert!((second["gain"].as_f64().unwrap() - (1.0 - pair / single)).abs() < 1e-12);
     // The paddle on the needle's side of the target, as in the continuum.
     assert_eq!(study["optimum_single"]["dynamic"], serde_json::json!([3]));
 }
@@ -72,6 +81,8 @@ fn a_tolerance_comes_with_the_errors_of_both_measures() {
     assert_eq!(study["as_good_single"]["dynamic"], serde_json::json!([]));
     let [one, two] = ["as_good_single", "as_good"].map(|key| study[key]["static"].as_array().unwrap().len());
     assert!(one > 0 && two == 0, "{one} {two}");
+    // What the second paddle saves on this body is less than such errors.
+    assert_eq!(study["second_paddle"]["left_open"], serde_json::json!(true));
 }
 
 #[test]

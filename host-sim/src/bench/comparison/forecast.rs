@@ -38,12 +38,12 @@ const AROUND_FREE_RUN_S: f64 = 1.2;
 /// The parts of a comparison in their order, and how fast they go.
 #[derive(Debug, Default)]
 pub(super) struct Forecast {
-    parts: Vec<Part>,
     state: Mutex<State>,
 }
 
 #[derive(Debug, Default)]
 struct State {
+    parts: Vec<Part>,
     /// How many parts have begun, and when the last of them did.
     begun: usize,
     since: Option<Instant>,
@@ -56,14 +56,27 @@ struct State {
 impl Forecast {
     /// Without parts nothing is foretold.
     pub(super) fn of(parts: Vec<Part>) -> Self {
-        Self { parts, state: Mutex::default() }
+        Self { state: Mutex::new(State { parts, ..State::default() }) }
+    }
+
+    /// What nobody foresaw is to be done next, and takes so long, s.
+    pub(super) fn interpose(&self, takes_s: f64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let part = match state.pace_s {
+            Some(pace_s) if pace_s > 0.0 => Part { work: takes_s / pace_s, clock_s: 0.0 },
+            _ => Part { work: 0.0, clock_s: takes_s },
+        };
+        let next = state.begun;
+        if next > 0 && next <= state.parts.len() {
+            state.parts.insert(next, part);
+        }
     }
 
     /// The next part begins now, and the one before has ended: what this part and all behind it will take, s; none where no
     /// part has told yet how fast it goes.
     pub(super) fn next(&self, now: Instant) -> Option<[f64; 2]> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        let before = state.begun.checked_sub(1).and_then(|last| self.parts.get(last));
+        let before = state.begun.checked_sub(1).and_then(|last| state.parts.get(last).copied());
         if let (Some(part), Some(since)) = (before, state.since) {
             let took_s = (now - since).as_secs_f64();
             if part.work > 0.0 {
@@ -78,8 +91,8 @@ impl Forecast {
             _ if part.work == 0.0 => Some(part.clock_s + state.beside_clock_s),
             pace_s => pace_s.map(|pace_s| pace_s * part.work + part.clock_s),
         };
-        let this = takes(self.parts.get(state.begun - 1)?)?;
-        let behind: Option<f64> = self.parts[state.begun..].iter().map(takes).sum();
+        let this = takes(state.parts.get(state.begun - 1)?)?;
+        let behind: Option<f64> = state.parts[state.begun..].iter().map(takes).sum();
         Some([this, behind?])
     }
 }
@@ -110,6 +123,13 @@ impl Comparison<'_> {
         let clock_s = self.simulation.duration_s + AROUND_FREE_RUN_S;
         parts.extend(self.cases.iter().filter(|case| self.is_in_free_run(case)).map(|_| Part { work: 0.0, clock_s }));
         parts
+    }
+
+    /// Something that nobody foresaw begins: of so many steps, and of so many seconds.
+    pub(super) fn begins_in_addition(&self, what: &str, steps: u64, takes_s: f64) {
+        self.progress.extend(steps);
+        self.forecast.interpose(takes_s);
+        self.begins(what);
     }
 
     /// The next of the parts begins.
@@ -145,6 +165,29 @@ mod tests {
         assert_eq!(forecast.next(at(21)), Some([8.0, 20.0]));
         assert_eq!(forecast.next(at(29)), Some([20.0, 0.0]));
         assert_eq!(forecast.next(at(49)), None, "there is none any more");
+    }
+
+    #[test]
+    fn what_nobody_foresaw_is_done_before_the_rest() {
+        let free_run = Part { work: 0.0, clock_s: 7.0 };
+        let forecast = Forecast::of(vec![work(1.0), work(2.0), free_run]);
+        let start = Instant::now();
+        let at = |seconds: u64| start + Duration::from_secs(seconds);
+        assert_eq!(forecast.next(at(0)), None);
+        assert_eq!(forecast.next(at(3)), Some([6.0, 7.0]));
+        forecast.interpose(30.0);
+        let [this, then] = forecast.next(at(9)).unwrap();
+        assert!((this - 30.0).abs() < 1e-12 && then == 7.0, "{this} {then}");
+        // How long it took says nothing of what is on the clock.
+        assert_eq!(forecast.next(at(29)), Some([7.0, 0.0]));
+        // At the end, too; where nothing was foretold, nothing is.
+        forecast.interpose(5.0);
+        assert!(forecast.next(at(36)).is_some_and(|[this, then]| (this - 5.0).abs() < 1e-12 && then == 0.0));
+        let nothing = Forecast::default();
+        nothing.interpose(5.0);
+        assert_eq!(nothing.next(at(40)), None);
+        nothing.interpose(5.0);
+        assert_eq!(nothing.next(at(41)), None);
     }
 
     #[test]

@@ -15,6 +15,8 @@ use crate::world::tissue::WantedPlant;
 
 /// Nodes times ticks of the largest insertion that is simulated again in full: a minute or so, at 5 to 13 µs each.
 const MOST_WORK: u64 = 5_000_000;
+/// What one node takes for one tick, s.
+const NODE_TICK_S: f64 = 8e-6;
 
 impl Comparison<'_> {
     /// The dynamic strategy of all cases in lockstep; none where only free-run is asked for. Who looks on sees one after
@@ -86,18 +88,25 @@ impl Comparison<'_> {
     /// simulated once more with the full model, unless that takes long.
     fn in_full_where_off(&self, measured: Vec<MeasuredInsertion>) -> Result<Vec<Option<MeasuredInsertion>>, SimError> {
         let mut measured: Vec<Option<MeasuredInsertion>> = measured.into_iter().map(Some).collect();
+        let work = |i: usize| self.studied(self.cases[i].tissue).plant().nodes() as u64 * self.simulation.ticks();
         let off = |i: usize, near: &MeasuredInsertion| {
             let is_near_a_way = near.result.plant.path_knots.is_some() && self.simulation.plant.is_none();
-            let work = self.studied(self.cases[i].tissue).plant().nodes() as u64 * self.simulation.ticks();
-            near.result.tissue_off_in_words().filter(|_| is_near_a_way && work <= MOST_WORK)
+            near.result.tissue_off_in_words().filter(|_| is_near_a_way && work(i) <= MOST_WORK)
         };
         let all = measured.iter().enumerate();
         let again: Vec<(usize, String)> = all.filter_map(|(i, near)| Some((i, off(i, near.as_ref()?)?))).collect();
         let Some((first, why)) = again.first() else { return Ok(measured) };
-        self.progress.say(&format!("{}: the full model, because {why}", self.cases[*first].tissue));
         let cases: Vec<usize> = again.iter().map(|(i, _)| *i).collect();
+        let node_ticks: u64 = cases.iter().map(|&i| work(i)).sum();
+        let side_by_side = self.options.threads.min(cases.len()).max(1) as f64;
+        self.begins_in_addition(
+            &format!("{}: the full model, because {why}", self.cases[*first].tissue),
+            cases.len() as u64 * self.simulation.ticks(),
+            NODE_TICK_S * node_ticks as f64 / side_by_side,
+        );
         let simulation = Simulation { plant: Some(WantedPlant::Full), ..self.simulation.clone() };
-        for (outcome, (i, why)) in self.side_by_side(&cases, &simulation, &|| ())?.into_iter().zip(again) {
+        let step = || self.progress.step();
+        for (outcome, (i, why)) in self.side_by_side(&cases, &simulation, &step)?.into_iter().zip(again) {
             match outcome {
                 Ok(mut full) => {
                     let peak = measured[i].as_ref().map_or(0.0, |near| near.result.max_orthogonal_error);
@@ -108,7 +117,7 @@ impl Comparison<'_> {
                 }
                 // Where the full model cannot go, the other one's answer is all there is, and is said not to be trusted.
                 Err(SimError::Runtime(RuntimeError::World(error))) => {
-                    let near = measured[i].as_mut().map(|near| &mut near.result.plant.not_verified);
+                    let near = measured[i].as_mut().map(|near| &mut near.result.plant.not_in_full);
                     near.into_iter().for_each(|known| *known = Some(error.to_string()));
                 }
                 Err(error) => return Err(error),

@@ -9,6 +9,11 @@ pub trait Progress: Sync {
         let _ = steps;
     }
 
+    /// So many more than was thought.
+    fn extend(&self, steps: u64) {
+        let _ = steps;
+    }
+
     /// One of them is done.
     fn step(&self) {}
 
@@ -34,6 +39,10 @@ impl Progress for indicatif::ProgressBar {
         self.set_length(steps);
     }
 
+    fn extend(&self, steps: u64) {
+        self.inc_length(steps);
+    }
+
     fn step(&self) {
         self.inc(1);
     }
@@ -46,6 +55,10 @@ impl Progress for indicatif::ProgressBar {
 impl Progress for LongRun {
     fn begin(&self, steps: u64) {
         self.bar.set_length(steps);
+    }
+
+    fn extend(&self, steps: u64) {
+        self.bar.inc_length(steps);
     }
 
     fn step(&self) {

@@ -419,6 +419,14 @@ fn the_conclusion_says_what_spoils_it() {
         off(0.2, Some("no way"))
     );
     assert!(!off(0.3, Some("no way")).contains("--plant full"), "{}", off(0.3, Some("no way")));
+    assert!(off(1e9, None).contains("its tissue is off by more than ten times that"), "{}", off(1e9, None));
+    // Where the full model was tried in its place, that is known, and so is how far off this one was.
+    let mut run = good.clone();
+    let plant = &mut run.cases[1].strategies.dynamic.as_mut().unwrap().plant;
+    (plant.model, plant.extrapolation_error) = (PlantModel::Reduced, Some(0.3e-5));
+    plant.not_in_full = Some("no way".to_owned());
+    let expected = "its tissue is up to 30 % of that off; the full model was tried and ended (no way)";
+    assert!(said(&run).contains(expected), "{}", said(&run));
     // Between its solves the full model is as exact as is asked for, and where next to nothing is left that is much of it.
     let mut run = good.clone();
     run.cases[1].strategies.dynamic.as_mut().unwrap().plant.extrapolation_error = Some(4e-5);
@@ -491,6 +499,28 @@ fn feedback_below_the_noise_is_told() {
     let mut unknown = with(1.1, 0.5);
     unknown.cases.iter_mut().for_each(|case| case.strategies.none = None);
     assert!(!said(&unknown).contains(told));
+}
+
+/// The loop that runs beside the one in a row is not in that row.
+#[test]
+fn free_run_beside_lockstep_has_its_own_word_on_its_tissue() {
+    let on_screen = |run: &RunResult| crate::report::terminal::summary::summary(run, "there".as_ref());
+    let off = |in_row: bool| {
+        let mut run = run("mine");
+        let strategies = &mut run.cases[1].strategies;
+        let of = if in_row { &mut strategies.dynamic } else { &mut strategies.dynamic_free_run };
+        let found = of.as_mut().unwrap();
+        (found.plant.model, found.plant.path_knots) = (PlantModel::Reduced, Some(9));
+        found.plant.extrapolation_error = Some(0.5 * found.max_orthogonal_error);
+        on_screen(&run)
+    };
+    let marked = |text: &str| -> Vec<String> {
+        text.lines().filter(|line| line.contains("NOT TO BE TRUSTED")).map(str::to_owned).collect()
+    };
+    assert!(marked(&on_screen(&run("mine"))).is_empty());
+    let (beside, in_row) = (marked(&off(false)), marked(&off(true)));
+    assert!(beside.len() == 1 && beside[0].contains("free-run: tissue") && beside[0].contains("50 %"), "{beside:?}");
+    assert!(in_row.len() == 1 && !in_row[0].contains(": tissue"), "{in_row:?}");
 }
 
 #[test]

@@ -217,10 +217,14 @@ fn write_plant(text: &mut String, run: &RunResult) -> std::fmt::Result {
             if plant.fallbacks > 0 {
                 write!(text, "; the full model answered {} steps", plant.fallbacks)?;
             }
-            match &plant.first_fallback {
-                Some(why) => writeln!(text, ": {why}")?,
-                None => writeln!(text)?,
+            if let Some(why) = &plant.first_fallback {
+                write!(text, ": {why}")?;
             }
+            // Rows have this of what they show, which is in lockstep where there is both.
+            let beside = strategy
+                .distrust()
+                .filter(|_| !strategies.controlled().is_some_and(|shown| std::ptr::eq(shown, strategy)));
+            writeln!(text, "{}", beside.map_or_else(String::new, |off| format!("; NOT TO BE TRUSTED: {off}")))?;
         }
     }
     Ok(())
@@ -260,7 +264,11 @@ fn write_accuracy(text: &mut String, plant: &PlantAccount, peak: f64) -> std::fm
 
 /// What an error of the tissue is of the largest error that a run found with it, where that is worth telling.
 fn telling(off: f64, peak: f64) -> String {
-    if off > TELLING * peak { format!(" ({:.0} % of the largest error)", 100.0 * off / peak) } else { String::new() }
+    match off / peak {
+        share if share <= TELLING || off == 0.0 => String::new(),
+        share if share < 10.0 => format!(" ({:.0} % of the largest error)", 100.0 * share),
+        _ => " (more than ten times the largest error)".to_owned(),
+    }
 }
 
 /// A loop on the machine's clock.
@@ -373,6 +381,8 @@ mod tests {
         assert!(words.contains("NOT VERIFIED") && words.contains("no way") && words.contains("60 %"), "{words}");
         let trained = PlantAccount { states_verified: Some(7), largest_error: Some(0.01), ..PlantAccount::default() };
         assert_eq!(said(trained), ", at most 1.0e-2 from the full model in 7 states of its way");
+        assert_eq!(telling(0.0, 0.0), "");
+        assert_eq!([telling(6.0, 0.5), telling(1e-9, 0.0)], [" (more than ten times the largest error)"; 2]);
         // Where it answered nothing itself, nothing is told of it.
         assert_eq!(said(PlantAccount { fallbacks: 5567, ..PlantAccount::default() }), "");
     }

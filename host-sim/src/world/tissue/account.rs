@@ -24,6 +24,9 @@ pub struct PlantAccount {
     /// Whether the insertion was simulated near its planned way first, left that, and is of the full model therefore.
     #[serde(default)]
     pub left_the_way: bool,
+    /// Why the full model could not simulate the insertion in its place, where that was tried because it left the way.
+    #[serde(default)]
+    pub not_in_full: Option<String>,
     /// What a step of the full model takes, µs, where the reduced one stands in because that is too long.
     #[serde(default)]
     pub full_step_us: Option<f64>,
@@ -83,6 +86,7 @@ impl Default for PlantAccount {
             fallbacks: 0,
             first_fallback: None,
             left_the_way: false,
+            not_in_full: None,
             full_step_us: None,
             largest_estimate: None,
             path_knots: None,

@@ -15,5 +15,5 @@ pub use discretised::{Discretised, SpaceErrorEstimate};
 pub use insertion::InsertionModel;
 pub use refinement::{SAFETY, distances};
 pub use study::SpacePlacement;
-pub use uncertainty::Uncertain;
+pub use uncertainty::{SecondPaddle, Uncertain};
 pub use workflow::SpaceStudy;

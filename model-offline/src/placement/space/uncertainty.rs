@@ -78,6 +78,36 @@ impl Uncertain<'_> {
     }
 }
 
+/// What a second paddle does for control at rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SecondPaddle {
+    /// Controllability measure of the best paddle.
+    pub single: f64,
+    /// That of the best pair.
+    pub pair: f64,
+    /// The part of the way for the worst direction that the pair saves; negative where it is longer, none where neither controls.
+    pub gain: Option<f64>,
+    /// Whether the estimated errors leave open that it saves none; none where none are estimated.
+    pub left_open: Option<bool>,
+}
+
+impl SecondPaddle {
+    /// By the best of a placement, with what is known of its errors; none where there are no pairs.
+    pub fn of(placement: &SpacePlacement, uncertain: Option<Uncertain<'_>>) -> Option<Self> {
+        let place = |best: &[u32]| placement.sets().position(|(paddles, _)| paddles == best);
+        let [alone, together] = [&placement.optimum_single, &placement.optimum].map(|best| place(&best.dynamic));
+        let (alone, together) = alone.zip(together).filter(|_| !placement.pairs.is_empty())?;
+        let measure = |set| placement.sets().nth(set).map(|(_, answer)| answer.controllability_measure);
+        let (single, pair) = measure(alone).zip(measure(together))?;
+        let left_open = uncertain.map(|uncertain| {
+            let ranges = uncertain.measure_range(alone).zip(uncertain.measure_range(together));
+            ranges.is_some_and(|([least, _], [_, most])| least <= most)
+        });
+        let gain = Some(1.0 - pair / single).filter(|gain| gain.is_finite());
+        Some(Self { single, pair, gain, left_open })
+    }
+}
+
 /// A fixture, and how far it is off per depth at rest.
 struct HeldStill<'a> {
     of: &'a SpaceStatic,
@@ -179,6 +209,30 @@ mod tests {
                 Uncertain { placement: &placement, estimate: &estimate }.as_good(&placement.optimum_single, &[]);
             assert_eq!(found, AsGoodSets { fixtures: vec![], dynamic }, "{error}");
         }
+    }
+
+    #[test]
+    fn a_second_paddle_gains_what_the_errors_do_not_take() {
+        let mut placement = placement();
+        let of = |placement: &SpacePlacement, error: f64| {
+            let estimate = estimate(error, 0.0);
+            SecondPaddle::of(placement, Some(Uncertain { placement, estimate: &estimate })).unwrap()
+        };
+        // 10 / (1 + e) meets 8 / (1 − e) where e is 1/9.
+        for (error, left_open) in [(0.11, false), (0.112, true)] {
+            let found = of(&placement, error);
+            assert_eq!((found.single, found.pair, found.left_open), (10.0, 8.0, Some(left_open)), "{error}");
+            assert!((found.gain.unwrap() - 0.2).abs() < 1e-12);
+        }
+        assert_eq!(SecondPaddle::of(&placement, None).unwrap().left_open, None);
+        // Where no paddle controls alone, the second is all of it; where no pair does either, nothing is gained.
+        placement.optimum_single.dynamic = vec![7];
+        let found = of(&placement, 0.5);
+        assert_eq!((found.gain, found.left_open), (Some(1.0), Some(false)));
+        placement.pairs[0].answer.controllability_measure = f64::INFINITY;
+        assert_eq!(of(&placement, 0.5).gain, None);
+        placement.pairs.clear();
+        assert_eq!(SecondPaddle::of(&placement, None), None);
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::insertion::InsertionModel;
 use super::refinement::{LEVELS, refine};
 use super::rest::{SpaceResponse, rest_responses};
 use super::study::{SpacePlacement, place_in_space, steps};
-use super::uncertainty::Uncertain;
+use super::uncertainty::{SecondPaddle, Uncertain};
 use crate::discretization::{Integration, Method, Resolution};
 use crate::model::ModelError;
 use crate::model::space::SpaceModel;
@@ -58,6 +58,11 @@ impl SpaceStudy {
     /// The placement with the estimated errors of it, where the scene asks for a tolerance.
     pub fn uncertain(&self) -> Option<Uncertain<'_>> {
         self.error_estimate.as_ref().map(|estimate| Uncertain { placement: &self.placement, estimate })
+    }
+
+    /// What a second paddle does for control at rest; none where the scene has no pairs.
+    pub fn second_paddle(&self) -> Option<SecondPaddle> {
+        SecondPaddle::of(&self.placement, self.uncertain())
     }
 
     /// Pairs of paddles that cannot be attached together, by index.
