@@ -206,6 +206,23 @@ mod tests {
         }
     }
 
+    /// Two paddles in the plane with unequal limits: of all w with Σ nᵀJₚ·wₚ = 1 the one of least Σ ‖wₚ‖²/cₚ, which Lagrange's condition
+    /// makes wₚ = cₚ·Jₚᵀn over the sum of cₚ·‖Jₚᵀn‖².
+    #[test]
+    fn limits_weigh_how_several_share_one_direction() {
+        let n = Vector2::new(0.6, 0.8);
+        let jacobians = [jacobian(), Matrix2::new(0.2, -0.1, 0.3, 0.5)];
+        let weights = [0.25, 9.0];
+        let found = Direction::MinimumNorm.solve(&jacobians, &n, &weights);
+        let rows = jacobians.map(|jacobian| jacobian.tr_mul(&n));
+        let sum: f64 = rows.iter().zip(weights).map(|(row, weight)| weight * row.norm_squared()).sum();
+        for ((found, row), weight) in found.iter().zip(rows).zip(weights) {
+            assert!((found - row * (weight / sum)).norm() < 1e-14, "{found} {row} {weight}");
+        }
+        let moved: f64 = jacobians.iter().zip(found).map(|(jacobian, w)| n.dot(&(jacobian * w))).sum();
+        assert!((moved - 1.0).abs() < 1e-14);
+    }
+
     /// A second paddle that moves nothing changes nothing of how the first one is damped.
     #[test]
     fn several_are_damped_as_one() {

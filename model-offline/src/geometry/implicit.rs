@@ -29,6 +29,11 @@ pub trait Implicit: Debug + Send + Sync {
     /// Opposite corners of a box that holds the body, length units; none if the body has no end.
     fn bounds(&self) -> Option<(Point<3>, Point<3>)>;
 
+    /// Opposite corners of the smallest such box that is known, to a small part of a voxel of what is made of voxels; length units.
+    fn extent(&self) -> Option<(Point<3>, Point<3>)> {
+        self.bounds()
+    }
+
     /// The smooth pieces that the surface is made of; by default the surface is smooth.
     fn sheets(&self) -> Vec<Sheet<'_>>;
 
@@ -64,6 +69,48 @@ pub trait Implicit: Debug + Send + Sync {
     fn holds(&self, x: &Point<3>, tolerance: f64) -> bool {
         self.patch_level(x) <= tolerance
     }
+}
+
+/// Steps along a surface towards what is nearest, and towards the surface, at most; shares of the way that are tried.
+const STEPS_ALONG: usize = 60;
+const STEPS_ONTO: usize = 20;
+const HALVINGS: i32 = 6;
+
+/// Distance of a point from the surface of a body, length units: from points near the surface along it to where it is nearest, of
+/// all of them the least. Levels are distances at the surface alone.
+pub fn distance_from(body: &dyn Implicit, x: &Point<3>, near_surface: impl Iterator<Item = Point<3>>) -> f64 {
+    near_surface.filter_map(|start| nearest_downhill(body, x, start)).fold(f64::INFINITY, f64::min)
+}
+
+/// Where the distance from `x` ceases to grow less along the surface; none where the surface cannot be found.
+fn nearest_downhill(body: &dyn Implicit, x: &Point<3>, start: Point<3>) -> Option<f64> {
+    let mut at = onto_surface(body, start)?;
+    for _ in 0..STEPS_ALONG {
+        let normal = body.gradient(&at).try_normalize(0.0)?;
+        let way = x - at;
+        let along = way - normal * way.dot(&normal);
+        let tries = (0..HALVINGS).map(|k| at + along * 0.5_f64.powi(k));
+        let mut tries = tries.filter_map(|next| onto_surface(body, next));
+        match tries.find(|next| (x - next).norm() < way.norm()) {
+            Some(next) => at = next,
+            None => break,
+        }
+    }
+    Some((x - at).norm())
+}
+
+/// The same point moved to where the level vanishes, by Newton's method along the gradient.
+fn onto_surface(body: &dyn Implicit, mut x: Point<3>) -> Option<Point<3>> {
+    let size = body.bounds().map_or(1.0, |(low, high)| (high - low).norm());
+    for _ in 0..STEPS_ONTO {
+        let level = body.level(&x);
+        if level.abs() <= 1e-12 * size {
+            return Some(x);
+        }
+        let gradient = body.gradient(&x);
+        x -= gradient * (level / gradient.norm_squared());
+    }
+    (body.level(&x).abs() <= 1e-6 * size).then_some(x)
 }
 
 /// Whether a region and a body share a point that is `wanted`, of a grid over the region's bounds: one fine enough to find

@@ -23,6 +23,7 @@ pub use facts::{BodyFacts, InclusionFacts, MaterialFacts, NeedleFacts, PaddleFac
 pub use limits::LimitError;
 pub use motion::{Breathing, Motion, Surge};
 pub use schema::{FitSection, PlantModel, TableScalar};
+pub(crate) use sensor::millimetres;
 pub use sensor::{IDEAL_NOISE_PER_DEPTH, Outages, Sensor, SensorPreset, UnknownLength};
 pub use shaft::{Mechanics, Resistance, Shaft};
 pub use tissue::TissueVariant;

@@ -73,7 +73,7 @@ impl UnknownLength {
 const KNOWN_UNITS: &str = "um, mm, cm, m, in";
 
 /// Millimetres per unit of length, where its label says so.
-pub(super) fn millimetres(unit: &str) -> Option<f64> {
+pub(crate) fn millimetres(unit: &str) -> Option<f64> {
     match unit {
         "um" | "µm" | "μm" => Some(1e-3),
         "mm" => Some(1.0),

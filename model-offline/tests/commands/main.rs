@@ -6,6 +6,7 @@ mod draw;
 #[cfg(target_os = "linux")]
 mod limits;
 mod scenes;
+mod segmentations;
 mod slipping_needles;
 mod space_awkward;
 mod space_commands;

@@ -205,6 +205,14 @@ fn a_drawing_with_all_roles_is_a_scene() {
     let printed = new(&["--length", "cm"]).success();
     assert_eq!(printed.get_output().stdout, std::fs::read(&path).unwrap());
     assert!(String::from_utf8_lossy(&printed.get_output().stderr).contains("taken: paddle 7"));
+    // Some programs write two bytes for a letter.
+    for (mark, of) in [([0xff, 0xfe], u16::to_le_bytes as fn(u16) -> [u8; 2]), ([0xfe, 0xff], u16::to_be_bytes)] {
+        let bytes: Vec<u8> = mark.into_iter().chain(text.encode_utf16().flat_map(of)).collect();
+        std::fs::write(&drawing, bytes).unwrap();
+        assert_eq!(new(&["--length", "cm"]).success().get_output().stdout, printed.get_output().stdout);
+    }
+    std::fs::write(&drawing, [0xff, 0xfe, 0x00, 0xd8, 0x20, 0x00]).unwrap();
+    new(&[]).code(2);
     // Roles that contradict each other: whose, and what to do.
     std::fs::write(&drawing, text.replace(r#"x1="20" y1="40" x2="20" y2="60""#, r#"x1="40" y1="90" x2="60" y2="90""#))
         .unwrap();

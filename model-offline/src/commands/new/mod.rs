@@ -9,6 +9,7 @@ use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, s
 use model_offline::scene::space::{self, AnyScene};
 use model_offline::scene::starter::{self, StarterNames, starter};
 use model_offline::{say, tell};
+use std::borrow::Cow;
 use std::io::{self, IsTerminal as _};
 use std::path::{Path, PathBuf};
 
@@ -111,6 +112,25 @@ fn asked_for(names: &StarterNames) -> Result<String, CliError> {
     Ok(starter(names, Some(&imported)))
 }
 
+/// The text of a drawing: UTF-8, or UTF-16 with its mark.
+fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ImportError> {
+    let wrong = |line| {
+        let what = "this is no text: give an SVG file that is not compressed".to_owned();
+        ImportError::Syntax { line, what }
+    };
+    let wide = |of: fn([u8; 2]) -> u16| {
+        let units: Vec<u16> = bytes[2..].chunks_exact(2).map(|pair| of([pair[0], pair[1]])).collect();
+        String::from_utf16(&units).map(Cow::Owned).map_err(|_| wrong(1))
+    };
+    match bytes {
+        [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
+        _ => std::str::from_utf8(bytes)
+            .map(Cow::Borrowed)
+            .map_err(|error| wrong(1 + bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count())),
+    }
+}
+
 /// The scene of a file, and what became of everything in it.
 fn import(file: &Path, args: &NewArgs, names: &StarterNames) -> Result<(String, String), CliError> {
     let bytes = reading::read(file, reading::DATA).map_err(|error| {
@@ -118,18 +138,8 @@ fn import(file: &Path, args: &NewArgs, names: &StarterNames) -> Result<(String, 
     })?;
     let options = ImportOptions { size: args.size, length: &names.length, stress: &names.stress };
     let read = || -> Result<(String, Imported), ImportError> {
-        let mut imported = if args.svg.is_some() {
-            let text = std::str::from_utf8(&bytes).map_err(|error| {
-                let line = 1 + bytes[..error.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
-                ImportError::Syntax {
-                    line,
-                    what: "this is no text: give an SVG file that is not compressed".to_owned(),
-                }
-            })?;
-            svg::read(text, &options)?
-        } else {
-            gmsh::read(&bytes, &options)?
-        };
+        let mut imported =
+            if args.svg.is_some() { svg::read(&text_of(&bytes)?, &options)? } else { gmsh::read(&bytes, &options)? };
         Ok((starter::imported(names, &mut imported)?, imported))
     };
     match read() {

@@ -30,6 +30,7 @@ pub struct LabelBody {
     origin: Point<3>,
     axes: Matrix3<f64>,
     bounds: (Point<3>, Point<3>),
+    extent: (Point<3>, Point<3>),
     moved: f64,
 }
 
@@ -76,7 +77,9 @@ impl LabelBody {
         };
         let corners: Vec<Point<3>> = (0..8).map(corner).collect();
         let bounds = box_of(&corners).unwrap_or((origin, origin));
-        Ok(Self { levels, to_box, origin, axes, bounds, moved })
+        let surface: Vec<Point<3>> = crossings(&levels).map(|index| origin + axes * index).collect();
+        let extent = box_of(&surface).unwrap_or(bounds);
+        Ok(Self { levels, to_box, origin, axes, bounds, extent, moved })
     }
 
     /// How far the boundary was moved outwards to keep the volume of the voxels, in mm.
@@ -141,6 +144,10 @@ impl Implicit for LabelBody {
 
     fn bounds(&self) -> Option<(Point<3>, Point<3>)> {
         Some(self.bounds)
+    }
+
+    fn extent(&self) -> Option<(Point<3>, Point<3>)> {
+        Some(self.extent)
     }
 
     fn sheets(&self) -> Vec<Sheet<'_>> {
@@ -239,6 +246,26 @@ fn samples(levels: &Lattice<f32>, reach: f64) -> (f64, Vec<f32>) {
         }
     }
     (deep, near)
+}
+
+/// Indices of where levels vanish between neighbours: the surface is farthest out along an axis on such a line, because levels in
+/// between are linear in each index.
+fn crossings(levels: &Lattice<f32>) -> impl Iterator<Item = Vector3<f64>> {
+    let size = levels.size;
+    let steps = [1, size[0], size[0] * size[1]];
+    let place = move |index: usize| [index % size[0], index / size[0] % size[1], index / size[0] / size[1]];
+    levels.data.iter().enumerate().flat_map(move |(index, level)| {
+        let at = place(index);
+        (0..3).filter_map(move |axis| {
+            let next = (at[axis] + 1 < size[axis]).then(|| levels.data[index + steps[axis]])?;
+            let [here, there] = [*level, next].map(f64::from);
+            ((here < 0.0) != (there < 0.0)).then(|| {
+                let mut found = Vector3::from(at).map(|i| i as f64);
+                found[axis] += here / (here - there);
+                found
+            })
+        })
+    })
 }
 
 /// Lowest and highest indices of a box around what is inside; none where nothing is.

@@ -103,8 +103,19 @@ impl Labels {
 
     /// Numbers of voxels of the separate parts of the labels `wanted`, the largest first: voxels of one part share faces.
     pub fn parts(&self, wanted: &BTreeSet<u16>) -> Vec<usize> {
+        sorted(self.connected(&|label| wanted.contains(label)).into_iter().map(|part| part.voxels))
+    }
+
+    /// Numbers of voxels of the cavities in the labels `wanted`, the largest first: what they shut off from the edge of the image.
+    pub fn cavities(&self, wanted: &BTreeSet<u16>) -> Vec<usize> {
+        let others = self.connected(&|label| !wanted.contains(label));
+        sorted(others.into_iter().filter(|part| !part.reaches_edge).map(|part| part.voxels))
+    }
+
+    /// The parts of the labels that `is` tells, in the order of their first voxels: voxels of one part share faces.
+    fn connected(&self, is: &dyn Fn(&u16) -> bool) -> Vec<Connected> {
         let steps = [1, self.size[0], self.size[0] * self.size[1]];
-        let mut left: Vec<bool> = self.data.iter().map(|label| wanted.contains(label)).collect();
+        let mut left: Vec<bool> = self.data.iter().map(is).collect();
         let mut parts = Vec::new();
         let mut found = Vec::new();
         for first in 0..left.len() {
@@ -112,21 +123,36 @@ impl Labels {
                 continue;
             }
             found.push(first);
-            let mut voxels = 0;
+            let mut part = Connected::default();
             while let Some(place) = found.pop() {
-                voxels += 1;
+                part.voxels += 1;
                 for (axis, step) in steps.into_iter().enumerate() {
                     let along = place / step % self.size[axis];
                     let before = (along > 0).then(|| place - step);
                     let behind = (along + 1 < self.size[axis]).then(|| place + step);
+                    part.reaches_edge |= before.is_none() || behind.is_none();
                     found.extend(before.into_iter().chain(behind).filter(|next| std::mem::take(&mut left[*next])));
                 }
             }
-            parts.push(voxels);
+            parts.push(part);
         }
-        parts.sort_unstable_by(|a, b| b.cmp(a));
         parts
     }
+}
+
+/// Voxels that share faces.
+#[derive(Default)]
+struct Connected {
+    voxels: usize,
+    /// Whether one of them is an outermost one of the image.
+    reaches_edge: bool,
+}
+
+/// The largest first.
+fn sorted(voxels: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut voxels: Vec<usize> = voxels.collect();
+    voxels.sort_unstable_by(|a, b| b.cmp(a));
+    voxels
 }
 
 #[cfg(test)]

@@ -128,6 +128,10 @@ fn a_body_ends_at_the_border_of_the_image() {
     }
     let (low, high) = body.bounds().unwrap();
     assert!(low.x <= -0.5 && low.x >= -2.1 && high.y >= 9.5 && high.y < 11.1, "{low}, {high}");
+    // Half a voxel beyond the last middles, and no more.
+    let extent = body.extent().unwrap();
+    let expected = (Point::<3>::repeat(-0.5), Point::<3>::new(11.5, 9.5, 7.5));
+    assert!((extent.0 - expected.0).amax() < 0.04 && (extent.1 - expected.1).amax() < 0.04, "{extent:?}");
     let points: Vec<Point<3>> = vec![low, high];
     assert_eq!(box_of(&points), Some((low, high)));
 }
@@ -208,4 +212,9 @@ fn parts_are_what_hangs_together_by_faces() {
     assert_eq!(labels.parts(&set(&[1, 2])), [voxels(2.5), voxels(1.5), 1, 1, 1]);
     assert_eq!(labels.parts(&set(&[2])), [1, 1, 1]);
     assert_eq!(labels.parts(&set(&[3])), [0; 0]);
+    // Voxels of label 2 in the corners of the image are beside what reaches its edge; one in the middle of a ball is shut off.
+    assert_eq!(labels.cavities(&set(&[1])), [0; 0]);
+    labels.data[4 + 16 * (4 + 9 * 4)] = 2;
+    labels.data[11 + 16 * (4 + 9 * 4)] = 0;
+    assert_eq!((labels.cavities(&set(&[1])), labels.cavities(&set(&[1, 2]))), (vec![1, 1], vec![1]));
 }

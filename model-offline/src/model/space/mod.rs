@@ -193,6 +193,23 @@ impl SpaceModel {
         [&self.held.needle].into_iter().chain(&self.held.paddles).map(Vec::len).collect()
     }
 
+    /// The largest part by which elements have more or less of an inclusion than there is of it, beyond what is not known of that: on a
+    /// coarse mesh faces cut its edges and corners off.
+    pub(crate) fn misses_of_inclusions(&self) -> f64 {
+        let mut found = vec![0.0; self.scene.inclusions.len() + 1];
+        let (rule, shares) = (self.spatial.rule(), self.spatial.shares());
+        for point in (0..rule.len()).map(|q| rule.point(q)) {
+            for (part, share) in &shares[point.cell as usize] {
+                found[*part as usize] += share * point.weight;
+            }
+        }
+        let misses = found[1..].iter().enumerate().filter_map(|(place, found)| {
+            let volume = seen::sampled_volume(&self.scene, place)?;
+            Some((found / volume - 1.0).abs() - seen::SAMPLING_ERROR)
+        });
+        misses.fold(0.0, f64::max)
+    }
+
     /// Those of the scene's pairs whose patches have a piece of the surface in common, where two paddles cannot both be.
     pub fn overlapping(&self) -> &[[usize; 2]] {
         &self.overlapping

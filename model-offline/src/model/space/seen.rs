@@ -20,6 +20,8 @@ const SEEN: f64 = 0.5;
 const STEPS: i32 = 24;
 /// A volume is known from so many of them.
 const FEWEST: usize = 500;
+/// How far off such a volume may be, as a part of it.
+pub(super) const SAMPLING_ERROR: f64 = 0.03;
 /// The surface of a mesh is nowhere farther from the body's than this part of the edges there: with eight edges around
 /// a bore it is at 0.1 of them.
 const SAG: f64 = 0.1;

@@ -5,9 +5,11 @@ use super::seen::{BodySurface, outside, sampled_volume};
 use super::{loose_part, overlapping, patches_of, touching};
 use crate::discretization::TetMesh;
 use crate::discretization::meshing::mesh::Element;
+use crate::geometry::implicit::distance_from;
 use crate::geometry::{Implicit, Point, box_of};
 use crate::model::error::ModelError;
 use crate::scene::SceneWarning;
+use crate::scene::millimetres;
 use crate::scene::space::SpaceScene;
 use crate::scene::warning::{self, ALONG};
 use serde::Serialize;
@@ -17,6 +19,8 @@ use std::collections::BTreeMap;
 const NAMED: usize = 5;
 /// Points of the body's surface are so far apart, over the size of the body.
 const SAMPLED: f64 = 0.05;
+/// From so many of the mesh's nearest triangles the surface is followed to where it is nearest to the target.
+const STARTS: usize = 12;
 /// The needle's way is followed in so many steps over the size of the body.
 const STEPS: i32 = 1000;
 
@@ -93,7 +97,7 @@ pub struct TargetSurvey {
     pub along_needle: f64,
     /// Its distance from the needle's line.
     pub off_needle: f64,
-    /// Its distance from the surface, about.
+    /// Its distance from the surface; about that of what a segmentation gives.
     pub from_boundary: f64,
 }
 
@@ -146,7 +150,7 @@ const LOOSE: f64 = 0.05;
 /// Lowest and highest coordinates: the body's own bounds, where the mesh is about as large.
 fn extent(scene: &SpaceScene, mesh: &TetMesh) -> (Point<3>, Point<3>) {
     let (low, high) = box_of(&mesh.nodes).unwrap_or_default();
-    let Some(bounds) = scene.body.bounds() else { return (low, high) };
+    let Some(bounds) = scene.body.extent() else { return (low, high) };
     let near = LOOSE * (high - low).max();
     let nearer = |own: f64, found: f64| if (own - found).abs() <= near { own } else { found };
     (bounds.0.zip_map(&low, nearer), bounds.1.zip_map(&high, nearer))
@@ -188,7 +192,7 @@ impl Survey {
             volume: volumes.iter().sum(),
             surface: PatchSurvey::of(mesh, surface.triangles()).area,
             immobile: measured[0].clone(),
-            target: TargetSurvey::of(scene, &Point::from(needle.contact.middle)),
+            target: TargetSurvey::of(scene, &Point::from(needle.contact.middle), mesh),
             needle,
             inclusions: inclusions.collect(),
             paddles: paddles.map(|(p, patch)| PaddleSurvey { index: p.index, patch: patch.clone() }).collect(),
@@ -210,7 +214,8 @@ impl Survey {
         let inwards = -axis.dot(&Point::from(needle.contact.normal).try_normalize(0.0).unwrap_or_default());
         let degrees = inwards.clamp(-1.0, 1.0).acos().to_degrees();
         let to_surface = (90.0 - degrees).abs();
-        let mut found = Vec::new();
+        let mut found: Vec<SceneWarning> =
+            another_unit(scene).map(|of_file| SceneWarning::BodyInOtherUnit { of_file }).into_iter().collect();
         if to_surface < ALONG {
             found.push(SceneWarning::NeedleAlongSurface { degrees: to_surface });
         } else if degrees > 90.0 {
@@ -223,6 +228,11 @@ impl Survey {
         }
         found
     }
+}
+
+/// The unit of length of the body's file, where the scene's is another one that is known.
+fn another_unit(scene: &SpaceScene) -> Option<&'static str> {
+    scene.unit_of_body.filter(|_| millimetres(&scene.length_unit).is_some())
 }
 
 /// Parts of the body, and which of some patches are not on the target's.
@@ -281,16 +291,31 @@ impl PatchSurvey {
 }
 
 impl TargetSurvey {
-    fn of(scene: &SpaceScene, entry: &Point<3>) -> Self {
+    fn of(scene: &SpaceScene, entry: &Point<3>, mesh: &TetMesh) -> Self {
         let way = scene.target - entry;
         let along = way.dot(&scene.needle.axis);
         Self {
             position: scene.target.into(),
             along_needle: along,
             off_needle: (way - scene.needle.axis * along).norm(),
-            from_boundary: -scene.body.level(&scene.target),
+            from_boundary: from_surface(scene, mesh),
         }
     }
+}
+
+/// Distance of the target from the surface. Levels of files are distances, those of solids are at their surfaces alone.
+fn from_surface(scene: &SpaceScene, mesh: &TetMesh) -> f64 {
+    let (body, target) = (scene.body.as_ref(), &scene.target);
+    let level = -body.level(target);
+    if body.is_measured() {
+        return level;
+    }
+    let middles =
+        mesh.boundary().into_iter().map(|t| t.iter().map(|n| mesh.nodes[*n as usize]).sum::<Point<3>>() / 3.0);
+    let mut near: Vec<(f64, Point<3>)> = middles.map(|x| ((x - target).norm(), x)).collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let found = distance_from(body, target, near.into_iter().take(STARTS).map(|(_, x)| x));
+    if found.is_finite() { found } else { level }
 }
 
 impl MeshSurvey {

@@ -3,10 +3,11 @@
 //! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
 //! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)); their own error is estimated by a coarser mesh. From a mesh to
 //! the one with half the size at the rims it falls by at least a half, so that the difference of the two is no less than what
-//! is left; it is taken times [`SAFETY`].
+//! is left; it is taken times [`SAFETY`]. Faces that cut edges and corners off an inclusion do so on both meshes, and may leave less of
+//! it on the finer one: what the inclusion does at all, times the part of it that is missed, is open as well.
 
 use super::discretised::{Discretised, SpaceErrorEstimate, answering, at_level};
-use super::rest::SpaceResponse;
+use super::rest::{SpaceResponse, rest_responses};
 use crate::discretization::{Integration, Method};
 use crate::model::space::SpaceModel;
 use crate::model::space::meshing::{MeshSize, mesh};
@@ -111,6 +112,31 @@ fn coarser_on_all<'a, T>(meshes: &'a [(Vec<usize>, T)], now: &[usize]) -> Option
     meshes.iter().rfind(|(on_patches, _)| is_coarser(on_patches)).map(|(_, answers)| answers)
 }
 
+/// What is left open by the part of the inclusions that a mesh misses, in the order of [`Reference`].
+struct Missed {
+    errors: Vec<f64>,
+    full: Vec<f64>,
+    per_depth: Vec<f64>,
+}
+
+impl Missed {
+    /// What the inclusions do on a mesh, as the answers without them say, times the part that is missed.
+    fn on(model: &SpaceModel, rest: &[SpaceResponse]) -> Result<Self, ModelError> {
+        let part = model.misses_of_inclusions();
+        if part == 0.0 {
+            let nothing = || vec![0.0; rest.len()];
+            return Ok(Self { errors: nothing(), full: nothing(), per_depth: nothing() });
+        }
+        let without = rest_responses(&model.without_inclusions())?;
+        let of = |does: Vec<f64>| does.into_iter().map(|does| SAFETY * part * does).collect();
+        Ok(Self {
+            errors: of(distances(&without, rest)),
+            full: of(distances_of(|controls| controls.full, &without, rest)),
+            per_depth: of(apart_per_depth(model.scene().needle.axis, &without, rest)),
+        })
+    }
+}
+
 /// Quadratic tetrahedra on finer and finer meshes.
 struct Ladder {
     scene: SpaceScene,
@@ -183,9 +209,11 @@ impl Ladder {
         let on_patches = model.nodes_on_patches();
         if let Some(coarser) = coarser_on_all(&self.coarser, &on_patches) {
             let apart = distances(coarser, &rest);
-            let errors = estimates(&apart);
-            let full = estimates(&distances_of(|controls| controls.full, coarser, &rest));
-            let per_depth = estimates(&apart_per_depth(self.scene.needle.axis, coarser, &rest));
+            let missed = Missed::on(&model, &rest)?;
+            let errors = sums(&estimates(&apart), &missed.errors);
+            let full = sums(&estimates(&distances_of(|controls| controls.full, coarser, &rest)), &missed.full);
+            let per_depth =
+                sums(&estimates(&apart_per_depth(self.scene.needle.axis, coarser, &rest)), &missed.per_depth);
             let decided_by = decided_by(&self.scene, &errors, &apart);
             let nodes = model.nodes();
             self.finest = Some(Reference { nodes, rest: rest.clone(), errors, full, per_depth, decided_by, level });
@@ -423,6 +451,42 @@ mod tests {
         assert_eq!(coarser_on_all(&meshes, &[1000, 129]), Some(&"second"));
         assert_eq!(coarser_on_all(&meshes, &[1000, 130]), Some(&"third"));
         assert_eq!(coarser_on_all::<&str>(&[], &[1]), None);
+    }
+
+    /// A ball in elements a little shorter than itself has lost much of its volume, and a box none. What the ball does at all, times
+    /// that part, is open.
+    #[test]
+    fn what_a_mesh_misses_of_an_inclusion_is_left_open() {
+        let block = include_str!("../../../scenes/block.toml");
+        let shape = "box = { min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4] }";
+        assert!(block.contains(shape));
+        let missed = |shape_of: &str| {
+            let text = block.replacen(shape, shape_of, 1).replacen("of = \"all\"", "of = [[3, 6]]", 1);
+            let crate::scene::space::AnyScene::Space(scene) =
+                crate::scene::space::AnyScene::parse(&text, "block.toml").unwrap()
+            else {
+                panic!("planar")
+            };
+            let scene = scene.with_method(Method::new(Integration::FemT10));
+            let (model, rest) = at_level(&scene, -1).unwrap();
+            (model.misses_of_inclusions(), Missed::on(&model, &rest).unwrap(), model, rest)
+        };
+        let (part, none, _, rest) = missed(shape);
+        assert_eq!(part, 0.0);
+        assert!([&none.errors, &none.full].iter().all(|errors| **errors == vec![0.0; rest.len()]));
+        let (part, found, model, rest) = missed("sphere = { centre = [0.65, 0.5, 0.35], radius = 0.09 }");
+        assert!(part > 0.1 && part < 0.6, "{part}");
+        let without = rest_responses(&model.without_inclusions()).unwrap();
+        let per_depth = apart_per_depth(scene_axis(&model), &without, &rest);
+        assert!(
+            found.errors.iter().zip(distances(&without, &rest)).all(|(error, does)| *error == SAFETY * part * does)
+        );
+        assert!(found.per_depth.iter().zip(per_depth).all(|(error, does)| *error == SAFETY * part * does));
+        assert!(worst(&found.errors) > 1e-3 && found.full.len() == found.errors.len(), "{:?}", found.errors);
+    }
+
+    fn scene_axis(model: &SpaceModel) -> Vector3<f64> {
+        model.scene().needle.axis
     }
 
     fn unit() -> crate::placement::space::Controllability {

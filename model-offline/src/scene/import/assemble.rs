@@ -99,6 +99,18 @@ fn body(shapes: &[Shape], summary: &Summary) -> Result<usize, ImportError> {
     })
 }
 
+/// Why a shape that is named as the body is not the body.
+fn no_body(along: &Along<'_>, shape: &Shape) -> String {
+    let is_within = |p: &Point2| along.outline.locate(*p, DETAIL * along.size) != Location::Outside;
+    match () {
+        () if !shape.closed => "the body is a closed shape, and this is a line".to_owned(),
+        () if shape.points.iter().all(is_within) => {
+            "the body is a larger shape; holes in it have no place in a scene".to_owned()
+        }
+        () => "the body is another, larger shape, and a scene has one".to_owned(),
+    }
+}
+
 /// How the file's coordinates become the scene's.
 struct Frame {
     origin: Point2,
@@ -181,8 +193,11 @@ impl Sorter<'_> {
         let (numbered, others): (Vec<Shape>, Vec<Shape>) =
             shapes.into_iter().partition(|shape| matches!(shape.role, Some(Role::Paddle(Some(_)))));
         for shape in numbered.iter().chain(&others) {
+            if let Some(meant) = shape.meant {
+                self.imported.summary.note(format!("{}: did you mean `{meant}` in its name?", shape.told));
+            }
             let left = match shape.role {
-                Some(Role::Body) => Err("the body is a larger shape; holes in it have no place in a scene".to_owned()),
+                Some(Role::Body) => Err(no_body(along, shape)),
                 Some(Role::Inclusion) => self.inclusion(along, shape),
                 None => self.unnamed(along, shape),
                 Some(Role::Needle) => self.needle(along, shape),
@@ -257,7 +272,7 @@ impl Sorter<'_> {
 
     fn needle(&mut self, along: &Along<'_>, shape: &Shape) -> Result<(), String> {
         if self.imported.needle.is_some() {
-            return Err("there is a needle already, and a scene has one".to_owned());
+            return Err("there is a needle already, by its line or by its contact, and a scene has one".to_owned());
         }
         let (mut needle, note) = parts::needle(along, shape)?;
         self.on_outline(along, &mut needle.contact);
@@ -279,7 +294,9 @@ impl Sorter<'_> {
     fn paddle(&mut self, along: &Along<'_>, shape: &Shape, index: Option<u32>) -> Result<(), String> {
         let used: BTreeSet<u32> = self.imported.paddles.iter().map(|paddle| paddle.0).collect();
         let index = match index {
-            Some(index) if used.contains(&index) => return Err(format!("there is a paddle {index} already")),
+            Some(index) if used.contains(&index) => {
+                return Err(format!("there is a paddle {index} already, and one is one straight piece"));
+            }
             Some(index) => index,
             None => (1..).find(|index| !used.contains(index)).unwrap_or(u32::MAX),
         };

@@ -1,7 +1,9 @@
 //! What a name in a drawing or a mesh says: the role of a shape, and the material that it is made of.
 
 use crate::material::Preset;
+use crate::scene::error::nearest;
 use std::fmt;
+use strum::VariantArray as _;
 
 /// What a shape is in the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +44,33 @@ impl fmt::Display for Role {
 pub(super) struct Meaning {
     pub(super) role: Option<Role>,
     pub(super) preset: Option<Preset>,
+    /// What else it may have been meant to say: a role or a material whose name is nearly that.
+    pub(super) meant: Option<&'static str>,
 }
+
+/// First words that say a role.
+const WORDS: [(&str, Role); 20] = [
+    ("body", Role::Body),
+    ("outline", Role::Body),
+    ("domain", Role::Body),
+    ("inclusion", Role::Inclusion),
+    ("inclusions", Role::Inclusion),
+    ("tumour", Role::Inclusion),
+    ("tumours", Role::Inclusion),
+    ("tumor", Role::Inclusion),
+    ("tumors", Role::Inclusion),
+    ("lesion", Role::Inclusion),
+    ("lesions", Role::Inclusion),
+    ("needle", Role::Needle),
+    ("needles", Role::Needle),
+    ("target", Role::Target),
+    ("targets", Role::Target),
+    ("paddle", Role::Paddle(None)),
+    ("paddles", Role::Paddle(None)),
+    ("fixed", Role::Fixed),
+    ("immobile", Role::Fixed),
+    ("bone", Role::Fixed),
+];
 
 /// What a name says: its first word is a role (`inclusion-hard`, `Paddle 1`, `fixed_left`), the rest or all of it may
 /// be the name of a material (`body-breast-fat`, `liver`). Capitals do not matter; words are parted by `-`, `_` and
@@ -54,14 +82,24 @@ pub(super) fn meaning(name: &str) -> Meaning {
     let Some((first, rest)) = words.split_first() else {
         return Meaning::default();
     };
+    let material = |words: &[&str]| nearest(&words.join("-"), Preset::VARIANTS.iter().map(|preset| preset.name()));
     match word(first) {
-        None => Meaning { role: None, preset: preset(&words) },
+        None => {
+            let preset = preset(&words);
+            let roles = WORDS.iter().map(|(word, _)| *word);
+            let role = || nearest(first.trim_end_matches(|c: char| c.is_ascii_digit()), roles);
+            let meant = if preset.is_none() { role().or_else(|| material(&words)) } else { None };
+            Meaning { role: None, preset, meant }
+        }
         Some(Role::Paddle(_)) => {
             let digits = first.trim_start_matches(|c: char| !c.is_ascii_digit());
             let number = if digits.is_empty() { rest.first().copied().unwrap_or("") } else { digits };
-            Meaning { role: Some(Role::Paddle(number.parse().ok())), preset: None }
+            Meaning { role: Some(Role::Paddle(number.parse().ok())), ..Meaning::default() }
         }
-        Some(role) => Meaning { role: Some(role), preset: preset(rest) },
+        Some(role) => {
+            let preset = preset(rest);
+            Meaning { role: Some(role), preset, meant: if preset.is_none() { material(rest) } else { None } }
+        }
     }
 }
 
@@ -72,17 +110,8 @@ pub(super) fn has_role_later(name: &str) -> bool {
 }
 
 fn word(word: &str) -> Option<Role> {
-    match word.trim_end_matches(|c: char| c.is_ascii_digit()) {
-        "body" | "outline" | "domain" => Some(Role::Body),
-        "inclusion" | "inclusions" | "tumour" | "tumours" | "tumor" | "tumors" | "lesion" | "lesions" => {
-            Some(Role::Inclusion)
-        }
-        "needle" => Some(Role::Needle),
-        "target" => Some(Role::Target),
-        "paddle" | "paddles" => Some(Role::Paddle(None)),
-        "fixed" | "immobile" | "bone" => Some(Role::Fixed),
-        _ => None,
-    }
+    let word = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    WORDS.iter().find_map(|(known, role)| (*known == word).then_some(*role))
 }
 
 #[cfg(test)]
@@ -113,9 +142,34 @@ mod tests {
             ("nobody", None, None),
             ("left paddle", None, None),
             ("-", None, None),
+            ("Targets", Some(Role::Target), None),
+            ("needles", Some(Role::Needle), None),
         ] {
-            assert_eq!(meaning(name), Meaning { role, preset }, "{name}");
+            let found = meaning(name);
+            assert_eq!((found.role, found.preset), (role, preset), "{name}");
+            // Whoever says a role means it.
+            assert!(found.meant.is_none() || role.is_none() && preset.is_none(), "{name}: {found:?}");
         }
         assert!(has_role_later("left paddle") && !has_role_later("paddle-left") && !has_role_later("left side"));
+    }
+
+    #[test]
+    fn what_is_nearly_a_role_or_a_material_may_have_been_meant() {
+        for (name, meant) in [
+            ("fixd", Some("fixed")),
+            ("Traget-2", Some("target")),
+            ("needel", Some("needle")),
+            ("paddel3", Some("paddle")),
+            ("inclusion-breast-glnd", Some("breast-gland")),
+            ("tumour-livr", Some("liver")),
+            ("Skin_Rabit", Some("skin-rabbit")),
+            // What is no word of ours at all, or right.
+            ("inclusion-hard", None),
+            ("body-2", None),
+            ("left side", None),
+            ("breast-gland", None),
+        ] {
+            assert_eq!(meaning(name).meant, meant, "{name}");
+        }
     }
 }

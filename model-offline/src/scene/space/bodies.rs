@@ -19,6 +19,8 @@ type Body = Arc<dyn Implicit>;
 /// Standard deviation of the Gaussian that smooths labels, in voxels: it takes the stairs away and leaves what is two
 /// voxels thick.
 const SMOOTHING: f64 = 0.7;
+/// The unit of length of segmentations.
+const MM: &str = "mm";
 /// A body in millimetres is hardly smaller or larger than this.
 const USUAL_MM: Range<f64> = 2.0..3000.0;
 /// Labels of a segmentation that are told of at most.
@@ -33,6 +35,8 @@ pub(super) struct Bodies<'a> {
     segmentation: Option<Segmentation>,
     mesh: Option<MeshBody>,
     pub(super) notes: Vec<String>,
+    /// The unit of length of the body's file, where it is another one than the scene's.
+    pub(super) unit_of_body: Option<&'static str>,
     /// All files that were read.
     pub(super) files: Vec<PathBuf>,
 }
@@ -40,6 +44,7 @@ pub(super) struct Bodies<'a> {
 /// The labels of the domain, and which of them are the body.
 #[derive(Debug)]
 struct Segmentation {
+    file: String,
     labels: Labels,
     body: BTreeSet<u16>,
 }
@@ -47,7 +52,16 @@ struct Segmentation {
 impl<'a> Bodies<'a> {
     /// For files relative to `folder`, in a scene whose unit of length is `unit`.
     pub(super) fn new(source: Source<'a>, folder: &'a Path, unit: &'a str) -> Self {
-        Self { source, folder, unit, segmentation: None, mesh: None, notes: Vec::new(), files: Vec::new() }
+        let (notes, files) = (Vec::new(), Vec::new());
+        Self { source, folder, unit, segmentation: None, mesh: None, notes, unit_of_body: None, files }
+    }
+
+    /// The same error with what there is to say of the files, which may explain it.
+    pub(super) fn explained(&self, mut error: SceneError) -> SceneError {
+        if !self.notes.is_empty() {
+            error.help = format!("{} ({})", error.help, self.notes.join("; "));
+        }
+        error
     }
 
     /// The scene's body.
@@ -158,8 +172,11 @@ impl<'a> Bodies<'a> {
             let told = format!("label {}{name}: {} voxels, {:.0} mm³", count.label, count.voxels, count.volume);
             self.note(file.get(), [told]);
         }
-        if self.unit != "mm" {
-            self.note(file.get(), [format!("coordinates are in mm, and the scene's unit of length is {}", self.unit)]);
+        if self.unit != MM {
+            self.unit_of_body = Some(MM);
+            let told =
+                format!("coordinates are in mm and taken as they are; the scene's unit of length is {}", self.unit);
+            self.note(file.get(), [told]);
         }
         let wanted = match body.get() {
             LabelSet::One(label) => BTreeSet::from([*label]),
@@ -172,26 +189,24 @@ impl<'a> Bodies<'a> {
             let told = "the body reaches the edge of the image, where it is cut off flat".to_owned();
             self.note(file.get(), [told]);
         }
-        if let [largest, others @ ..] = read.value.parts(&wanted).as_slice()
-            && !others.is_empty()
-        {
-            let (count, voxels) = (others.len(), others.iter().sum::<usize>());
-            let told = format!(
-                "the body has {count} separate parts beside the largest of {largest} voxels, {voxels} voxels together; what is \
-                 smaller than elements is lost, the rest has to be held: take specks out of the segmentation"
-            );
-            self.note(file.get(), [told]);
-        }
-        self.segmentation = Some(Segmentation { labels: read.value, body: wanted });
+        self.note(file.get(), in_pieces("the body", &read.value.parts(&wanted)));
+        let cavities = read.value.cavities(&wanted);
+        let told = format!(
+            "the body has {} of {} that nothing reaches from outside; what is smaller than elements is lost",
+            many(cavities.len(), "cavity", "cavities"),
+            many(cavities.iter().sum(), "voxel", "voxels")
+        );
+        self.note(file.get(), (!cavities.is_empty()).then_some(told));
+        self.segmentation = Some(Segmentation { file: file.get().clone(), labels: read.value, body: wanted });
         Ok(region)
     }
 
     /// The region of one label of the domain's segmentation, or of one group of its mesh.
-    fn label(&self, label: u16, span: Range<usize>) -> Checked<Body> {
+    fn label(&mut self, label: u16, span: Range<usize>) -> Checked<Body> {
         if let Some(mesh) = &self.mesh {
             return self.part(mesh, Wanted::Label(label.into()), span);
         }
-        let Some(Segmentation { labels, body }) = &self.segmentation else {
+        let Some(Segmentation { file, labels, body }) = &self.segmentation else {
             return Err(self.source.error(
                 span,
                 format!("label {label} is of no segmentation: the domain has none, nor a mesh"),
@@ -206,18 +221,22 @@ impl<'a> Bodies<'a> {
                 format!("name all labels that belong to the body: body = [{}]", all.join(", ")),
             ));
         }
-        self.region_of(labels, &BTreeSet::from([label]), span)
+        let wanted = BTreeSet::from([label]);
+        let region = self.region_of(labels, &wanted, span)?;
+        let (file, pieces) = (file.clone(), in_pieces(&format!("label {label}"), &labels.parts(&wanted)));
+        self.note(&file, pieces);
+        Ok(region)
     }
 
     /// The region of a group of the domain's mesh, or of a label of its segmentation, by its name.
-    fn named_part(&self, name: &Located<String>) -> Checked<Body> {
+    fn named_part(&mut self, name: &Located<String>) -> Checked<Body> {
         if let Some(mesh) = &self.mesh {
             return self.part(mesh, Wanted::Name(name.get()), name.span());
         }
         let names = self.segmentation.as_ref().map(|segmentation| &segmentation.labels.names);
         let label = names.and_then(|names| names.iter().find(|(_, known)| *known == name.get()));
-        if let Some((label, _)) = label {
-            return self.label(*label, name.span());
+        if let Some(label) = label.map(|(label, _)| *label) {
+            return self.label(label, name.span());
         }
         let help = match names.filter(|names| !names.is_empty()) {
             None => "describe the body by [domain] mesh, or the inclusion by another shape".to_owned(),
@@ -264,6 +283,23 @@ impl<'a> Bodies<'a> {
     fn note(&mut self, file: &str, notes: impl IntoIterator<Item = String>) {
         self.notes.extend(notes.into_iter().map(|note| format!("{file}: {note}")));
     }
+}
+
+/// What to say of a region of labels in several parts, of which the numbers of voxels are given, the largest first.
+fn in_pieces(what: &str, parts: &[usize]) -> Option<String> {
+    let [largest, others @ ..] = parts else { return None };
+    (!others.is_empty()).then(|| {
+        format!(
+            "{what} has {} beside the largest of {largest} voxels, {} together; what is smaller than elements is lost, the rest \
+             has to be meant (and held, of a body): take specks out of the segmentation",
+            many(others.len(), "separate part", "separate parts"),
+            many(others.iter().sum(), "voxel", "voxels"),
+        )
+    })
+}
+
+fn many(count: usize, one: &str, several: &str) -> String {
+    format!("{count} {}", if count == 1 { one } else { several })
 }
 
 /// What to ask about a body of this size.

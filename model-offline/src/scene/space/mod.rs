@@ -102,6 +102,8 @@ pub struct SpaceScene {
     /// Whether that method is asked for by name. Otherwise it is the default, and placement may take another
     /// ([`for_placement`](Self::for_placement)).
     pub names_method: bool,
+    /// The unit of length of the file that the body is of, where the file says it and it is another one than the scene's.
+    pub unit_of_body: Option<&'static str>,
     /// SHA-256 over what the scene's text says and its files hold.
     pub(super) content: [u8; 32],
     /// What was changed or assumed in files that the scene names, a sentence each.

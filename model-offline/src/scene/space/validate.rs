@@ -8,7 +8,7 @@ use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::geometry::implicit::share;
 use crate::geometry::{Implicit, Point, Solid};
 use crate::material::{Law, MaterialSection};
-use crate::number::length;
+use crate::number::{length, short};
 use crate::scene::Actuator;
 use crate::scene::error::{SceneError, Source};
 use crate::scene::exactly::{Coordinates, Exactly};
@@ -66,7 +66,7 @@ impl Validator<'_> {
             )
         })?;
         let size = self.size(low, high)?;
-        let target = self.target(body.as_ref())?;
+        let target = self.target(body.as_ref()).map_err(|error| bodies.explained(error))?;
         let onto = |region: Solid| region.onto(body.as_ref(), DIGITS * size);
         let mut needle = self.needle(size)?;
         needle.region = onto(needle.region);
@@ -92,6 +92,7 @@ impl Validator<'_> {
             actuator: self.actuator(&needle)?,
             discretization: self.discretization(&file.discretization, high - low)?,
             names_method: file.discretization.get().names_method(),
+            unit_of_body: bodies.unit_of_body,
             needle,
             paddles,
             body,
@@ -220,7 +221,11 @@ impl Validator<'_> {
         } else {
             format!("the target is outside the body, about {} from it", length(outside))
         };
-        Err(self.error(located.span(), told, "move the target into the body"))
+        let extent = body.extent().map_or_else(String::new, |(low, high)| {
+            let point = |p: Point<3>| format!("({}, {}, {})", short(p.x), short(p.y), short(p.z));
+            format!(", which reaches from {} to {}", point(low), point(high))
+        });
+        Err(self.error(located.span(), told, format!("move the target into the body{extent}")))
     }
 
     fn immobile(&self) -> Checked<Vec<Solid>> {
@@ -326,7 +331,7 @@ impl Validator<'_> {
             return Err(self.error(
                 located.span(),
                 "material: tissue that relaxes is computed in the plane alone",
-                "write [material.relaxation] g = [], tau = []: the elastic part of the preset is left, with its moduli of a fast deformation",
+                "write relaxation = { g = [], tau = [] } into this material: the elastic part of the preset is left, with its moduli of a fast deformation",
             ));
         }
         Ok(law)

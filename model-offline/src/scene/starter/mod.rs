@@ -6,7 +6,7 @@ mod sides;
 use self::layout::Layout;
 use super::Scene;
 use super::import::{ImportError, Imported, ImportedNeedle, Role};
-use super::sensor::millimetres;
+use super::millimetres;
 use crate::geometry::{Point2, Polygon};
 use crate::material::Preset;
 use crate::number::in_unit;

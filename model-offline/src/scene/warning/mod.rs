@@ -11,6 +11,11 @@ use std::fmt;
 /// order of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum SceneWarning {
+    /// The body's file is in another unit of length than the scene says it is, and numbers are taken as they are.
+    BodyInOtherUnit {
+        /// The file's unit.
+        of_file: &'static str,
+    },
     /// The needle goes away from the body at its entry.
     NeedlePointsOut {
         /// Angle between the axis and the inner normal of the boundary, degrees.
@@ -222,6 +227,7 @@ impl SceneWarning {
     pub fn message(&self, unit: &str) -> String {
         let long = |value: f64| in_unit(value, unit);
         match *self {
+            Self::BodyInOtherUnit { of_file } => in_other_unit(of_file, unit),
             Self::NeedlePointsOut { degrees } => {
                 format!("the needle points out of the body: {degrees:.0}° from straight in")
             }
@@ -299,6 +305,9 @@ impl SceneWarning {
     /// What to do.
     pub fn help(&self) -> &'static str {
         match self {
+            Self::BodyInOtherUnit { .. } => {
+                "give units.length as that of the file, with all other numbers of the scene in it"
+            }
             Self::NeedlePointsOut { .. } => "turn the axis round, or move the contact to the other side",
             Self::NeedleAlongSurface { .. } => "turn the axis inwards",
             Self::NeedleMissesTarget { .. } => "turn the axis, or move the contact; nothing to do where it is meant so",
@@ -341,6 +350,10 @@ impl SceneWarning {
     pub fn told(&self, unit: &str) -> String {
         format!("{}; {}", self.message(unit), self.help())
     }
+}
+
+fn in_other_unit(of_file: &str, unit: &str) -> String {
+    format!("the body's file is in {of_file} and taken as it is, and the scene says that lengths are in {unit}")
 }
 
 fn passes_beside([miss, depth, at]: [String; 3]) -> String {

@@ -154,12 +154,12 @@ impl Shapes<'_> {
         let all: Vec<Vec<u64>> = regions.iter().filter(|r| part(&r.1)).flat_map(|r| r.3.iter().cloned()).collect();
         let outer = self.loops(&boundary(&all))?;
         let (told, meaning) = match main {
-            Some(i) => (regions[i].0.clone(), Meaning { role: regions[i].1.role, preset: regions[i].1.preset }),
+            Some(i) => (regions[i].0.clone(), regions[i].1),
             None => ("all surfaces".to_owned(), Meaning::default()),
         };
         for (i, points) in outer.into_iter().enumerate() {
             if i == 0 {
-                let body = Meaning { role: Some(Role::Body), preset: meaning.preset };
+                let body = Meaning { role: Some(Role::Body), ..meaning };
                 self.shapes.push(Shape::new(told.clone(), body, points, true));
             } else {
                 self.summary.leave(

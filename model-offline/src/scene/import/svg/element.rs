@@ -103,7 +103,14 @@ impl Attributes<'_, '_> {
                 let r = self.positive("r", Side::Diagonal)?;
                 self.ellipse(r, r)
             }
-            "ellipse" => self.ellipse(self.positive("rx", Side::Width)?, self.positive("ry", Side::Height)?),
+            // A radius that is not given is the other one.
+            "ellipse" => {
+                match ["rx", "ry"].map(|radius| self.node.attribute(radius).is_some_and(|text| text.trim() != "auto")) {
+                    [true, false] => self.positive("rx", Side::Width).and_then(|r| self.ellipse(r, r)),
+                    [false, true] => self.positive("ry", Side::Height).and_then(|r| self.ellipse(r, r)),
+                    _ => self.ellipse(self.positive("rx", Side::Width)?, self.positive("ry", Side::Height)?),
+                }
+            }
             "line" => {
                 let mut path = BezPath::new();
                 path.move_to((self.or_zero("x1", Side::Width)?, self.or_zero("y1", Side::Height)?));

@@ -11,7 +11,7 @@ use super::shape::Shape;
 use super::{ImportError, ImportOptions, Imported, Summary};
 use element::{NotDrawn, Viewport};
 use kurbo::Affine;
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Node, ParsingOptions};
 use std::collections::BTreeMap;
 use std::str::FromStr as _;
 
@@ -26,7 +26,9 @@ const NO_SHAPES: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "p
 /// # Errors
 /// [`ImportError`].
 pub fn read(text: &str, options: &ImportOptions<'_>) -> Result<Imported, ImportError> {
-    let document = Document::parse(text)
+    // Drawings begin with a DOCTYPE as often as not. Nothing it names is fetched, and entities that grow are refused.
+    let options_of_xml = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
+    let document = Document::parse_with_options(text, options_of_xml)
         .map_err(|error| ImportError::Syntax { line: error.pos().row as usize, what: error.to_string() })?;
     let root = document.root_element();
     if root.tag_name().name() != "svg" {
@@ -90,7 +92,7 @@ impl<'a, 'input> Reader<'a, 'input> {
         let named = own.iter().copied().find(|name| name.role.is_some());
         context.role = match named {
             Some(named) => named,
-            None => Meaning { role: context.role.role, preset: context.role.preset },
+            None => Meaning { meant: own.iter().find_map(|name| name.meant).or(context.role.meant), ..context.role },
         };
         if let Some(visibility) = property(node, "visibility") {
             context.is_visible = !matches!(visibility, "hidden" | "collapse");
@@ -108,8 +110,15 @@ impl<'a, 'input> Reader<'a, 'input> {
             }
             return Ok(context);
         }
+        let moved = property(node, "transform").is_some();
         let why = match name {
             _ if unseen.is_some() => unseen,
+            _ if styled(node, "transform").is_some() => {
+                Some("its style transforms it; make that a transform attribute")
+            }
+            _ if moved && property(node, "transform-origin").is_some() => {
+                Some("it is transformed about a transform-origin; write that into the transform")
+            }
             "svg" => Some("a drawing within the drawing is not read; ungroup it"),
             "switch" => Some("alternatives are not read; keep one of them, without <switch>"),
             _ if NO_SHAPES.contains(&name) => Some("what is in it is not drawn by itself"),
@@ -142,8 +151,8 @@ impl<'a, 'input> Reader<'a, 'input> {
             "style" => {
                 let rules = node.text().unwrap_or("");
                 let mut words = rules.split(|c: char| !c.is_ascii_alphanumeric() && c != '-');
-                let hides = words.any(|word| ["display", "visibility", "opacity"].contains(&word));
-                hides.then_some("style sheets are not read: what they hide is taken; hide it by its own style")
+                let hides = words.any(|word| ["display", "visibility", "opacity", "transform"].contains(&word));
+                hides.then_some("style sheets are not read: what they hide or transform is taken as if they did not; use attributes")
             }
             _ => None,
         };
@@ -212,13 +221,17 @@ fn names<'a>(node: Node<'a, '_>) -> [&'a str; 2] {
 
 /// A property, from the style or an attribute of its name.
 fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
+    styled(node, name).or(node.attribute(name).map(str::trim))
+}
+
+/// The same from the style alone.
+fn styled<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     let rules = node.attribute("style").unwrap_or("").split(';');
     // The last one counts.
-    let styled = rules.rev().find_map(|rule| {
+    rules.rev().find_map(|rule| {
         let (key, value) = rule.split_once(':')?;
         (key.trim() == name).then(|| value.trim().trim_end_matches("!important").trim())
-    });
-    styled.or(node.attribute(name).map(str::trim))
+    })
 }
 
 /// Why an element and all that is within it cannot be seen.

@@ -3,7 +3,7 @@
 use super::super::{ImportError, ImportOptions, Summary};
 use super::element::Viewport;
 use crate::number::short;
-use crate::scene::sensor::millimetres;
+use crate::scene::millimetres;
 use roxmltree::Node;
 
 /// Sides that differ by less than this part are one scale: drawings are rounded.
@@ -69,8 +69,12 @@ pub(super) fn of_root(
     let mm = match (view, width, height) {
         (_, None, None) => {
             if options.size.is_none() {
-                summary
-                    .note("scale: the drawing has no width or height with a unit, its numbers are taken as they are");
+                let given = ["width", "height"].map(told).into_iter().filter(|side| !side.is_empty());
+                let given = given.collect::<Vec<_>>().join(" × ");
+                let has = if given.is_empty() { String::new() } else { format!(" ({given})") };
+                summary.note(format!(
+                    "scale: the drawing has no width or height in mm, cm, in, pt, pc, Q or px{has}, its numbers are taken as they are"
+                ));
             }
             return Ok((viewport, None));
         }

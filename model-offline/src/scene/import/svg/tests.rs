@@ -229,6 +229,9 @@ fn hidden_and_undrawn_shapes_are_left_out_and_say_so() {
         ("<image/>".into(), "image"),
         ("<style>.a { display: none }</style>".into(), "style sheets"),
         ("<style>.a { opacity: 0 }</style>".into(), "style sheets"),
+        ("<style>.a { transform: scale(2) }</style>".into(), "style sheets"),
+        (format!("<g style='transform:translate(5px,0px)'>{circle}</g>"), "its style transforms it"),
+        (format!("<g transform='scale(.5)' transform-origin='20 20'>{circle}{circle}</g>"), "transform-origin; write"),
     ] {
         let said = left(&with_body(&shape));
         assert!(said.contains(why), "{shape}: {said}");
@@ -267,7 +270,10 @@ fn every_shape_that_is_left_out_says_why() {
         ("<polygon points=''/>", "no points"),
         ("<polygon points='0,0 1e300,0 5,5' transform='scale(1e300)'/>", "too large"),
         ("<path d='M0 0 A 1e60 1e60 0 0 1 1e60 1e60 Z'/>", "digits"),
-        ("<rect id='body-2' x='3' y='3' width='9' height='9'/>", "the body is a larger shape"),
+        ("<rect id='body-2' x='3' y='3' width='9' height='9'/>", "the body is a larger shape; holes"),
+        ("<rect id='body-2' x='130' y='3' width='9' height='9'/>", "the body is another, larger shape"),
+        ("<line id='body-2' x1='3' y1='3' x2='9' y2='9'/>", "the body is a closed shape"),
+        ("<ellipse cx='30' cy='30' rx='0' ry='auto'/>", "rx is 0"),
         ("<circle id='target' cx='300' cy='30' r='5'/>", "outside the body"),
         ("<circle id='target' cx='100' cy='30' r='5'/>", "on the boundary"),
         ("<line id='needle' x1='300' y1='0' x2='300' y2='9'/>", "tip is not in the body"),
@@ -300,8 +306,49 @@ fn every_shape_that_is_left_out_says_why() {
         let said = left(&with_body(&format!("{first}{second}")));
         assert!(said.contains(why), "{second}: {said}");
     }
+    for (shape, meant) in [
+        ("<circle id='tumour-livr' cx='30' cy='30' r='5'/>", "`liver`"),
+        ("<g inkscape:label='fixd'><line x1='20' y1='60' x2='60' y2='60'/></g>", "`fixed`"),
+    ] {
+        let notes = drawn(&with_body(shape)).summary.notes;
+        let asks = |note: &String| note.contains("did you mean") && note.contains(meant);
+        assert!(notes.iter().any(asks), "{shape}: {notes:?}");
+    }
     let hint = drawn(&with_body("<circle id='left-tumour' cx='30' cy='30' r='5'/>"));
     assert!(hint.summary.notes.iter().any(|note| note.contains("begins with it")), "{:?}", hint.summary);
+}
+
+/// Other programs begin their drawings with one; what it declares is known, and nothing is fetched.
+#[test]
+fn a_drawing_may_have_a_doctype() {
+    let root = |shapes: &str| format!("<svg xmlns=\"http://www.w3.org/2000/svg\">{shapes}</svg>");
+    let outside = "PUBLIC \"-//W3C//DTD SVG 1.1//EN\" \"http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd\"";
+    let entities = "[<!ENTITY side \"40\"> <!ENTITY ns_svg \"http://www.w3.org/2000/svg\">]";
+    for doctype in [String::new(), outside.to_owned(), format!("{outside} {entities}"), entities.to_owned()] {
+        let width = if doctype.contains("ENTITY") { "&side;" } else { "40" };
+        let text = format!("<!DOCTYPE svg {doctype}>\n{}", root(&format!("<rect width='{width}' height='30'/>")));
+        assert!((read(&text, &IN_MM).unwrap().outline.area() - 1200.0).abs() < 1e-9, "{doctype}");
+    }
+    // Entities of entities grow without end, or name themselves.
+    let laughs: String =
+        (1..12).map(|i| format!("<!ENTITY a{i} \"{}\">", format!("&a{};", i - 1).repeat(10))).collect();
+    for entities in [format!("<!ENTITY a0 \"ha\">{laughs}"), "<!ENTITY a11 \"&a11;\">".to_owned()] {
+        let text = format!("<!DOCTYPE svg [{entities}]>{}", root("<text>&a11;</text><rect width='9' height='9'/>"));
+        assert!(matches!(read(&text, &IN_MM), Err(ImportError::Syntax { .. })), "{entities}");
+    }
+    let file = "<!DOCTYPE svg [<!ENTITY file SYSTEM \"file:///etc/hostname\">]>";
+    let text = format!("{file}{}", root("<text>&file;</text><rect width='9' height='9'/>"));
+    assert!(matches!(read(&text, &IN_MM), Err(ImportError::Syntax { .. })));
+}
+
+/// As browsers draw it.
+#[test]
+fn an_ellipse_with_one_radius_is_a_circle() {
+    for radii in ["rx='10'", "ry='10'", "rx='10' ry='auto'", "rx='10' ry='10'"] {
+        let ellipse = drawn(&with_body(&format!("<ellipse cx='50' cy='30' {radii}/>")));
+        let area = ellipse.inclusions[0].outline.area();
+        assert!((area / (100.0 * std::f64::consts::PI) - 1.0).abs() < 0.02, "{radii}: {area}");
+    }
 }
 
 #[test]
