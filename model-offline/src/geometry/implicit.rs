@@ -74,7 +74,7 @@ pub trait Implicit: Debug + Send + Sync {
 /// Steps along a surface towards what is nearest, and towards the surface, at most; shares of the way that are tried.
 const STEPS_ALONG: usize = 60;
 const STEPS_ONTO: usize = 20;
-const HALVINGS: i32 = 6;
+const HALVINGS: i32 = 12;
 
 /// Distance of a point from the surface of a body, length units: from points near the surface along it to where it is nearest, of
 /// all of them the least. Levels are distances at the surface alone.

@@ -211,8 +211,11 @@ fn a_drawing_with_all_roles_is_a_scene() {
         std::fs::write(&drawing, bytes).unwrap();
         assert_eq!(new(&["--length", "cm"]).success().get_output().stdout, printed.get_output().stdout);
     }
-    std::fs::write(&drawing, [0xff, 0xfe, 0x00, 0xd8, 0x20, 0x00]).unwrap();
-    new(&[]).code(2);
+    let half = text.encode_utf16().flat_map(u16::to_le_bytes).chain([0x20]);
+    for wrong in [vec![0xff, 0xfe, 0x00, 0xd8, 0x20, 0x00], [0xff, 0xfe].into_iter().chain(half).collect()] {
+        std::fs::write(&drawing, wrong).unwrap();
+        new(&[]).code(2);
+    }
     // Roles that contradict each other: whose, and what to do.
     std::fs::write(&drawing, text.replace(r#"x1="20" y1="40" x2="20" y2="60""#, r#"x1="40" y1="90" x2="60" y2="90""#))
         .unwrap();

@@ -123,6 +123,7 @@ fn text_of(bytes: &[u8]) -> Result<Cow<'_, str>, ImportError> {
         String::from_utf16(&units).map(Cow::Owned).map_err(|_| wrong(1))
     };
     match bytes {
+        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] if bytes.len() % 2 == 1 => Err(wrong(1)),
         [0xff, 0xfe, ..] => wide(u16::from_le_bytes),
         [0xfe, 0xff, ..] => wide(u16::from_be_bytes),
         _ => std::str::from_utf8(bytes)

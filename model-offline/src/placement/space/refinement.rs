@@ -120,12 +120,17 @@ struct Missed {
 }
 
 impl Missed {
+    /// Nothing.
+    fn none(rest: &[SpaceResponse]) -> Self {
+        let nothing = || vec![0.0; rest.len()];
+        Self { errors: nothing(), full: nothing(), per_depth: nothing() }
+    }
+
     /// What the inclusions do on a mesh, as the answers without them say, times the part that is missed.
     fn on(model: &SpaceModel, rest: &[SpaceResponse]) -> Result<Self, ModelError> {
         let part = model.misses_of_inclusions();
         if part == 0.0 {
-            let nothing = || vec![0.0; rest.len()];
-            return Ok(Self { errors: nothing(), full: nothing(), per_depth: nothing() });
+            return Ok(Self::none(rest));
         }
         let without = rest_responses(&model.without_inclusions())?;
         let of = |does: Vec<f64>| does.into_iter().map(|does| SAFETY * part * does).collect();
@@ -140,6 +145,8 @@ impl Missed {
 /// Quadratic tetrahedra on finer and finer meshes.
 struct Ladder {
     scene: SpaceScene,
+    /// What leaves more open than this is never enough.
+    tolerance: f64,
     /// The level that is next.
     level: i32,
     /// Nodes on patches and answers of the meshes before, coarsest first.
@@ -156,11 +163,12 @@ struct Ladder {
 }
 
 impl Ladder {
-    fn new(scene: &SpaceScene, wants_model: bool) -> Self {
+    fn new(scene: &SpaceScene, tolerance: f64, wants_model: bool) -> Self {
         let scene = scene.with_method(Method::new(Integration::FemT10));
         let level = *LEVELS.start() - 1;
         let (finest, model, failed, memory) = (None, None, None, None);
-        Self { scene, level, coarser: Vec::new(), finest, model, wants_model, failed, memory, ended: false }
+        let coarser = Vec::new();
+        Self { scene, tolerance, level, coarser, finest, model, wants_model, failed, memory, ended: false }
     }
 
     fn open(&self) -> f64 {
@@ -209,8 +217,11 @@ impl Ladder {
         let on_patches = model.nodes_on_patches();
         if let Some(coarser) = coarser_on_all(&self.coarser, &on_patches) {
             let apart = distances(coarser, &rest);
-            let missed = Missed::on(&model, &rest)?;
-            let errors = sums(&estimates(&apart), &missed.errors);
+            let errors = estimates(&apart);
+            // What does not do as it is need not be known any better.
+            let missed =
+                if worst(&errors) <= self.tolerance { Missed::on(&model, &rest)? } else { Missed::none(&rest) };
+            let errors = sums(&errors, &missed.errors);
             let full = sums(&estimates(&distances_of(|controls| controls.full, coarser, &rest)), &missed.full);
             let per_depth =
                 sums(&estimates(&apart_per_depth(self.scene.needle.axis, coarser, &rest)), &missed.per_depth);
@@ -248,7 +259,7 @@ impl Ladder {
 /// [`ModelError`], among them [`ModelError::ToleranceNotReached`].
 pub(super) fn refine(scene: &SpaceScene, tolerance: f64) -> Result<Discretised, ModelError> {
     let is_reference = scene.discretization.method.integration == Integration::FemT10;
-    let mut ladder = Ladder::new(scene, is_reference);
+    let mut ladder = Ladder::new(scene, tolerance, is_reference);
     if is_reference {
         ladder.climb(tolerance)?;
         return match (ladder.finest.take_if(|finest| finest.open() <= tolerance), ladder.model.take()) {
@@ -570,7 +581,7 @@ mod tests {
         let mut scene = SpaceScene::bundled("block").unwrap();
         scene.paddles.truncate(2);
         scene.pairs.clear();
-        let mut ladder = Ladder::new(&scene, false);
+        let mut ladder = Ladder::new(&scene, 0.05, false);
         let decided_by = decided_by(&scene, errors, errors);
         let errors = errors.to_vec();
         ladder.finest = Some(Reference {

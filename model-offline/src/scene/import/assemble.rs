@@ -193,9 +193,6 @@ impl Sorter<'_> {
         let (numbered, others): (Vec<Shape>, Vec<Shape>) =
             shapes.into_iter().partition(|shape| matches!(shape.role, Some(Role::Paddle(Some(_)))));
         for shape in numbered.iter().chain(&others) {
-            if let Some(meant) = shape.meant {
-                self.imported.summary.note(format!("{}: did you mean `{meant}` in its name?", shape.told));
-            }
             let left = match shape.role {
                 Some(Role::Body) => Err(no_body(along, shape)),
                 Some(Role::Inclusion) => self.inclusion(along, shape),

@@ -49,7 +49,7 @@ pub(super) struct Meaning {
 }
 
 /// First words that say a role.
-const WORDS: [(&str, Role); 20] = [
+const WORDS: [(&str, Role); 21] = [
     ("body", Role::Body),
     ("outline", Role::Body),
     ("domain", Role::Body),
@@ -70,6 +70,7 @@ const WORDS: [(&str, Role); 20] = [
     ("fixed", Role::Fixed),
     ("immobile", Role::Fixed),
     ("bone", Role::Fixed),
+    ("bones", Role::Fixed),
 ];
 
 /// What a name says: its first word is a role (`inclusion-hard`, `Paddle 1`, `fixed_left`), the rest or all of it may

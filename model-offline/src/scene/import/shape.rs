@@ -18,8 +18,6 @@ pub(super) struct Shape {
     pub(super) told: String,
     pub(super) role: Option<Role>,
     pub(super) preset: Option<Preset>,
-    /// What its name may have been meant to say.
-    pub(super) meant: Option<&'static str>,
     /// y upwards; of a closed loop the first point is not repeated.
     pub(super) points: Vec<Point2>,
     pub(super) closed: bool,
@@ -34,8 +32,7 @@ impl Shape {
         if meets {
             points.pop();
         }
-        let Meaning { role, preset, meant } = meaning;
-        Self { told, role, preset, meant, points, closed: closed || meets }
+        Self { told, role: meaning.role, preset: meaning.preset, points, closed: closed || meets }
     }
 
     pub(super) fn is_finite(&self) -> bool {

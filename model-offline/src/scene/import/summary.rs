@@ -40,6 +40,13 @@ pub struct Summary {
 }
 
 impl Summary {
+    /// Asks about a name that is nearly another one.
+    pub(super) fn ask(&mut self, told: &str, meant: Option<&str>) {
+        if let Some(meant) = meant {
+            self.note(format!("{told}: did you mean `{meant}` in its name?"));
+        }
+    }
+
     pub(super) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
     }

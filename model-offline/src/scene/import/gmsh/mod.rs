@@ -80,6 +80,7 @@ impl Shapes<'_> {
         }
         for (group, lines) in &self.mesh.elements[1] {
             let (told, meaning) = named(group, "lines");
+            self.summary.ask(&told, meaning.meant);
             match meaning.role {
                 Some(Role::Needle | Role::Target | Role::Paddle(_) | Role::Fixed) => {
                     self.lines(&told, meaning, lines)?
@@ -96,6 +97,7 @@ impl Shapes<'_> {
         }
         for (group, points) in &self.mesh.elements[0] {
             let (told, meaning) = named(group, "point");
+            self.summary.ask(&told, meaning.meant);
             match (meaning.role, group) {
                 (Some(Role::Target), _) => {
                     for node in points.iter().flatten() {
@@ -138,6 +140,7 @@ impl Shapes<'_> {
         let mut regions: Vec<(String, Meaning, f64, Vec<Vec<u64>>)> = Vec::new();
         for (group, cells) in &self.mesh.elements[2] {
             let (told, meaning) = named(group, "surface");
+            self.summary.ask(&told, meaning.meant);
             let mut area = 0.0;
             for cell in cells {
                 let corners: Vec<Point2> = cell.iter().map(|node| self.point(*node)).collect::<Result<_, _>>()?;

@@ -2,8 +2,10 @@
 //!
 //! A shape's role is in its id, its Inkscape label, or those of the groups and layers around it, nearest first.
 
+mod document;
 mod element;
 mod scale;
+mod style;
 
 use super::assemble::assemble;
 use super::role::{Meaning, ROLES, has_role_later, meaning};
@@ -11,9 +13,9 @@ use super::shape::Shape;
 use super::{ImportError, ImportOptions, Imported, Summary};
 use element::{NotDrawn, Viewport};
 use kurbo::Affine;
-use roxmltree::{Document, Node, ParsingOptions};
+use roxmltree::Node;
 use std::collections::BTreeMap;
-use std::str::FromStr as _;
+use style::{affine, is_none, moved, property, unseen};
 
 /// Namespace of layers and labels.
 const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
@@ -26,10 +28,7 @@ const NO_SHAPES: [&str; 8] = ["defs", "symbol", "clipPath", "mask", "marker", "p
 /// # Errors
 /// [`ImportError`].
 pub fn read(text: &str, options: &ImportOptions<'_>) -> Result<Imported, ImportError> {
-    // Drawings begin with a DOCTYPE as often as not. Nothing it names is fetched, and entities that grow are refused.
-    let options_of_xml = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
-    let document = Document::parse_with_options(text, options_of_xml)
-        .map_err(|error| ImportError::Syntax { line: error.pos().row as usize, what: error.to_string() })?;
+    let document = document::parsed(text)?;
     let root = document.root_element();
     if root.tag_name().name() != "svg" {
         let what = format!("<{}> is no drawing: an SVG file begins with <svg>", root.tag_name().name());
@@ -37,7 +36,8 @@ pub fn read(text: &str, options: &ImportOptions<'_>) -> Result<Imported, ImportE
     }
     let mut summary = Summary::default();
     let (viewport, per_unit) = scale::of_root(root, options, &mut summary)?;
-    let mut reader = Reader { document: &document, viewport, summary, shapes: Vec::new(), absent: BTreeMap::new() };
+    let line_ends = text.match_indices('\n').map(|(at, _)| at).collect();
+    let mut reader = Reader { line_ends, viewport, summary, shapes: Vec::new(), absent: BTreeMap::new() };
     reader.read(root)?;
     let Reader { mut summary, shapes, absent, .. } = reader;
     for (told, why, count) in absent.into_values() {
@@ -60,8 +60,9 @@ struct Context {
     is_visible: bool,
 }
 
-struct Reader<'a, 'input> {
-    document: &'a Document<'input>,
+struct Reader {
+    /// Where lines of the file end.
+    line_ends: Vec<usize>,
     viewport: Viewport,
     summary: Summary,
     shapes: Vec<Shape>,
@@ -69,9 +70,9 @@ struct Reader<'a, 'input> {
     absent: BTreeMap<usize, (String, String, usize)>,
 }
 
-impl<'a, 'input> Reader<'a, 'input> {
+impl Reader {
     /// All elements in the order of the file, without recursion: drawings may be nested deeply.
-    fn read(&mut self, root: Node<'a, 'input>) -> Result<(), ImportError> {
+    fn read(&mut self, root: Node<'_, '_>) -> Result<(), ImportError> {
         let top = Context { transform: Affine::IDENTITY, role: Meaning::default(), absent: None, is_visible: true };
         let mut open = vec![(root, top)];
         while let Some((node, above)) = open.pop() {
@@ -85,15 +86,20 @@ impl<'a, 'input> Reader<'a, 'input> {
         Ok(())
     }
 
-    fn context(&mut self, node: Node<'a, 'input>, above: Context, is_root: bool) -> Result<Context, ImportError> {
+    fn context(&mut self, node: Node<'_, '_>, above: Context, is_root: bool) -> Result<Context, ImportError> {
         let mut context = above;
         // What an element is called says more than what is around it.
         let own = names(node).map(meaning);
         let named = own.iter().copied().find(|name| name.role.is_some());
         context.role = match named {
             Some(named) => named,
-            None => Meaning { meant: own.iter().find_map(|name| name.meant).or(context.role.meant), ..context.role },
+            None => context.role,
         };
+        let meant = named.map_or_else(|| own.iter().find_map(|name| name.meant), |named| named.meant);
+        if context.absent.is_none() {
+            let told = self.told(node);
+            self.summary.ask(&told, meant);
+        }
         if let Some(visibility) = property(node, "visibility") {
             context.is_visible = !matches!(visibility, "hidden" | "collapse");
         }
@@ -105,18 +111,22 @@ impl<'a, 'input> Reader<'a, 'input> {
         if is_root {
             // Nothing would be left of the drawing, which somebody has asked to be read.
             let is_hidden = !std::mem::replace(&mut context.is_visible, true);
-            if let Some(why) = unseen.or_else(|| is_hidden.then_some("it is hidden (visibility: hidden)")) {
+            let is_moved = moved(node).is_some_and(|moved| !moved.is_read);
+            let why = unseen
+                .or_else(|| is_hidden.then_some("it is hidden (visibility: hidden)"))
+                .or_else(|| is_moved.then_some("its own style transforms it"));
+            if let Some(why) = why {
                 self.summary.note(format!("the whole drawing: {why}; it was read all the same"));
             }
             return Ok(context);
         }
-        let moved = property(node, "transform").is_some();
+        let moved = moved(node);
         let why = match name {
             _ if unseen.is_some() => unseen,
-            _ if styled(node, "transform").is_some() => {
+            _ if moved.as_ref().is_some_and(|moved| !moved.is_read) => {
                 Some("its style transforms it; make that a transform attribute")
             }
-            _ if moved && property(node, "transform-origin").is_some() => {
+            _ if moved.as_ref().is_some_and(|moved| !moved.is_about_origin) => {
                 Some("it is transformed about a transform-origin; write that into the transform")
             }
             "svg" => Some("a drawing within the drawing is not read; ungroup it"),
@@ -128,15 +138,14 @@ impl<'a, 'input> Reader<'a, 'input> {
             let place = node.id().get_usize();
             self.absent.insert(place, (self.told(node), why.to_owned(), 0));
             context.absent = Some(place);
-        } else if let Some(text) = node.attribute("transform") {
-            let t = svgtypes::Transform::from_str(text)
-                .map_err(|error| self.syntax(node, format!("transform: {error}")))?;
-            context.transform *= Affine::new([t.a, t.b, t.c, t.d, t.e, t.f]);
+        } else if let Some(text) = node.attribute("transform").filter(|text| !is_none(text)) {
+            let transform = affine(text).map_err(|error| self.syntax(node, format!("transform: {error}")))?;
+            context.transform *= transform;
         }
         Ok(context)
     }
 
-    fn element(&mut self, node: Node<'a, 'input>, context: &Context) -> Result<(), ImportError> {
+    fn element(&mut self, node: Node<'_, '_>, context: &Context) -> Result<(), ImportError> {
         let name = node.tag_name().name();
         let is_drawn = element::SHAPES.contains(&name);
         if let Some(absent) = context.absent.and_then(|place| self.absent.get_mut(&place)) {
@@ -200,13 +209,18 @@ impl<'a, 'input> Reader<'a, 'input> {
 
     /// What an element is called in messages.
     fn told(&self, node: Node<'_, '_>) -> String {
-        let line = self.document.text_pos_at(node.range().start).row;
+        let line = self.line(node);
         let name = label(node).or(node.attribute("id")).map_or_else(String::new, |name| format!(" `{name}`"));
         format!("<{}>{name} (line {line})", node.tag_name().name())
     }
 
     fn syntax(&self, node: Node<'_, '_>, what: String) -> ImportError {
-        ImportError::Syntax { line: self.document.text_pos_at(node.range().start).row as usize, what }
+        ImportError::Syntax { line: self.line(node), what }
+    }
+
+    /// The line of the file on which an element begins, from 1.
+    fn line(&self, node: Node<'_, '_>) -> usize {
+        1 + self.line_ends.partition_point(|end| *end < node.range().start)
     }
 }
 
@@ -217,30 +231,6 @@ fn label<'a>(node: Node<'a, '_>) -> Option<&'a str> {
 /// Where a role is looked for: the id, then the label.
 fn names<'a>(node: Node<'a, '_>) -> [&'a str; 2] {
     [node.attribute("id").unwrap_or(""), label(node).unwrap_or("")]
-}
-
-/// A property, from the style or an attribute of its name.
-fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
-    styled(node, name).or(node.attribute(name).map(str::trim))
-}
-
-/// The same from the style alone.
-fn styled<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
-    let rules = node.attribute("style").unwrap_or("").split(';');
-    // The last one counts.
-    rules.rev().find_map(|rule| {
-        let (key, value) = rule.split_once(':')?;
-        (key.trim() == name).then(|| value.trim().trim_end_matches("!important").trim())
-    })
-}
-
-/// Why an element and all that is within it cannot be seen.
-fn unseen(node: Node<'_, '_>) -> Option<&'static str> {
-    if property(node, "display") == Some("none") {
-        return Some("it is hidden (display: none)");
-    }
-    let opacity = property(node, "opacity")?.trim_end_matches('%').trim().parse::<f64>().ok()?;
-    (opacity <= 0.0).then_some("it cannot be seen (opacity: 0)")
 }
 
 #[cfg(test)]

@@ -232,6 +232,7 @@ fn hidden_and_undrawn_shapes_are_left_out_and_say_so() {
         ("<style>.a { transform: scale(2) }</style>".into(), "style sheets"),
         (format!("<g style='transform:translate(5px,0px)'>{circle}</g>"), "its style transforms it"),
         (format!("<g transform='scale(.5)' transform-origin='20 20'>{circle}{circle}</g>"), "transform-origin; write"),
+        (format!("<g style='Rotate: 30deg'>{circle}</g>"), "its style transforms it"),
     ] {
         let said = left(&with_body(&shape));
         assert!(said.contains(why), "{shape}: {said}");
@@ -308,11 +309,11 @@ fn every_shape_that_is_left_out_says_why() {
     }
     for (shape, meant) in [
         ("<circle id='tumour-livr' cx='30' cy='30' r='5'/>", "`liver`"),
-        ("<g inkscape:label='fixd'><line x1='20' y1='60' x2='60' y2='60'/></g>", "`fixed`"),
+        ("<g inkscape:label='fixd'><line x2='60'/><line x2='60'/></g>", "`fixd` (line 3): did you mean `fixed`"),
     ] {
         let notes = drawn(&with_body(shape)).summary.notes;
-        let asks = |note: &String| note.contains("did you mean") && note.contains(meant);
-        assert!(notes.iter().any(asks), "{shape}: {notes:?}");
+        let asked = notes.iter().filter(|note| note.contains("did you mean")).collect::<Vec<_>>();
+        assert!(asked.len() == 1 && asked[0].contains(meant), "{shape}: {notes:?}");
     }
     let hint = drawn(&with_body("<circle id='left-tumour' cx='30' cy='30' r='5'/>"));
     assert!(hint.summary.notes.iter().any(|note| note.contains("begins with it")), "{:?}", hint.summary);
@@ -336,9 +337,50 @@ fn a_drawing_may_have_a_doctype() {
         let text = format!("<!DOCTYPE svg [{entities}]>{}", root("<text>&a11;</text><rect width='9' height='9'/>"));
         assert!(matches!(read(&text, &IN_MM), Err(ImportError::Syntax { .. })), "{entities}");
     }
+    // Long ones that are used often, in texts and in attributes, and those with elements or others in them.
+    let long = "x".repeat(100_000);
+    let often = "&a;".repeat(10_000);
+    let elements = format!("<!ENTITY a \"{}\">", "<g/>".repeat(1000));
+    for (entities, shapes) in [
+        (format!("<!ENTITY a '{long}'>"), format!("<desc>{often}</desc>")),
+        (format!("<!ENTITY a '{long}'>"), format!("<g id='{often}'/>")),
+        (format!("<!-- ' --><!ENTITY % b 'c'><!ENTITY a '{long}'>"), format!("<g id='{often}'/>")),
+        (elements, often.clone()),
+        ("<!ENTITY b 'x'><!ENTITY a '&b;&b;'>".to_owned(), often.clone()),
+    ] {
+        let text = format!("<!DOCTYPE svg [{entities}]>{}", root(&format!("{shapes}<rect width='9' height='9'/>")));
+        let refused = read(&text, &IN_MM).unwrap_err().to_string();
+        assert!(refused.contains("entities"), "{refused}");
+    }
     let file = "<!DOCTYPE svg [<!ENTITY file SYSTEM \"file:///etc/hostname\">]>";
     let text = format!("{file}{}", root("<text>&file;</text><rect width='9' height='9'/>"));
     assert!(matches!(read(&text, &IN_MM), Err(ImportError::Syntax { .. })));
+}
+
+/// What says that it transforms and does not, or does the same about any point, is taken.
+#[test]
+fn transforms_that_change_nothing_change_nothing() {
+    let centroid = |attributes: &str| {
+        let circle = format!("<circle id='tumour' cx='30' cy='30' r='5' {attributes}/>");
+        drawn(&with_body(&circle)).inclusions[0].outline.centroid()
+    };
+    let expected = centroid("");
+    for (attributes, by) in [
+        ("style='transform:none;fill:red'", [0.0, 0.0]),
+        ("style='transform: ;rotate:none'", [0.0, 0.0]),
+        ("transform='' style='transform-origin:center'", [0.0, 0.0]),
+        ("transform='none' transform-origin='center'", [0.0, 0.0]),
+        ("transform='translate(2,3)' transform-origin='center'", [2.0, -3.0]),
+        ("transform='scale(1.2)' transform-origin='0 0'", [6.0, -6.0]),
+        ("transform='scale(1.2)' style='transform-origin:0px 0%'", [6.0, -6.0]),
+    ] {
+        let found = centroid(attributes);
+        assert!((found - expected - Point2::from(by)).norm() < 1e-2, "{attributes}: {found} {expected}");
+    }
+    // Of the drawing as a whole it is said.
+    let text = "<svg style='transform:scale(2)'><rect id='body' width='100' height='60'/></svg>";
+    let notes = read(text, &IN_MM).unwrap().summary.notes;
+    assert!(notes.iter().any(|note| note.contains("its own style transforms it")), "{notes:?}");
 }
 
 /// As browsers draw it.
