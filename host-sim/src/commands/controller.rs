@@ -21,6 +21,7 @@ use host_sim::runtime::signals;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::loop_settings::{LoopArgs, LoopSettings};
 use model_offline::output::table_text::hex;
+use model_offline::output::terminal::complain;
 use model_offline::scene::{Motion, SensorPreset};
 use model_offline::table::TableBuildError;
 
@@ -139,8 +140,8 @@ fn hand_in(args: &ControllerArgs, served: ServedPlant) -> Result<(), SimError> {
             accounts.faults
         );
         if accounts.ticks.due == 0 {
-            eprintln!(
-                "note: the other side ended before the first tick, and says why: a table of another scene is refused"
+            complain(
+                "note: the other side ended before the first tick, and says why: a table of another scene is refused",
             );
         }
     }

@@ -73,7 +73,7 @@ pub(crate) fn faults(args: &FaultsArgs) -> Result<(), SimError> {
         return Err(UsageError::NoRow { row, last }.into());
     }
     if let Some(directory) = &args.out {
-        std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
+        FileError::make_folder(directory)?;
     }
     let files = FILES.map(|name| args.out.as_ref().map(|directory| directory.join(name)));
     let [csv, own, svg] = files.each_ref().map(Option::as_deref);

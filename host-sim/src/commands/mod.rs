@@ -197,13 +197,16 @@ fn progress_bar(quiet: bool) -> ProgressBar {
 fn sweep() {
     let swept = host_sim::exchange::sweep();
     if !swept.is_empty() {
-        eprintln!("Removed from shared memory what killed processes had left there: {}", swept.join(", "));
+        terminal::complain(&format!(
+            "Removed from shared memory what killed processes had left there: {}",
+            swept.join(", ")
+        ));
     }
 }
 
 /// Writes the manual pages.
 fn man(directory: &Path) -> Result<(), SimError> {
-    std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
+    FileError::make_folder(directory)?;
     clap_mangen::generate_to(Cli::command(), directory).map_err(FileError::write(directory))?;
     say!("{}", directory.join("host-sim.1").display());
     Ok(())
@@ -243,7 +246,9 @@ fn refuse(error: &clap::Error) -> ! {
     let _ = error.print();
     if let Some(word) = context(ContextKind::InvalidSubcommand) {
         if ELSEWHERE.contains(&word.as_str()) {
-            eprintln!("\n  tip: `{word}` is a command of model-offline: model-offline {word} --help");
+            terminal::complain(&format!(
+                "\n  tip: `{word}` is a command of model-offline: model-offline {word} --help"
+            ));
         } else {
             terminal::suggest(error, &word, &Cli::command());
         }
@@ -251,7 +256,7 @@ fn refuse(error: &clap::Error) -> ! {
         && std::env::args().nth(1).is_some_and(|first| first.starts_with(&option))
         && is_option_of_run(&option)
     {
-        eprintln!("\n  tip: `{option}` is an option of run: host-sim run {option}");
+        terminal::complain(&format!("\n  tip: `{option}` is an option of run: host-sim run {option}"));
     }
     std::process::exit(error.exit_code());
 }

@@ -12,6 +12,7 @@ use host_sim::runtime::executor::Hardware;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{View, insertions_in_space};
+use model_offline::output::terminal::complain;
 use model_offline::parallel;
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
@@ -80,7 +81,7 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
         write_json(path, &compared)?;
     }
     if !args.quiet {
-        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        scene.notes.iter().for_each(|note| complain(&format!("note: {note}")));
         tell!("{}", summary(&compared, args.out));
     }
     let Some(view) = view else { return Ok(()) };

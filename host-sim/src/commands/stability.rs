@@ -46,7 +46,7 @@ pub(crate) struct LoopStabilityArgs {
 pub(crate) fn stability(args: &LoopStabilityArgs) -> Result<(), SimError> {
     signals::install();
     let scene = Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?;
-    std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
+    FileError::make_folder(&args.out)?;
     let bar = super::progress_bar(args.quiet);
     bar.begin(PARTS);
     let threads = parallel::threads(args.threads);

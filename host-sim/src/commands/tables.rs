@@ -43,7 +43,7 @@ pub(crate) struct TablesArgs {
 pub(crate) fn tables(args: &TablesArgs) -> Result<(), SimError> {
     signals::install();
     let scene = args.tissue.of(&Scene::read(args.scene.as_deref().unwrap_or(Path::new("paper")))?);
-    std::fs::create_dir_all(&args.out).map_err(FileError::write(&args.out))?;
+    FileError::make_folder(&args.out)?;
     let threads = parallel::threads(args.threads);
     let bar = super::progress_bar(args.quiet);
     bar.begin(KNOTS.len() as u64);

@@ -86,7 +86,7 @@ pub(crate) fn timing(args: &TimingArgs) -> Result<(), SimError> {
         return Err(UsageError::NoProcessor { cpu, last: processors - 1 }.into());
     }
     if let Some(directory) = &args.out {
-        std::fs::create_dir_all(directory).map_err(FileError::write(directory))?;
+        FileError::make_folder(directory)?;
     }
     let own = args.out.as_ref().map(|directory| directory.join("timing.json"));
     let picture = args.out.as_ref().map(|directory| directory.join("timing.svg"));

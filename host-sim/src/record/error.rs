@@ -1,5 +1,6 @@
 //! What can go wrong with recordings and other files.
 
+use model_offline::output::make_folder;
 use std::path::{Path, PathBuf};
 
 use firmware::contract::TableError;
@@ -34,6 +35,14 @@ impl FileError {
     pub fn write(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Write { path, source }
+    }
+
+    /// Makes a folder for results, with those above it.
+    ///
+    /// # Errors
+    /// [`Self::Write`] names the folder.
+    pub fn make_folder(path: &Path) -> Result<(), Self> {
+        make_folder(path).map_err(|error| Self::write(path)(error.source))
     }
 }
 

@@ -230,7 +230,7 @@ pub fn write_pictures(directory: &Path, into: &Path) -> Result<Vec<PathBuf>, Sim
         AnyRun::Plane(result) => pictures(&result).into_iter().map(|(name, svg)| (name.to_owned(), svg)).collect(),
         AnyRun::Space(result) => space::pictures(&result),
     };
-    std::fs::create_dir_all(into).map_err(FileError::write(into))?;
+    FileError::make_folder(into)?;
     let pictures = pictures.into_iter().map(|(name, svg)| (into.join(name), svg));
     let _together = together();
     pictures.map(|(path, svg)| Ok(write_bytes(&path, svg.as_bytes()).map(|()| path)?)).collect()

@@ -1,6 +1,7 @@
 //! Signals that ask for the end, or for a re-arming: remembered, and answered between two ticks, so that everything is
 //! tidied up and no step is interrupted.
 
+use model_offline::output::terminal::complain;
 use std::sync::Arc;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -67,7 +68,7 @@ pub fn ends_at_once<T>(work: impl FnOnce() -> T) -> T {
         let watcher = scope.spawn(|| {
             while !done.load(Ordering::Acquire) {
                 if let Err(interrupted) = check() {
-                    eprintln!("Error: {interrupted}");
+                    complain(&format!("Error: {interrupted}"));
                     std::process::exit(1);
                 }
                 std::thread::park_timeout(BETWEEN_LOOKS);

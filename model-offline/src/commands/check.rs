@@ -151,11 +151,15 @@ impl Told<'_> {
 
     fn inclusion(&self, place: usize) -> String {
         let inclusion = &self.facts.inclusions[place];
-        let own =
-            inclusion.material.as_ref().map_or(String::new(), |own| format!("own material, {}, ", self.material(own)));
+        let times = format!("stiffness times {}", short(inclusion.stiffness));
+        let what = match inclusion.material.as_ref().map(|own| format!("own material, {}", self.material(own))) {
+            None => times,
+            // A factor that says nothing of a material of its own.
+            Some(own) if inclusion.stiffness == 1.0 => own,
+            Some(own) => format!("{own}, {times}"),
+        };
         format!(
-            "{own}stiffness times {}; area {} around {}, {} wide",
-            short(inclusion.stiffness),
+            "{what}; area {} around {}, {} wide",
             area(inclusion.area, &self.facts.units.length),
             self.point(inclusion.centroid),
             self.long(inclusion.width)

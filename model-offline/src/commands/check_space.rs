@@ -131,17 +131,16 @@ fn text(told: &Told<'_>, warnings: &[String]) -> String {
         let _ = writeln!(out, "{name:<13}{what}");
     };
     row("body", told.body());
-    let modulus = <Law as Material<3>>::rest_shear_modulus(&scene.material);
-    row("material", format!("shear modulus {} at rest", in_unit(modulus, &scene.stress_unit)));
+    row("material", told.law(&scene.material));
     let share = 100.0 * survey.immobile.area / survey.surface;
     row("immobile", format!("{}, {share:.0} % of the surface", told.patch(&survey.immobile)));
     row("needle", told.needle());
     row("target", told.target());
     for inclusion in &survey.inclusions {
-        let (times, volume) = (short(inclusion.stiffness), told.volume(inclusion.volume));
+        let (stuff, volume) = (told.stuff(inclusion.number, inclusion.stiffness), told.volume(inclusion.volume));
         let held = inclusion.sampled_volume.map(|own| inclusion.volume / own).filter(|held| *held < LESS);
         let of_it = held.map_or_else(String::new, |held| format!(" ({:.0} % of its own)", 100.0 * held));
-        let what = format!("stiffness times {times}; volume {volume}{of_it}, {} elements", inclusion.elements);
+        let what = format!("{stuff}; volume {volume}{of_it}, {} elements", inclusion.elements);
         row(&format!("inclusion {}", inclusion.number), what);
     }
     for paddle in &survey.paddles {
@@ -172,6 +171,22 @@ struct Told<'a> {
 impl Told<'_> {
     fn long(&self, length: f64) -> String {
         in_unit(length, &self.scene.length_unit)
+    }
+
+    fn law(&self, law: &Law) -> String {
+        let modulus = <Law as Material<3>>::rest_shear_modulus(law);
+        format!("shear modulus {} at rest", in_unit(modulus, &self.scene.stress_unit))
+    }
+
+    /// What an inclusion is made of. A factor of one says nothing of a material of its own.
+    fn stuff(&self, number: usize, stiffness: f64) -> String {
+        let times = format!("stiffness times {}", short(stiffness));
+        let own = self.scene.inclusions.get(number - 1).and_then(|inclusion| inclusion.material.as_ref());
+        match own.map(|own| format!("own material, {}", self.law(own))) {
+            None => times,
+            Some(own) if stiffness == 1.0 => own,
+            Some(own) => format!("{own}, {times}"),
+        }
     }
 
     fn volume(&self, volume: f64) -> String {

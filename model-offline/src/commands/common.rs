@@ -35,7 +35,9 @@ impl SceneArgs {
     pub(super) fn read_still(&self) -> Result<Scene, CliError> {
         let scene = self.read_any()?;
         if !scene.motion.is_none() || scene.needle.deflection != 0.0 {
-            eprintln!("note: [motion] and deflection are left out here; `fit`, `compare` and `host-sim run` take them");
+            terminal::complain(
+                "note: [motion] and deflection are left out here; `fit`, `compare` and `host-sim run` take them",
+            );
         }
         Ok(scene)
     }

@@ -9,6 +9,7 @@ use model_offline::output::field_picture::{self, Field};
 use model_offline::output::placement_picture::{self, DrawnStudy, read_study};
 use model_offline::output::result_file::{Which, read_body};
 use model_offline::output::space_picture::{self, SpaceGeometry};
+use model_offline::output::terminal::complain;
 use model_offline::output::{PictureFormat, check_outputs, scene_picture, write_picture};
 use model_offline::placement::space::workflow::coarse;
 use model_offline::scene::space::SpaceScene;
@@ -64,7 +65,7 @@ pub(super) fn run(args: &DrawArgs) -> Result<(), CliError> {
     }
     let scene = args.scene.read_any()?;
     write_picture(&args.output, &scene_picture::svg(&scene))?;
-    eprint!("{}", warned(&scene.told_warnings()));
+    warn_of(&scene.told_warnings());
     Ok(())
 }
 
@@ -73,8 +74,15 @@ fn draw_in_space(args: &DrawArgs, scene: &SpaceScene) -> Result<(), CliError> {
     let warnings = check_space::warnings(scene, &check_space::survey(scene)?);
     let geometry = SpaceGeometry::new(&coarse(scene)?);
     write_picture(&args.output, &space_picture::scene_svg(&geometry, scene.needle.depth))?;
-    eprint!("{}", warned(&warnings));
+    warn_of(&warnings);
     Ok(())
+}
+
+/// On standard error: standard output may be the picture.
+fn warn_of(warnings: &[String]) {
+    if !warnings.is_empty() {
+        complain(warned(warnings).trim_end());
+    }
 }
 
 impl DrawArgs {

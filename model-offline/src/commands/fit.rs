@@ -7,6 +7,7 @@ use super::json::write_json;
 use model_offline::discretization::Resolution;
 use model_offline::output;
 use model_offline::output::check_outputs;
+use model_offline::output::terminal::complain;
 use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
 use model_offline::study::fit;
@@ -72,7 +73,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
     check_outputs(&[&args.scene.scene], &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
     let told = |what: &str| {
         if !args.quiet {
-            eprintln!("{what} …");
+            complain(&format!("{what} …"));
         }
     };
     let outcome = fit::fit_told(&scene, args.tolerance, parallel::threads(args.threads), &told)

@@ -3,6 +3,7 @@
 use super::common::SceneArgs;
 use super::error::CliError;
 use super::json::write_json;
+use model_offline::output::terminal::complain;
 use model_offline::output::{self, check_outputs, terminal};
 use model_offline::parallel;
 use model_offline::scene::space::SpaceScene;
@@ -32,7 +33,7 @@ pub(super) fn run(scene: &SpaceScene, args: &Asked<'_>) -> Result<(), CliError> 
     check_outputs(&args.scene.files(scene), &outputs)?;
     stays_in_folder(scene, args)?;
     if !args.quiet {
-        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        scene.notes.iter().for_each(|note| complain(&format!("note: {note}")));
     }
     let text = Scene::text(&args.scene.scene)?;
     let fit = fitted(scene, &text, args).map_err(|error| error.reported_of(args.json, &scene.name, scene.tissue()))?;
@@ -46,7 +47,10 @@ pub(super) fn run(scene: &SpaceScene, args: &Asked<'_>) -> Result<(), CliError> 
     if let Some(file) = args.write_slice {
         match &fit.slice_text {
             Some(text) => output::write_whole(file, text.as_bytes())?,
-            None => eprintln!("note: --write-slice: {}", fit.slice_failure.as_deref().unwrap_or("there is no slice")),
+            None => {
+                let why = fit.slice_failure.as_deref().unwrap_or("there is no slice");
+                complain(&format!("note: --write-slice: {why}"));
+            }
         }
     }
     if let Some(file) = args.svg {

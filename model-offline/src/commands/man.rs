@@ -14,7 +14,7 @@ pub(super) struct ManArgs {
 
 pub(super) fn run(args: &ManArgs, command: clap::Command) -> Result<(), CliError> {
     let fail = |source| OutputError { path: args.directory.clone(), source };
-    std::fs::create_dir_all(&args.directory).map_err(fail)?;
+    output::make_folder(&args.directory)?;
     let together = output::together();
     clap_mangen::generate_to(command, &args.directory).map_err(fail)?;
     drop(together);

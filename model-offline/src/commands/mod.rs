@@ -169,11 +169,11 @@ pub(crate) fn parse() -> Cli {
         let argument = error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string);
         let _ = error.print();
         if argument.is_some_and(|argument| VARIED.iter().any(|option| argument.starts_with(option))) {
-            eprintln!("\n  tip: studies vary this themselves: leave it out");
+            terminal::complain("\n  tip: studies vary this themselves: leave it out");
         }
         if let Some(word) = word {
             if ELSEWHERE.contains(&word.as_str()) {
-                eprintln!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help");
+                terminal::complain(&format!("\n  tip: `{word}` is a command of host-sim: host-sim {word} --help"));
             } else {
                 terminal::suggest(&error, &word, &Cli::command());
             }

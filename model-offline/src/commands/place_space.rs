@@ -6,6 +6,7 @@ use super::error::CliError;
 use super::json::write_json;
 use super::place_text::in_lengths_of;
 use model_offline::number::{decimals, length, smallest_told};
+use model_offline::output::terminal::complain;
 use model_offline::parallel;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
 use model_offline::placement::space::{SecondPaddle, SpaceErrorEstimate, SpaceStudy};
@@ -24,7 +25,7 @@ const LISTED: usize = 10;
 
 pub(super) fn run(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), CliError> {
     if !run.quiet {
-        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        scene.notes.iter().for_each(|note| complain(&format!("note: {note}")));
     }
     place(scene, json, run).map_err(|error| error.reported_of(json, &scene.name, scene.tissue()))
 }
@@ -40,7 +41,9 @@ fn place(scene: &SpaceScene, json: Option<&Path>, run: &RunArgs) -> Result<(), C
     write_json(json, &document(&study, &warnings))?;
     if !run.quiet {
         for [a, b] in study.overlapping() {
-            eprintln!("note: paddles {a} and {b} overlap, and cannot be attached together: no such pair is the best");
+            complain(&format!(
+                "note: paddles {a} and {b} overlap, and cannot be attached together: no such pair is the best"
+            ));
         }
         tell!("{}{}", summary(&study), warned(&warnings));
     }

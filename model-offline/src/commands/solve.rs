@@ -9,6 +9,7 @@ use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{EnergyAccount, Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::{in_unit, length};
 use model_offline::output;
+use model_offline::output::terminal::complain;
 use model_offline::output::vtu::{self, Shown};
 use model_offline::output::{Geometry, NodalFields, State, body, check_outputs, has_stress};
 use model_offline::placement::{controllability, discretise};
@@ -111,7 +112,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
     let (gone, available) = (displacement.norm(), scene.actuator.max_displacement);
     if gone > available {
         let [gone, available] = [gone, available].map(|length| in_unit(length, &scene.length_unit));
-        eprintln!("note: the paddle is {gone} from rest, and [actuator] max_displacement is {available}");
+        complain(&format!("note: the paddle is {gone} from rest, and [actuator] max_displacement is {available}"));
     }
     check_all_outputs(&[&args.scene.scene], args)?;
     solve(&scene, Held { paddle, displacement }, args).map_err(|error| error.reported(args.json.as_deref(), &scene))
@@ -131,7 +132,7 @@ fn note_what_is_too_deep(scene: &Scene, depth: f64) {
     deeper.needle.depth = depth.max(scene.needle.depth);
     let known = scene.warnings();
     for warning in deeper.warnings().iter().filter(|warning| !known.contains(warning)) {
-        eprintln!("note: {}", warning.told(&scene.length_unit));
+        complain(&format!("note: {}", warning.told(&scene.length_unit)));
     }
 }
 

@@ -9,6 +9,7 @@ use model_offline::model::space::{SpaceBody, SpaceModel};
 use model_offline::number::{in_unit, short};
 use model_offline::output;
 use model_offline::output::space_picture::{self, SpaceGeometry, SpaceState};
+use model_offline::output::terminal::complain;
 use model_offline::output::vtu::{self, Shown, Sight};
 use model_offline::parallel;
 use model_offline::placement::space::workflow;
@@ -48,7 +49,7 @@ type Displaced = (usize, Vector3<f64>);
 pub(super) fn run(scene: &SpaceScene, args: SpaceArgs<'_>) -> Result<(), CliError> {
     let paddles = displaced(scene, args)?;
     if !args.quiet {
-        scene.notes.iter().for_each(|note| eprintln!("note: {note}"));
+        scene.notes.iter().for_each(|note| complain(&format!("note: {note}")));
     }
     let solved = parallel::within(args.threads, || solve(scene, &paddles, args));
     solved.map_err(|error| error.reported_of(args.json, &scene.name, scene.tissue()))

@@ -30,7 +30,7 @@ pub use together::{Together, end_between_results, together};
 pub use told::told;
 
 use destination::Destination;
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 /// A file that could not be written.
@@ -86,14 +86,33 @@ fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 /// # Errors
 /// [`OutputError`] names the folder.
 pub fn make_folder(path: &Path) -> Result<(), OutputError> {
-    std::fs::create_dir_all(path).map_err(|source| OutputError { path: path.to_owned(), source })
+    let fail = |error: io::Error| match error.kind() {
+        io::ErrorKind::AlreadyExists => {
+            io::Error::new(error.kind(), "a file of that name is where a folder is to be: name another")
+        }
+        _ => error,
+    };
+    std::fs::create_dir_all(path).map_err(|error| OutputError { path: path.to_owned(), source: fail(error) })
 }
 
 #[cfg(all(test, unix))]
 mod tests {
-    use super::write_whole;
+    use super::{make_folder, write_whole};
     use std::fs;
     use std::os::unix::fs::{PermissionsExt as _, symlink};
+
+    #[test]
+    fn a_folder_is_not_made_where_a_file_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let taken = folder.path().join("taken");
+        fs::write(&taken, "kept").unwrap();
+        let refused = make_folder(&taken).unwrap_err().to_string();
+        assert!(refused.contains("taken: a file of that name is where a folder is to be: name another"), "{refused}");
+        assert_eq!(fs::read_to_string(&taken).unwrap(), "kept");
+        // One that is there already serves.
+        make_folder(&folder.path().join("a/b")).unwrap();
+        make_folder(&folder.path().join("a")).unwrap();
+    }
 
     #[test]
     fn a_link_stays_and_what_is_behind_it_is_replaced_whole() {

@@ -193,7 +193,7 @@ pub fn suggest(error: &clap::Error, word: &str, command: &clap::Command) {
         .map(|known| (strsim::osa_distance(word, known.get_name()), known.get_name()))
         .min_by_key(|(distance, _)| *distance);
     if let Some((1, name)) = nearest.filter(|_| !suggested) {
-        eprintln!("\n  tip: did you mean `{name}`?");
+        complain(&format!("\n  tip: did you mean `{name}`?"));
     }
 }
 

@@ -699,6 +699,21 @@ fn said(command: &mut Command, code: i32) -> (String, String) {
     (out, err.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" "))
 }
 
+/// A factor on the energy says nothing of an inclusion that has its own material, unless it has a factor, too.
+#[test]
+fn a_factor_of_one_is_not_told_of_a_material_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = "material = { model = \"neo-hookean\", lambda = 40.0, mu = 7.0 }";
+    for (keys, told) in [
+        (own.to_owned(), "own material, shear modulus 7 kPa at rest; area 400 mm²"),
+        (format!("{own}\nstiffness = 2.0"), "own material, shear modulus 7 kPa at rest, stiffness times 2; area"),
+    ] {
+        let scene = written(folder.path(), "own.toml", &text(&[("stiffness = 10.0", &keys)]));
+        let (out, _) = said(model_offline().arg("check").arg(&scene), 0);
+        assert!(out.contains(told), "{told}:\n{out}");
+    }
+}
+
 #[test]
 fn check_tells_numbers_and_warnings_as_text_and_as_json() {
     let folder = tempfile::tempdir().unwrap();

@@ -196,11 +196,18 @@ fn a_full_disk_is_told_once() {
     let said = String::from_utf8_lossy(&refused.get_output().stderr).into_owned();
     assert_eq!(said.matches("No space left").count(), 1, "{said}");
     // Where words cannot be said either, there is no panic.
-    for call in [&["check", "paper", "--json", "/dev/stdout"][..], &["check", "none.toml"]] {
+    let displaced = ["solve", "paper", "--paddle", "3", "--paddle-displacement=-0.12,0", "--depth", "0.001"];
+    for (call, code) in [
+        (&["check", "paper", "--json", "/dev/stdout"][..], 1),
+        (&["check", "none.toml"], 2),
+        // A note, which is all that is lost, and a tip.
+        (&displaced, 0),
+        (&["plaec", "paper"], 2),
+    ] {
         let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
         let program = assert_cmd::cargo::cargo_bin!("model-offline");
         let output = std::process::Command::new(program).args(call).stderr(full).output().unwrap();
-        assert!(matches!(output.status.code(), Some(1 | 2)), "{call:?}: {:?}", output.status);
+        assert_eq!(output.status.code(), Some(code), "{call:?}");
     }
 }
 

@@ -136,6 +136,12 @@ fn new_scenes_can_be_placed_at_once() {
         assert_eq!(Scene::read(&scene).unwrap().told_warnings(), [""; 0], "good as it is");
         model_offline().arg("place").arg(&scene).assert().success();
         model_offline().args(["new", "-o"]).arg(&scene).assert().code(2);
+        // What is written flows into another program: nothing is there to be replaced.
+        let flows = model_offline().args(["new", "-o", "/dev/stdout"]).args(arguments).args(input).assert().success();
+        let flowed = String::from_utf8(flows.get_output().stdout.clone()).unwrap();
+        Scene::parse(&flowed, "flowed").unwrap();
+        let said = String::from_utf8_lossy(&flows.get_output().stderr).into_owned();
+        assert!(!flowed.contains("stdout") && !said.contains("stdout"), "{flowed}\n{said}");
     };
     from(&[], None);
     from(&["--size", "120", "--svg"], Some(&drawing));

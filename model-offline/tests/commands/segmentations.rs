@@ -169,3 +169,21 @@ discretization.level = 0
         assert!((found / expected - 1.0).abs() < 1e-3, "{axes:?} {target:?}: {found}, not {expected}");
     }
 }
+
+#[test]
+fn an_inclusion_of_a_material_of_its_own_says_which() {
+    let folder = tempfile::tempdir().unwrap();
+    let own = "material = { model = \"neo-hookean\", lambda = 40.0, mu = 7.0 }";
+    for (keys, told) in [
+        (own.to_owned(), "inclusion 1 own material, shear modulus 7 kPa at rest; volume"),
+        (
+            format!("{own}, stiffness = 2.0"),
+            "inclusion 1 own material, shear modulus 7 kPa at rest, stiffness times 2; volume",
+        ),
+        ("stiffness = 10.0".to_owned(), "inclusion 1 stiffness times 10; volume"),
+    ] {
+        let scene = scene("mm", [25.0, 25.0, 17.5]).replacen("stiffness = 10.0", &keys, 1);
+        let (code, said, _) = check(&scene, &image(&[]), folder.path());
+        assert!(code == 0 && said.contains(told), "{told}:\n{said}");
+    }
+}

@@ -96,6 +96,40 @@ fn assert_functions_fit(name: &str) {
     assert!(found.is_empty(), "{name}:\n{}", found.join("\n"));
 }
 
+/// Places of a crate's sources, tests left out, where what is printed ends the program if it cannot be.
+fn printed(src: &Path) -> Vec<String> {
+    let mut files = Crate::read(src, "lib.rs").files;
+    if src.join("main.rs").exists() {
+        files.extend(Crate::read(src, "main.rs").files);
+    }
+    let mut found = Vec::new();
+    for file in files {
+        let text = std::fs::read_to_string(src.join(&file.path)).unwrap();
+        let own = text.lines().take_while(|line| *line != "#[cfg(test)]").enumerate();
+        let code = own.filter(|(_, line)| !line.trim_start().starts_with("//"));
+        let prints = |line: &str| ["print!(", "println!("].iter().any(|print| line.contains(print));
+        found.extend(code.filter(|(_, line)| prints(line)).map(|(n, _)| format!("{}:{}", file.path.display(), n + 1)));
+    }
+    found
+}
+
+/// `println!` and `eprintln!` panic where a disk is full: `say!`, `tell!` and `complain` do not.
+#[test]
+fn nothing_that_is_said_ends_a_program() {
+    for name in ["firmware", "model-offline", "host-sim"] {
+        let found = printed(&src(name));
+        assert!(found.is_empty(), "{name}: {found:?}");
+    }
+    let says = [
+        (
+            "lib.rs",
+            "mod a;\n/// println!()\npub fn f() { a::g() }\n#[cfg(test)]\nmod tests { fn h() { print!(\"\") } }",
+        ),
+        ("a.rs", "pub fn g() {\n    eprintln!();\n}"),
+    ];
+    assert_eq!(printed(planted(&says).path()), ["a.rs:2"]);
+}
+
 #[test]
 fn no_imports_of_host_sim_run_in_a_circle() {
     assert_no_circles("host-sim");

@@ -4,6 +4,7 @@ mod interactive;
 
 use super::error::CliError;
 use model_offline::output;
+use model_offline::output::terminal::complain;
 use model_offline::reading;
 use model_offline::scene::import::{ImportError, ImportOptions, Imported, gmsh, svg};
 use model_offline::scene::space::{self, AnyScene};
@@ -68,14 +69,15 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
     }
     // Before anybody is asked anything.
     if let Some(path) = &args.output {
-        if path.exists() && !args.force {
+        if path.exists() && !output::is_stream(path) && !args.force {
             return Err(usage(format!("{} is there already", path.display()), "name another file, or add --force"));
         }
         let inputs: Vec<&Path> = args.svg.iter().chain(&args.msh).map(PathBuf::as_path).collect();
         output::check_outputs(&inputs, &[("--output", Some(path))])?;
     }
     let stem = |path: &PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let source = args.output.as_ref().or(args.svg.as_ref()).or(args.msh.as_ref());
+    let file = args.output.as_ref().filter(|path| !output::is_stream(path));
+    let source = file.or(args.svg.as_ref()).or(args.msh.as_ref());
     let name = args.name.clone().or_else(|| source.and_then(stem)).unwrap_or_else(|| "my-scene".to_owned());
     let names = StarterNames { name, length: args.length.clone(), stress: args.stress.clone() };
     let (text, summary) = match args.svg.as_ref().or(args.msh.as_ref()) {
@@ -86,16 +88,18 @@ pub(super) fn run(args: &NewArgs) -> Result<(), CliError> {
     };
     // A suggestion that validation refuses would only be found out by the next command.
     AnyScene::parse(&text, "<new scene>")?;
-    match &args.output {
-        None => {
-            tell!("{text}");
-            eprint!("{summary}");
+    let Some(file) = file else {
+        match &args.output {
+            None => tell!("{text}"),
+            Some(stream) => output::write_whole(stream, text.as_bytes())?,
         }
-        Some(path) => {
-            output::write_whole(path, text.as_bytes())?;
-            say!("{summary}{}\nnext: model-offline check {0}, draw it, then model-offline place {0}", path.display());
+        if !summary.is_empty() {
+            complain(summary.trim_end());
         }
-    }
+        return Ok(());
+    };
+    output::write_whole(file, text.as_bytes())?;
+    say!("{summary}{}\nnext: model-offline check {0}, draw it, then model-offline place {0}", file.display());
     Ok(())
 }
 

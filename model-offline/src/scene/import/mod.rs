@@ -107,13 +107,18 @@ impl ImportedNeedle {
     }
 }
 
+/// Where something is wrong, if it is on a line.
+fn at_line(line: usize) -> String {
+    if line == 0 { String::new() } else { format!("line {line}: ") }
+}
+
 /// Why a file gives no scene.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ImportError {
     /// The file is not what its name says.
-    #[error("line {line}: {what}")]
+    #[error("{}{what}", at_line(*line))]
     Syntax {
-        /// Line, from 1.
+        /// Line, from 1; 0 where what is wrong is on none of them.
         line: usize,
         /// What is wrong there.
         what: String,

@@ -31,6 +31,9 @@ fn broken_meshes_are_refused() {
     assert!(matches!(from(""), Err(ImportError::NoOutline(_))));
     assert!(from(&V2[..150]).is_err());
     assert!(matches!(from(&V2.replace("5 2 2 7", "5 77 2 7")), Err(ImportError::Syntax { .. })));
+    // No line is to blame.
+    let missing = from(&V2.replace("3 4 0 0", "33 4 0 0")).unwrap_err().to_string();
+    assert!(missing.starts_with("node 3 is used and not given"), "{missing}");
     assert!(matches!(from(&V2.replace("5 2 2 7", "5 2 9000000000 7")), Err(ImportError::Syntax { .. })));
     assert!(matches!(
         from(&V2.replace("\n6\n1 0 0 0", "\n18446744073709551615\n1 0 0 0")),
