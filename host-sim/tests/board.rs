@@ -254,9 +254,9 @@ fn a_whole_insertion_on_the_cortex_m7_is_bit_identical() {
     }
 }
 
-/// `run` of `scan` with these pairs on homogeneous tissue in half a second, with the controller on a board.
+/// `run` of a coarse `scan` with these pairs on homogeneous tissue in half a second, with the controller on a board.
 fn run_in_space(folder: &Path, pairs: &str, options: &[&str]) -> std::process::Output {
-    let scene = scenes::with_pairs(folder, pairs);
+    let scene = scenes::quick_with_pairs(folder, pairs);
     std::process::Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
         .args(["run", "--quiet", "--tissue", "homogeneous", "--insertion-time", "0.5"])
         .args(options)

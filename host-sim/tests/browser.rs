@@ -293,7 +293,7 @@ fn the_live_view_shows_pauses_steps_and_obeys_its_knobs() {
 fn a_body_in_space_moves_in_the_live_view_and_is_turned() {
     let Some(browser) = Browser::start() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let scene = scenes::with_pairs(folder.path(), "[[5, 6]]");
+    let scene = scenes::quick_with_pairs(folder.path(), "[[5, 6]]");
     let (mut simulation, address, mut said) = live_of(&scene, folder.path());
     browser.look(1280, 1000, "light");
     browser.open(&address);

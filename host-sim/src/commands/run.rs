@@ -38,7 +38,7 @@ pub(crate) struct RunArgs {
     /// Tissue that the planner and the table believe in [default: the simulation's]
     #[arg(long, value_enum)]
     pub(crate) table_tissue: Option<TissueVariant>,
-    /// Controller table to use instead of computing one
+    /// Controller table to use instead of computing one, in the plane
     #[arg(long, value_name = "FILE", conflicts_with = "table_tissue")]
     pub(crate) table: Option<PathBuf>,
     /// Use a table of another scene all the same; the report says so

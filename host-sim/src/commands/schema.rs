@@ -9,7 +9,7 @@ use schemars::schema_for;
 /// What a schema is about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Subject {
-    /// `run --json`, `result.json`
+    /// `run --json`, `result.json` of a scene in the plane
     #[default]
     Result,
     /// `timing --json`

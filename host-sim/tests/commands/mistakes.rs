@@ -116,7 +116,7 @@ paths = [[[0, 0], [0.12, 0]]]
 [needle]
 contact = [[0.095, 0.08], [0.08, 0.08]]
 axis = [0.0, -1.0]
-depth = 0.006
+depth = 0.002
 increments = 10
 
 [target]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
-use crate::scenes::with_pairs;
+use crate::scenes::{quick_with_pairs, with_pairs};
 use host_sim::record::recording::{Record, Recording};
 use host_sim::runtime::accounting::tick::ControllerTick;
 use host_sim::runtime::executor::AnyTable;
@@ -151,20 +151,20 @@ fn bodies_are_where_needle_and_paddles_are(page: &str, result: &Value) {
 fn an_insertion_follows_its_seed() {
     let series = |directory: &Path| result(directory)["cases"][0]["dynamic"]["series"].clone();
     let other = tempfile::tempdir().unwrap();
-    let scene = with_pairs(other.path(), "[[5, 6]]");
+    let scene = quick_with_pairs(other.path(), "[[5, 6]]");
     let output = run_scene(&scene, other.path(), &[&SHORT_OPTIONS[..], &["--seed", "2"]].concat());
     assert!(output.status.success(), "{output:?}");
     // That the same seed gives the same, bit by bit, is seen where one process does what two did.
     assert_ne!(series(other.path()), series(&SHORT));
 }
 
-/// A short insertion of the pair 5 + 6 in `scan`, homogeneous, seed 1.
+/// A short insertion of the pair 5 + 6 into a coarse `scan`, homogeneous, seed 1.
 const SHORT_OPTIONS: [&str; 6] = ["--tissue", "homogeneous", "--insertion-time", "0.5", "--mode", "lockstep"];
 
 /// The folder of that run, which several tests look at and none changes: scene, report and result.
 static SHORT: LazyLock<PathBuf> = LazyLock::new(|| {
     let directory = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap().keep();
-    let scene = with_pairs(&directory, "[[5, 6]]");
+    let scene = quick_with_pairs(&directory, "[[5, 6]]");
     let output = run_scene(&scene, &directory, &SHORT_OPTIONS);
     assert!(output.status.success(), "{output:?}");
     directory

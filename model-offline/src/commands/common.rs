@@ -288,6 +288,15 @@ pub(super) fn paddle_index(text: &str) -> Result<u32, std::num::ParseIntError> {
 /// Paddles farther from rest than this many sizes of the body are none.
 const FARTHEST: f64 = 10.0;
 
+/// A depth in the body of this size, as a scene's own has to be.
+pub(super) fn check_depth(depth: f64, size: f64) -> Result<(), CliError> {
+    if depth <= size {
+        return Ok(());
+    }
+    let message = format!("--depth is {depth}, larger than the whole body ({})", short(size));
+    Err(CliError::usage(message, "check the units of the depth"))
+}
+
 /// Refuses displacements of paddles, length units, that no body of this size can be meant to bear.
 ///
 /// # Errors

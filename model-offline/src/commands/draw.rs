@@ -23,8 +23,8 @@ pub(super) struct DrawArgs {
     /// Where to write the picture: a .svg, .png or .pdf file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// What the colours of a result show; a result is a .json file of `solve --json`, `place --json` or `host-sim run` in place
-    /// of a scene.
+    /// What the colours of a result show; a result is a .json file of `place --json` or, in the plane, of `solve --json` or
+    /// `host-sim run`, in place of a scene.
     #[arg(long, value_parser = PossibleValuesParser::new(Field::ALL.map(|(name, _)| name)).try_map(|name| field(&name)))]
     field: Option<Field>,
     /// Number of the case of a result of `host-sim run` [default: 1]

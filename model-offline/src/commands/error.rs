@@ -150,7 +150,7 @@ impl CliError {
             Self::Scene(_) | Self::Refused(_) | Self::Usage { .. } | Self::BadTable { .. } => 2,
             Self::Slice(SliceError::NotFree { .. } | SliceError::OnLine { .. }) => 2,
             Self::Model(error) if error.is_usage() => 2,
-            Self::Table(TableBuildError::Knots(_)) => 2,
+            Self::Table(TableBuildError::Knots(_) | TableBuildError::Paddles(_)) => 2,
             Self::Needle(NeedleError::HeldWeakly) | Self::Picture(PictureError::Format { .. }) | Self::Result(_) => 2,
             _ => 1,
         }

@@ -93,6 +93,7 @@ pub(super) fn run(args: &SolveArgs) -> Result<(), CliError> {
         }
     };
     common::check_displacements(displacement.as_slice(), scene.outline.size())?;
+    common::check_depth(args.depth, scene.outline.size())?;
     if !args.dwell.is_finite() || args.dwell < 0.0 {
         return Err(CliError::usage(format!("--dwell is {}", args.dwell), "give seconds, 0 or more"));
     }

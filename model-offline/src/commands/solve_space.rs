@@ -1,6 +1,6 @@
 //! `model-offline solve` of a scene in space: one equilibrium, with as many paddles as are named.
 
-use super::common::{StudyProgress, check_displacements};
+use super::common::{StudyProgress, check_depth, check_displacements};
 use super::error::CliError;
 use super::for_paraview::ForParaView;
 use super::json::write_json;
@@ -47,6 +47,7 @@ pub(super) struct SpaceArgs<'a> {
 type Displaced = (usize, Vector3<f64>);
 
 pub(super) fn run(scene: &SpaceScene, args: SpaceArgs<'_>) -> Result<(), CliError> {
+    check_depth(args.depth, scene.size())?;
     let paddles = displaced(scene, args)?;
     if !args.quiet {
         scene.notes.iter().for_each(|note| complain(&format!("note: {note}")));

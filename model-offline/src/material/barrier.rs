@@ -1,7 +1,7 @@
 //! A volumetric barrier that any law can be given.
 
 use super::error::{MaterialError, not_negative};
-use super::kinematics::{Matrix, Tensor4, determinant, indices, inverse_transpose};
+use super::kinematics::{Matrix, Tensor4, determinant, inverse_transpose, tensor4};
 use super::material::Response;
 use serde::Serialize;
 
@@ -36,9 +36,10 @@ impl Barrier {
         let j = determinant(&f);
         let log = j.ln();
         let g = inverse_transpose(&f, j);
-        for (i, jj, k, l) in indices::<D>() {
-            tangent[i][jj][k][l] +=
-                self.beta * (3.0 * log * log * g[(i, jj)] * g[(k, l)] - log.powi(3) * g[(i, l)] * g[(k, jj)]);
-        }
+        let added: Tensor4<D> = tensor4(|i, jj, k, l| {
+            self.beta * (3.0 * log * log * g[(i, jj)] * g[(k, l)] - log.powi(3) * g[(i, l)] * g[(k, jj)])
+        });
+        let entries = tangent.as_flattened_mut().as_flattened_mut().as_flattened_mut();
+        entries.iter_mut().zip(added.as_flattened().as_flattened().as_flattened()).for_each(|(sum, part)| *sum += part);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite, not_negative};
-use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, zero4};
+use super::kinematics::{Matrix, Tensor4, green_lagrange, tensor4};
 use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::{MaterialSection, required, unused};
@@ -60,16 +60,14 @@ impl<const D: usize> Material<D> for Fung {
         let pk2 = identity * (l * trace) + e * (2.0 * m);
         // F C F for C = l I⊗I + 2m 𝕀 + 2 e^Q g⊗g, written out: no fourth-order product.
         let (fg, ff) = (f * g, f * f.transpose());
-        let mut a = zero4::<D>();
-        for (i, j, k, n) in indices::<D>() {
+        tensor4(|i, j, k, n| {
             let geometric = if i == k { pk2[(j, n)] } else { 0.0 };
             let shear = if j == n { ff[(i, k)] } else { 0.0 };
-            a[i][j][k][n] = geometric
+            geometric
                 + l * f[(i, j)] * f[(k, n)]
                 + m * (shear + f[(i, n)] * f[(k, j)])
-                + 2.0 * exponential * fg[(i, j)] * fg[(k, n)];
-        }
-        a
+                + 2.0 * exponential * fg[(i, j)] * fg[(k, n)]
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::catalogue::Catalogued;
 use super::error::{MaterialError, not_negative};
-use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, push_forward, zero4};
+use super::kinematics::{Matrix, Tensor4, green_lagrange, push_forward, tensor4};
 use super::lame::LameParameters;
 use super::material::{Material, Response, is_negative_somewhere, stable_at_rest};
 use super::section::{MaterialSection, TensorEntry, unused};
@@ -39,7 +39,7 @@ impl FungTensors {
 }
 
 fn gather(entries: &[TensorEntry]) -> Result<Tensor4<2>, MaterialError> {
-    let mut t: Tensor4<2> = zero4();
+    let mut t = [[[[0.0; 2]; 2]; 2]; 2];
     for &(i, j, k, l, value) in entries {
         if [i, j, k, l].iter().any(|&x| x > 1) {
             return Err(MaterialError::Index(i, j, k, l));
@@ -54,13 +54,8 @@ fn gather(entries: &[TensorEntry]) -> Result<Tensor4<2>, MaterialError> {
 
 /// Averages a tensor over ij ↔ ji, kl ↔ lk and ij ↔ kl.
 fn symmetrised(t: &Tensor4<2>) -> Tensor4<2> {
-    let mut out: Tensor4<2> = zero4();
-    for (i, j, k, l) in indices::<2>() {
-        let minor =
-            |a: usize, b: usize, c: usize, d: usize| t[a][b][c][d] + t[b][a][c][d] + t[a][b][d][c] + t[b][a][d][c];
-        out[i][j][k][l] = (minor(i, j, k, l) + minor(k, l, i, j)) / 8.0;
-    }
-    out
+    let minor = |a: usize, b: usize, c: usize, d: usize| t[a][b][c][d] + t[b][a][c][d] + t[a][b][d][c] + t[b][a][d][c];
+    tensor4(|i, j, k, l| (minor(i, j, k, l) + minor(k, l, i, j)) / 8.0)
 }
 
 /// T:E; not a number outside the plane, where the tensors say nothing.
@@ -90,11 +85,9 @@ impl<const D: usize> Material<D> for FungTensors {
         let e = green_lagrange(h);
         let (ae, ce) = (contract(&self.a, &e), contract(&self.c_tensor, &e));
         let exponential = self.c * ce.dot(&e).exp();
-        let mut c = zero4::<D>();
-        for (i, j, k, l) in indices::<D>() {
-            c[i][j][k][l] =
-                self.a[i][j][k][l] + exponential * (self.c_tensor[i][j][k][l] + 2.0 * ce[(i, j)] * ce[(k, l)]);
-        }
+        let c = tensor4(|i, j, k, l| {
+            self.a[i][j][k][l] + exponential * (self.c_tensor[i][j][k][l] + 2.0 * ce[(i, j)] * ce[(k, l)])
+        });
         push_forward(&f, &(ae + ce * exponential), &c)
     }
 

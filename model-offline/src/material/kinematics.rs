@@ -1,6 +1,7 @@
 //! Strain measures and the small algebra of 1 to 3 dimensions that laws are written in.
 
 use nalgebra::SMatrix;
+use std::array::from_fn;
 
 /// A D × D matrix.
 pub type Matrix<const D: usize> = SMatrix<f64, D, D>;
@@ -50,27 +51,21 @@ pub(super) fn inverse_transpose<const D: usize>(f: &Matrix<D>, j: f64) -> Matrix
     cofactors(f) / j
 }
 
-/// The tensor of zeros.
-pub(super) fn zero4<const D: usize>() -> Tensor4<D> {
-    [[[[0.0; D]; D]; D]; D]
-}
-
-/// All index quadruples (i, j, k, l), the last running fastest.
-pub(super) fn indices<const D: usize>() -> impl Iterator<Item = (usize, usize, usize, usize)> {
-    (0..D * D * D * D).map(|n| (n / (D * D * D), n / (D * D) % D, n / D % D, n % D))
+/// The tensor of these entries, in loops of constant length: assembly spends much of its time here.
+#[inline(always)]
+pub(super) fn tensor4<const D: usize>(entry: impl Fn(usize, usize, usize, usize) -> f64) -> Tensor4<D> {
+    from_fn(|i| from_fn(|j| from_fn(|k| from_fn(|l| entry(i, j, k, l)))))
 }
 
 /// A_iJkL = δ_ik S_JL + F_iM C_MJNL F_kN.
 pub(super) fn push_forward<const D: usize>(f: &Matrix<D>, pk2: &Matrix<D>, c: &Tensor4<D>) -> Tensor4<D> {
-    let mut a = zero4::<D>();
-    for (i, j, k, l) in indices::<D>() {
+    tensor4(|i, j, k, l| {
         let mut sum = if i == k { pk2[(j, l)] } else { 0.0 };
         for m in 0..D {
             for n in 0..D {
                 sum += f[(i, m)] * c[m][j][n][l] * f[(k, n)];
             }
         }
-        a[i][j][k][l] = sum;
-    }
-    a
+        sum
+    })
 }

@@ -2,7 +2,7 @@
 
 use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite};
-use super::kinematics::{Matrix, Tensor4, indices, zero4};
+use super::kinematics::{Matrix, Tensor4, tensor4};
 use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::MaterialSection;
@@ -39,13 +39,10 @@ impl<const D: usize> Material<D> for Linear {
     }
 
     fn tangent(&self, _: &Matrix<D>) -> Tensor4<D> {
-        let mut a = zero4::<D>();
-        for (i, j, k, l) in indices::<D>() {
-            let delta = |p: usize, q: usize| if p == q { 1.0 } else { 0.0 };
-            a[i][j][k][l] = self.lambda * delta(i, j) * delta(k, l)
-                + self.mu * (delta(i, k) * delta(j, l) + delta(i, l) * delta(j, k));
-        }
-        a
+        let delta = |p: usize, q: usize| if p == q { 1.0 } else { 0.0 };
+        tensor4(|i, j, k, l| {
+            self.lambda * delta(i, j) * delta(k, l) + self.mu * (delta(i, k) * delta(j, l) + delta(i, l) * delta(j, k))
+        })
     }
 }
 

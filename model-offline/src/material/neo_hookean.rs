@@ -2,7 +2,7 @@
 
 use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite};
-use super::kinematics::{Matrix, Tensor4, determinant, dilation, indices, inverse_transpose, zero4};
+use super::kinematics::{Matrix, Tensor4, determinant, dilation, inverse_transpose, tensor4};
 use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::MaterialSection;
@@ -51,18 +51,14 @@ impl<const D: usize> Material<D> for NeoHookean {
         let g = inverse_transpose(&f, j);
         let trace = f.norm_squared() + (3 - D) as f64;
         let factor = mu * j.powf(-2.0 / 3.0);
-        let pressure = 0.5 * kappa * (j * j - 1.0);
-        let mut a = zero4::<D>();
-        for (i, jj, k, l) in indices::<D>() {
-            let identity = if i == k && jj == l { 1.0 } else { 0.0 };
-            let swap = g[(i, l)] * g[(k, jj)];
-            a[i][jj][k][l] = factor
-                * (identity - 2.0 / 3.0 * (f[(i, jj)] * g[(k, l)] + g[(i, jj)] * f[(k, l)])
-                    + trace / 3.0 * (swap + 2.0 / 3.0 * g[(i, jj)] * g[(k, l)]))
-                + kappa * j * j * g[(i, jj)] * g[(k, l)]
-                - pressure * swap;
-        }
-        a
+        // What multiplies g ⊗ g is shared out between the two sides of f ⊗ g + g ⊗ f: a third of the products remain.
+        let both = factor * trace * 2.0 / 9.0 + kappa * j * j;
+        let swap = factor * trace / 3.0 - 0.5 * kappa * (j * j - 1.0);
+        let e = g * (0.5 * both) - f * (2.0 / 3.0 * factor);
+        tensor4(|i, j, k, l| {
+            let identity = if i == k && j == l { factor } else { 0.0 };
+            identity + (e[(i, j)] * g[(k, l)] + g[(i, j)] * e[(k, l)]) + swap * (g[(i, l)] * g[(k, j)])
+        })
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::catalogue::Catalogued;
 use super::error::{MaterialError, finite};
-use super::kinematics::{Matrix, Tensor4, green_lagrange, indices, zero4};
+use super::kinematics::{Matrix, Tensor4, green_lagrange, tensor4};
 use super::lame::{LameParameters, lambda};
 use super::material::{Material, Response};
 use super::section::MaterialSection;
@@ -37,13 +37,11 @@ impl<const D: usize> Material<D> for SaintVenantKirchhoff {
         let e = green_lagrange(h);
         let pk2 = Matrix::<D>::identity() * (self.lambda * e.trace()) + e * (2.0 * self.mu);
         let left_cauchy_green = f * f.transpose();
-        let mut a = zero4::<D>();
-        for (i, j, k, l) in indices::<D>() {
+        tensor4(|i, j, k, l| {
             let geometric = if i == k { pk2[(j, l)] } else { 0.0 };
             let shear = if j == l { left_cauchy_green[(i, k)] } else { 0.0 };
-            a[i][j][k][l] = geometric + self.lambda * f[(i, j)] * f[(k, l)] + self.mu * (shear + f[(i, l)] * f[(k, j)]);
-        }
-        a
+            geometric + self.lambda * f[(i, j)] * f[(k, l)] + self.mu * (shear + f[(i, l)] * f[(k, j)])
+        })
     }
 }
 

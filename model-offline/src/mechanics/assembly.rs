@@ -136,35 +136,43 @@ pub fn tangent<const D: usize>(
     let Medium { rule, stabilisation, tissue, prestress } = medium;
     let mut next = 0;
     for (q, (point, h)) in rule.points().zip(&state.gradients).enumerate() {
+        // a[l][k][m][i] = A_imkl: what a column sums over is outermost, what an entry of a block varies over runs fastest.
         let mut a = [[[[0.0; D]; D]; D]; D];
         for (material, factor) in tissue.parts(point.cell) {
             let part = material.tangent(h);
             let scale = point.weight * factor;
-            for (sum, row) in a.iter_mut().flatten().flatten().flatten().zip(part.iter().flatten().flatten().flatten())
-            {
-                *sum += scale * row;
+            for (l, of_l) in a.iter_mut().enumerate() {
+                for (k, of_k) in of_l.iter_mut().enumerate() {
+                    for (m, of_m) in of_k.iter_mut().enumerate() {
+                        of_m.iter_mut().zip(&part).for_each(|(sum, part)| *sum += scale * part[m][k][l]);
+                    }
+                }
             }
         }
         if let Some(pk2) = prestress.geometric(q) {
-            for (i, of_row) in a.iter_mut().enumerate() {
-                for (j, of_column) in of_row.iter_mut().enumerate() {
-                    of_column[i].iter_mut().enumerate().for_each(|(l, entry)| *entry += pk2[(j, l)]);
+            for (l, of_l) in a.iter_mut().enumerate() {
+                for (k, of_k) in of_l.iter_mut().enumerate() {
+                    of_k.iter_mut().enumerate().for_each(|(m, of_m)| of_m[k] += pk2[(m, l)]);
                 }
             }
         }
         for (column, (&j, gj)) in point.nodes.iter().zip(point.gradients).enumerate() {
-            // t[k][i][m] = A_imkl g_J,l: shared by all rows of this column.
-            let t: [[[f64; D]; D]; D] = std::array::from_fn(|k| {
-                std::array::from_fn(|i| std::array::from_fn(|m| (0..D).map(|l| a[i][m][k][l] * gj[l]).sum()))
-            });
+            // t[k][m][i] = A_imkl g_J,l: shared by all rows of this column.
+            let mut t = [[[0.0; D]; D]; D];
+            for (of_l, g) in a.iter().zip(gj) {
+                let (t, of_l) = (t.as_flattened_mut().as_flattened_mut(), of_l.as_flattened().as_flattened());
+                t.iter_mut().zip(of_l).for_each(|(t, a)| *t += a * g);
+            }
             let stride = blocks.strides[j as usize] as usize;
             let rows = &point.gradients[column..];
             for (gi, &at) in rows.iter().zip(&blocks.positions[next..next + rows.len()]) {
                 for (k, t) in t.iter().enumerate() {
                     let start = at as usize + k * stride;
-                    for (entry, t) in values[start..start + D].iter_mut().zip(t) {
-                        *entry += (0..D).map(|m| gi[m] * t[m]).sum::<f64>();
+                    let mut block = [0.0; D];
+                    for (t, g) in t.iter().zip(gi) {
+                        block.iter_mut().zip(t).for_each(|(entry, t)| *entry += g * t);
                     }
+                    values[start..start + D].iter_mut().zip(block).for_each(|(entry, new)| *entry += new);
                 }
             }
             next += rows.len();

@@ -351,6 +351,7 @@ impl ModelError {
             Self::ToleranceIsNoResolution
                 | Self::NoSpacing
                 | Self::NoSuchPaddle(_)
+                | Self::SamePaddle { .. }
                 | Self::NitscheInside
                 | Self::ImposedWeakly
                 | Self::RelaxesHeldWeakly

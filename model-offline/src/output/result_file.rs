@@ -61,6 +61,15 @@ pub enum ResultError {
         /// Why.
         reason: String,
     },
+    /// It is of a body in space.
+    #[error("{}: a result in space, of which only those of `place --json` are drawn", path.display())]
+    #[diagnostic(help(
+        "its bodies move in the report.html of `host-sim run`; `solve --vtu FILE` and `run --vtu` write them for ParaView; give the scene itself for a picture at rest"
+    ))]
+    InSpace {
+        /// The file.
+        path: PathBuf,
+    },
     /// What is asked for is not in it.
     #[error("{}: {what}", path.display())]
     #[diagnostic(help("{help}"))]
@@ -142,6 +151,9 @@ pub fn read_body(path: &Path, which: &Which) -> Result<ResultBody, ResultError> 
     let no_result =
         |error: serde_json::Error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() };
     let value = read_value(path)?;
+    if value.get("dimension").is_some_and(|dimension| *dimension == 3) {
+        return Err(ResultError::InSpace { path: path.to_owned() });
+    }
     let is_compared = value.get("cases").is_some();
     let body = if is_compared {
         compared(path, serde_json::from_value(value).map_err(no_result)?, which)?

@@ -2,6 +2,7 @@
 
 mod along_insertion;
 mod amplification;
+mod jumps;
 pub mod space;
 
 use self::amplification::largest_amplification;
@@ -79,6 +80,18 @@ pub enum TableBuildError {
         /// Why.
         source: ModelError,
     },
+    /// The tissue goes over to another equilibrium.
+    #[error(
+        "between depth {from:.4} and {to:.4} the tissue goes over to another equilibrium, as where a surface folds: the paddle's path ends {off:.2e} from where its slopes lead; a larger --spacing, a barrier in the material or more knots may go past it"
+    )]
+    Jump {
+        /// Depth of the knot before.
+        from: f64,
+        /// Depth of the knot behind.
+        to: f64,
+        /// Distance between where the path is there and where its slopes at both lead, length.
+        off: f64,
+    },
     /// The paddle would have to go farther than its actuator can.
     #[error(
         "holding the target at depth {depth:.4} takes a paddle displacement of {needed:.4}, the actuator has {available:.4}: raise [actuator] max_displacement or choose another paddle"
@@ -152,6 +165,14 @@ struct Followed<const D: usize, const P: usize> {
 }
 
 impl<const D: usize, const P: usize> Followed<D, P> {
+    /// These knots, before something; no table has fewer than two.
+    fn up_to(
+        knots: heapless::Vec<Knot<f64, D, P>, MAX_KNOTS>,
+        ended: TableBuildError,
+    ) -> Result<Self, TableBuildError> {
+        if knots.len() < 2 { Err(ended) } else { Ok(Self { knots, ended: Some(ended) }) }
+    }
+
     /// That they end early in an insertion so deep.
     fn ended(&mut self, wanted: f64) -> Option<EndedEarly> {
         let reached = self.knots.last().map_or(0.0, |knot| knot.depth);
@@ -294,6 +315,9 @@ fn knots_of_states(model: &TissueModel, position: usize, count: usize) -> Result
             Ok(knot) => {
                 // Before the next one, which may fail because of it.
                 check(&knot, paddle, available)?;
+                if let Some(Err(jump)) = knots.last().map(|last| jumps::refuse(last, &knot)) {
+                    return Followed::up_to(knots, jump);
+                }
                 // Capacity was checked before.
                 let _ = knots.push(knot);
             }

@@ -1,6 +1,6 @@
 //! Tables in space: one paddle or two that hold the target together.
 
-use super::{BuiltTable, Described, Followed, TableBuildError, TableOptions, to_bytes};
+use super::{BuiltTable, Described, Followed, TableBuildError, TableOptions, jumps, to_bytes};
 use crate::geometry::Implicit as _;
 use crate::model::space::SpaceBody;
 use crate::model::{ModelError, control_derivatives};
@@ -152,6 +152,9 @@ fn knots<const P: usize>(
                 let available = scene.actuator.max_displacement;
                 if needed > available {
                     return Err(TableBuildError::OutOfReach { depth, needed, available });
+                }
+                if let Some(Err(jump)) = knots.last().map(|last| jumps::refuse(last, &knot)) {
+                    return Followed::up_to(knots, jump);
                 }
                 // Capacity was checked before.
                 let _ = knots.push(knot);

@@ -47,6 +47,61 @@ fn place_reproduces_the_papers_optima_and_the_reference_measures() {
     }
 }
 
+/// An L of 80 mm with two stiff inclusions, whose surface folds beside the second paddle between 5.4 and 6 mm: every increment
+/// converges, and the state at 6 mm is far from the one before.
+const FOLDING: &str = r#"
+[scene]
+name = "folding"
+dimension = 2
+units = { length = "mm", stress = "kPa" }
+[domain]
+outline = [[0, 0], [80, 0], [80, 30], [30, 30], [30, 80], [0, 80]]
+[material]
+model = "neo-hookean"
+lambda = 9.0
+mu = 1.0
+[[inclusion]]
+outline = [[5, 40], [20, 38], [24, 55], [8, 58]]
+material = { model = "neo-hookean", lambda = 32.0, mu = 8.0 }
+[[inclusion]]
+outline = [[12, 70], [24, 70], [24, 80], [12, 80]]
+material = { model = "neo-hookean", lambda = 16.0, mu = 4.0 }
+[immobile]
+paths = [[[0, 0], [80, 0]]]
+[needle]
+contact = [[10, 80], [20, 80]]
+axis = [-0.2, -1]
+depth = 6.0
+increments = 6
+[target]
+position = [14, 45]
+[[paddle]]
+index = 2
+segment = [[0, 50], [0, 60]]
+[discretization]
+spacing = 1.75
+integration = "fem-t6"
+"#;
+
+#[test]
+fn a_table_ends_before_tissue_goes_over_to_another_equilibrium() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("folding.table");
+    std::fs::write(folder.path().join("folding.toml"), FOLDING).unwrap();
+    let mut command = model_offline();
+    command.args(["table", "folding.toml", "--knots", "8", "--paddle", "2", "-o"]).arg(&table);
+    let output = command.current_dir(folder.path()).assert().success();
+    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+    let told = "the table ends at depth 5.1429, of 6.0000 that the scene's needle goes: between depth 5.1429 and 6.0000 the tissue \
+                goes over to another equilibrium";
+    assert!(said.contains(told), "{said}");
+    let bytes = std::fs::read(&table).unwrap();
+    let table = firmware::decode::<f64, 2, 1, 1>(&bytes).unwrap();
+    assert_eq!(table.knots.len(), 7);
+    let steps: Vec<f64> = table.knots.windows(2).map(|k| (k[1].paddle_path - k[0].paddle_path).norm()).collect();
+    assert!(steps.windows(2).all(|s| s[1] < 2.0 * s[0]), "{steps:?}");
+}
+
 /// `| head` and a full disk. Nobody reads the first, and the files are wanted all the same; the second loses what was said.
 #[test]
 fn standard_output_may_be_closed_but_not_be_full() {

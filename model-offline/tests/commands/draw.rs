@@ -82,6 +82,9 @@ fn what_is_no_result_or_not_in_it_is_refused() {
     };
     assert!(refused(&with(&|v| v["geometry"] = serde_json::Value::Null), &[]).contains("no result of"));
     assert!(refused(&with(&|v| *v = 3.into()), &[]).contains("no result of"));
+    // As `solve` and `run` write it of a body in space, which has nothing of what a planar one has.
+    let in_space = refused(&with(&|v| *v = serde_json::json!({"dimension": 3, "cases": []})), &[]);
+    assert!(in_space.contains("a result in space") && in_space.contains("report.html"), "{in_space}");
     let short = with(&|v| v["node_displacements"].as_array_mut().unwrap().truncate(5));
     assert!(refused(&short, &[]).contains("nodes has a place"));
     let short = with(&|v| v["strain"].as_array_mut().unwrap().truncate(5));

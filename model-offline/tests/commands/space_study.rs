@@ -112,6 +112,11 @@ fn what_cannot_be_is_refused_with_the_place_and_nothing_is_written() {
             "min = [5.0, 5.0, 5.0], max = [6.0, 6.0, 6.0]",
             "covers nothing",
         ),
+        (
+            "min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4]",
+            "min = [0.6, 0.4, 0.3], max = [0.60001, 0.40001, 0.30001]",
+            "this inclusion is 1.732e-5 across, in a body of 1.732",
+        ),
         ("index = 2", "index = 1", "given twice"),
         (
             "min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]",
@@ -162,6 +167,28 @@ fn options_and_commands_of_the_plane_say_so() {
     assert!(output.status.code() == Some(2) && said.contains("dimension = 3"), "{said}");
     let output = program().args(["place", "paper", "--integration", "fem-t10", "--quiet"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
+}
+
+#[test]
+fn paddles_and_depths_that_are_none_are_no_failed_computation() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("none.table");
+    for (words, expected) in [
+        ("table paper --paddle 1,2", "2 paddles asked for"),
+        ("table block --spacing 0.4 --integration fem-t4 --paddle 1,3,8", "3 paddles asked for"),
+        ("table block --spacing 0.4 --integration fem-t4 --paddle 1,1", "paddle 1 is named twice"),
+    ] {
+        let output = program().args(words.split(' ')).arg("-o").arg(&table).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.code() == Some(2) && said.contains(expected) && !table.exists(), "{words}: {said}");
+    }
+    // Beyond the body, whose scene may not go there either.
+    for (words, size) in [("solve paper --depth 2", "1.414"), ("solve block --depth 2", "1.732")] {
+        let output = program().args(words.split(' ')).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        let expected = format!("--depth is 2, larger than the whole body ({size})");
+        assert!(output.status.code() == Some(2) && said.contains(&expected), "{words}: {said}");
+    }
 }
 
 /// The unit cube as text STL, with as many of its twelve triangles as asked for.

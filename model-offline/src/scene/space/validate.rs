@@ -23,6 +23,8 @@ type Checked<T> = Result<T, SceneError>;
 
 /// Distances below this part of the body's size are rounding.
 const ROUNDING: f64 = 1e-9;
+/// Inclusions smaller than this part of the body, which elements would have to be graded down to, are slips.
+const TINY: f64 = 1e-4;
 /// Bodies are at least this long, and their coordinates at most so large, in units of the scene.
 const SMALLEST: f64 = 1e-12;
 const LARGEST: f64 = 1e12;
@@ -302,6 +304,15 @@ impl Validator<'_> {
         if section.stiffness.is_nan() || section.stiffness <= 0.0 || section.stiffness.is_infinite() {
             let message = format!("stiffness is {}", section.stiffness);
             return Err(self.error(located.span(), message, "stiffness must be a positive finite number"));
+        }
+        let across = |what: &dyn Implicit| what.bounds().map_or(f64::INFINITY, |(low, high)| (high - low).norm());
+        let (size, whole) = (across(region.as_ref()), across(body));
+        if size < TINY * whole {
+            return Err(self.error(
+                located.span(),
+                format!("this inclusion is {} across, in a body of {}", short(size), short(whole)),
+                "check its numbers and their unit, or remove it: nothing so small shows in what is computed",
+            ));
         }
         if !share(region.as_ref(), body, &|_| true) {
             return Err(self.error(
