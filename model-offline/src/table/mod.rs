@@ -82,7 +82,7 @@ pub enum TableBuildError {
     },
     /// The tissue goes over to another equilibrium.
     #[error(
-        "between depth {from:.4} and {to:.4} the tissue goes over to another equilibrium, as where a surface folds: the paddle's path ends {off:.2e} from where its slopes lead; a larger --spacing, a barrier in the material or more knots may go past it"
+        "between depth {from:.4} and {to:.4} the tissue goes over to another equilibrium, as where a surface folds: the paddle's path ends {off:.2e} from where its slopes lead; a larger --spacing or more knots may go past it"
     )]
     Jump {
         /// Depth of the knot before.

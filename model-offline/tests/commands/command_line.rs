@@ -91,7 +91,7 @@ fn a_table_ends_before_tissue_goes_over_to_another_equilibrium() {
     let mut command = model_offline();
     command.args(["table", "folding.toml", "--knots", "8", "--paddle", "2", "-o"]).arg(&table);
     let output = command.current_dir(folder.path()).assert().success();
-    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+    let said = String::from_utf8_lossy(&output.get_output().stdout).into_owned();
     let told = "the table ends at depth 5.1429, of 6.0000 that the scene's needle goes: between depth 5.1429 and 6.0000 the tissue \
                 goes over to another equilibrium";
     assert!(said.contains(told), "{said}");

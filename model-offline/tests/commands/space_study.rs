@@ -115,7 +115,7 @@ fn what_cannot_be_is_refused_with_the_place_and_nothing_is_written() {
         (
             "min = [0.6, 0.4, 0.3], max = [0.7, 0.6, 0.4]",
             "min = [0.6, 0.4, 0.3], max = [0.60001, 0.40001, 0.30001]",
-            "this inclusion is 1.732e-5 across, in a body of 1.732",
+            "this inclusion is 0.00001732 across, in a body of 1.732",
         ),
         ("index = 2", "index = 1", "given twice"),
         (
