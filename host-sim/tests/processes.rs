@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use host_sim::bench::result::RunResult;
 use host_sim::record::recording::Recording;
 use host_sim::report::directory::read_run;
+use serde_json::Value;
 
 fn host_sim() -> Command {
     Command::new(assert_cmd::cargo::cargo_bin!("host-sim"))
@@ -133,7 +135,23 @@ fn both_modes_account_for_everything() {
         let out = folder.path().join(mode);
         succeeded(&run(&out, &["--mode", mode]));
         let result = read_run(&out).unwrap();
+        // Other programs find the controlled paddle under one name, whatever drove its time.
+        let written: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
+        let written = &written["cases"][0]["strategies"];
+        assert!(written["dynamic"]["mode"] == mode && written["dynamic_free_run"].is_null(), "{mode}");
         let strategies = &result.cases[0].strategies;
+        assert_eq!(
+            (strategies.dynamic.is_some(), strategies.dynamic_free_run.is_some()),
+            (mode == "lockstep", mode != "lockstep")
+        );
+        // As older versions wrote it.
+        let mut older: Value = serde_json::from_slice(&std::fs::read(out.join("result.json")).unwrap()).unwrap();
+        if mode == "free-run" {
+            let strategies = older["cases"][0]["strategies"].as_object_mut().unwrap();
+            let dynamic = strategies.insert("dynamic".to_owned(), Value::Null).unwrap();
+            strategies.insert("dynamic_free_run".to_owned(), dynamic);
+        }
+        assert!(serde_json::from_value::<RunResult>(older).unwrap() == result);
         let dynamic = strategies.dynamic.as_ref().or(strategies.dynamic_free_run.as_ref()).unwrap();
         let ledger = dynamic.ledger.as_ref().unwrap();
         assert_eq!(ledger.unaccounted, 0, "{ledger:?}");

@@ -20,6 +20,7 @@ use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
 use model_offline::table::{BuiltTable, TableBuildError, TableOptions};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
@@ -55,7 +56,7 @@ const SERIES_POINTS: usize = 500;
 const CHECKS: usize = 20;
 
 /// A run on a body in space.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceRun {
     /// [`FORMAT`].
     pub format: u32,
@@ -104,7 +105,7 @@ impl SpaceRun {
 }
 
 /// Strategies on one tissue with one table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceCase {
     /// Tissue of the simulation.
     pub tissue: TissueVariant,
@@ -136,7 +137,7 @@ impl SpaceCase {
 }
 
 /// A table in short.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceTableResult {
     /// SHA-256 of its bytes.
     pub hash: String,
@@ -154,7 +155,7 @@ pub struct SpaceTableResult {
 }
 
 /// One simulated insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceStrategyResult {
     /// What drove time.
     pub mode: RunMode,
@@ -170,14 +171,17 @@ pub struct SpaceStrategyResult {
     pub paddle_travel: f64,
     /// State of the controller at the end; none without one.
     #[serde(with = "names::mode")]
+    #[schemars(with = "String")]
     pub final_state: Option<Mode>,
     /// Part of the ticks from the needle's start on that ended in RUN; none without a controller.
     pub run_share: Option<f64>,
     /// Every fault that was ever present.
     #[serde(with = "names::faults")]
+    #[schemars(with = "String")]
     pub faults: Faults,
     /// Faults of the ticks that did not end in RUN, from the needle's start on.
     #[serde(with = "names::faults")]
+    #[schemars(with = "String")]
     pub outside_run_for: Faults,
     /// Accounts of samples, commands and ticks over both processes; none without a controller.
     pub ledger: Option<LedgerResult>,
@@ -200,7 +204,7 @@ pub struct SpaceStrategyResult {
 }
 
 /// What answered for the tissue, and how well.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpacePlantAccount {
     /// How it was tabulated.
     pub tabulation: TabulationReport,
@@ -217,7 +221,7 @@ pub struct SpacePlantAccount {
 }
 
 /// A moment of an insertion.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceSeriesPoint {
     /// Time since the start of the needle, s.
     pub time_s: f64,

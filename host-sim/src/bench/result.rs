@@ -292,16 +292,47 @@ pub struct TableResult {
 
 /// What was compared. Absent strategies were not asked for.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(from = "WrittenStrategies", into = "WrittenStrategies")]
+#[schemars(with = "WrittenStrategies")]
 pub struct Strategies {
     /// No paddle.
     pub none: Option<StrategyResult>,
     /// The best static paddle of the table's tissue, held.
-    #[serde(rename = "static")]
     pub static_paddle: Option<StrategyResult>,
-    /// The table's paddle, controlled.
+    /// The table's paddle, controlled in lockstep.
     pub dynamic: Option<StrategyResult>,
     /// The same on the machine's clock.
     pub dynamic_free_run: Option<StrategyResult>,
+}
+
+/// The same in files, where `dynamic` is there whatever drove its time.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Strategies")]
+struct WrittenStrategies {
+    /// No paddle.
+    none: Option<StrategyResult>,
+    /// The best static paddle of the table's tissue, held.
+    #[serde(rename = "static")]
+    static_paddle: Option<StrategyResult>,
+    /// The table's paddle, controlled: in lockstep, or on the machine's clock where that alone was asked for.
+    dynamic: Option<StrategyResult>,
+    /// The same once more on the machine's clock, beside lockstep.
+    dynamic_free_run: Option<StrategyResult>,
+}
+
+impl From<Strategies> for WrittenStrategies {
+    fn from(strategies: Strategies) -> Self {
+        let Strategies { none, static_paddle, dynamic, mut dynamic_free_run } = strategies;
+        Self { none, static_paddle, dynamic: dynamic.or_else(|| dynamic_free_run.take()), dynamic_free_run }
+    }
+}
+
+impl From<WrittenStrategies> for Strategies {
+    fn from(written: WrittenStrategies) -> Self {
+        let WrittenStrategies { none, static_paddle, mut dynamic, dynamic_free_run } = written;
+        let alone = dynamic.take_if(|dynamic| dynamic.mode == RunMode::FreeRun);
+        Self { none, static_paddle, dynamic, dynamic_free_run: dynamic_free_run.or(alone) }
+    }
 }
 
 impl Strategies {

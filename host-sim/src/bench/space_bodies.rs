@@ -4,13 +4,14 @@ use model_offline::output::space_picture::{SpaceGeometry, SpaceState};
 use model_offline::placement::space::InsertionModel;
 use model_offline::solver::equilibrium::NewtonSettings;
 use nalgebra::Vector3;
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// States on the way of an insertion at which the body is solved: the path matters near the limits of stability.
 const ON_THE_WAY: usize = 5;
 
 /// Bodies of a run, and the body at rest that they have in common.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceBodies {
     /// At rest, with the scene's inclusions.
     pub geometry: SpaceGeometry,

@@ -10,4 +10,13 @@ pub mod paper;
 pub mod studies;
 pub mod terminal;
 
+use firmware::detection::DEPTH_MARGIN;
+
 pub use self::page::{Attachments, pictures, render, render_with, timing_histograms};
+
+/// What a controller does where its table ends before the needle does.
+const PAST_ITS_TABLE: &str =
+    "past the end of its table the controller goes on with the last knot, to twice that depth at most";
+
+// Needles further past the table's end are refused by the controller: as far as the table is long is "twice".
+const _: () = assert!(DEPTH_MARGIN == 1.0);

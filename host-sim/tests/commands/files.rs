@@ -8,6 +8,7 @@ use assert_cmd::Command as Checked;
 use host_sim::bench::result::RunResult;
 use model_offline::output::field_picture::Field;
 use model_offline::output::result_file::{Which, read_body};
+use serde_json::Value;
 
 fn host_sim() -> Checked {
     Checked::new(env!("CARGO_BIN_EXE_host-sim"))
@@ -187,12 +188,43 @@ fn check_script_named_paraview(report: &Path) {
     assert!(said.contains("this is simple"), "{said}");
 }
 
-/// `jsonschema` finds the result to be what its schema says.
-fn check_schema(folder: &Path) {
-    let schema = host_sim().args(["schema", "result"]).assert().success();
-    std::fs::write(folder.join("schema.json"), &schema.get_output().stdout).unwrap();
+/// The folder's `result.json` is what its schema says: `jsonschema` finds so, and no field has a name that is not in the schema.
+pub(crate) fn check_schema(folder: &Path, subject: &str) {
+    let schema = host_sim().args(["schema", subject]).assert().success();
+    let schema = &schema.get_output().stdout;
+    let [result, schema_of_result] =
+        [&std::fs::read(folder.join("result.json")).unwrap(), schema].map(|json| serde_json::from_slice(json).unwrap());
+    check_names("", &result, &schema_of_result, &schema_of_result);
+    let own = tempfile::tempdir().unwrap();
+    std::fs::write(own.path().join("schema.json"), schema).unwrap();
+    std::fs::copy(folder.join("result.json"), own.path().join("result.json")).unwrap();
     let program = "import json, jsonschema\njsonschema.validate(json.load(open('result.json')), json.load(open('schema.json')))\n";
-    python("jsonschema", folder, program);
+    python("jsonschema", own.path(), program);
+}
+
+/// Objects at `path` and below have the fields that `schema` names, and no others, as far as the schema names any.
+fn check_names(path: &str, value: &Value, schema: &Value, whole: &Value) {
+    if let Some(reference) = schema["$ref"].as_str() {
+        let definition = whole.pointer(&reference[1..]).unwrap_or_else(|| panic!("{path}: no {reference}"));
+        return check_names(path, value, definition, whole);
+    }
+    if let Some(choices) = schema["anyOf"].as_array() {
+        let fits = |choice: &&Value| (choice["type"] == "null") == value.is_null();
+        return check_names(path, value, choices.iter().find(fits).unwrap(), whole);
+    }
+    if let (Some(object), Some(properties)) = (value.as_object(), schema["properties"].as_object()) {
+        for required in schema["required"].as_array().into_iter().flatten() {
+            assert!(object.contains_key(required.as_str().unwrap()), "{path}: no {required}");
+        }
+        for (name, value) in object {
+            let schema = properties.get(name).unwrap_or_else(|| panic!("{path}: {name} is not in the schema"));
+            check_names(&format!("{path}/{name}"), value, schema, whole);
+        }
+    }
+    for (index, value) in value.as_array().into_iter().flatten().enumerate() {
+        let schema = if schema["prefixItems"].is_array() { &schema["prefixItems"][index] } else { &schema["items"] };
+        check_names(&format!("{path}/{index}"), value, schema, whole);
+    }
 }
 
 /// What `model-offline draw` makes pictures of: every strategy's body, at the depth that is asked for, with every field.
@@ -224,7 +256,7 @@ fn a_run_can_be_opened_elsewhere() {
     check_script(&report);
     check_script_named_paraview(&report);
     check_bodies(&report);
-    check_schema(folder.path());
+    check_schema(folder.path(), "result");
 }
 
 #[test]
@@ -237,7 +269,7 @@ fn completions_manuals_and_schemas_can_be_generated() {
     host_sim().arg("man").arg(folder.path().join("man1")).assert().success();
     let page = std::fs::read_to_string(folder.path().join("man1/host-sim-run.1")).unwrap();
     assert!(page.contains("table\\-tissue"), "{page}");
-    for of in ["result", "timing", "mcap"] {
+    for of in ["result", "result-in-space", "timing", "mcap"] {
         let said = host_sim().args(["schema", of]).assert().success();
         serde_json::from_slice::<serde_json::Value>(&said.get_output().stdout).unwrap();
     }

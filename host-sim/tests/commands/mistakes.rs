@@ -131,17 +131,17 @@ index = 3
 segment = [[0.025, 0.08], [0.04, 0.08]]
 
 [discretization]
-tolerance = 0.005
+spacing = 0.004
 integration = "fem-t6"
 "#;
 
 /// A run on two tissues says which of them it cannot have, and how it can have the other: the best paddle cannot hold the target
-/// in one of them; at a tenth of the tolerance the other is not known well enough.
+/// in one of them; at a tolerance of 0.05 % the other is not known well enough.
 #[test]
 fn a_tissue_that_cannot_be_simulated_is_named() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("concave.toml"), HARD_WITHOUT_INCLUSIONS).unwrap();
-    let harder = HARD_WITHOUT_INCLUSIONS.replace("tolerance = 0.005", "tolerance = 0.0005");
+    let harder = HARD_WITHOUT_INCLUSIONS.replace("spacing = 0.004", "tolerance = 0.0005");
     std::fs::write(folder.path().join("harder.toml"), harder).unwrap();
     let run = |scene: &str, more: &[&str]| {
         let words = "run --mode lockstep --insertion-time 0.1 --quiet --out report --scene";

@@ -58,5 +58,7 @@ fn where_the_learnt_neighbourhood_is_left_the_full_model_answers() {
     // The table ends at a third of the way.
     let ends = "the table ends at depth 5.2500, of 15.0000 that the scene's needle goes: not-converged";
     assert!(usual["table"]["ends_early"].as_str().unwrap().starts_with(ends), "{}", usual["table"]["ends_early"]);
-    assert!(said.contains(ends) && page.contains("Beyond its table the controller does not run"), "{said}");
+    let goes_on = "of its table the controller goes on with the last knot, to twice that depth at most";
+    assert!(said.contains(&format!("past the end {goes_on}: {ends}")), "{said}");
+    assert!(page.contains(&format!("Past the end {goes_on}: tissue ")), "{page}");
 }

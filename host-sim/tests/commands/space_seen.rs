@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use crate::files::check_schema;
 use crate::scenes::with_pairs;
 use host_sim::record::recording::Recording;
 use host_sim::world::truth::{Truth, from_frame};
@@ -123,6 +124,7 @@ fn a_run_in_space_can_be_opened_elsewhere() {
     let truths: BTreeMap<u64, Truth> = recording.truths().into_iter().map(|truth| (truth.time_ns, truth)).collect();
     mcap_shows_the_body_where_the_recording_and_the_model_have_it(directory.path(), &path, &model, &truths);
     vtu_has_what_the_displacement_tells(&report, &model, &truths);
+    check_schema(&report, "result-in-space");
     the_report_is_made_again(directory.path(), &report);
 }
 

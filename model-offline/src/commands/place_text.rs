@@ -7,7 +7,7 @@ use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::accuracy::{AsGood, PaddleErrors, StaticErrors};
 use model_offline::placement::study::{Optimum, StaticStudy};
 use model_offline::placement::workflow::StudyAccuracy;
-use model_offline::placement::{PaddleResult, PlacementStudy};
+use model_offline::placement::{PaddleResult, Placement, PlacementStudy};
 use std::fmt::Write as _;
 
 /// An error of a static displacement that is explained, part of the displacement.
@@ -85,10 +85,12 @@ fn static_part(
         .failure
         .as_ref()
         .map_or(String::new(), |f| format!("  stopped at depth {}: {}", length(f.depth), f.reason));
+    let jumped =
+        study.jump.map_or(String::new(), |j| format!("  jumps from depth {} to {}", length(j.from), length(j.to)));
     // Of an insertion that stopped at once nothing is known.
     let largest = study.depth.last().map(|_| format!("{:.digits$}", study.max_orthogonal));
     let largest = largest.unwrap_or_else(|| NONE.to_owned());
-    format!("{largest:>23}{mark} {error:>8}   {share:>12}{stopped}")
+    format!("{largest:>23}{mark} {error:>8}   {share:>12}{jumped}{stopped}")
 }
 
 fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelError>>) -> String {
@@ -117,6 +119,7 @@ fn notes(study: &PlacementStudy, accuracy: Option<&Result<StudyAccuracy, ModelEr
         also(&as_good.dynamic_paddles)
     );
     out.push_str(&compared_to(study).unwrap_or_default());
+    out.push_str(jumps(study).unwrap_or_default());
     for line in study.verdict() {
         let _ = writeln!(out, "{line}");
     }
@@ -165,6 +168,16 @@ fn compared_to(study: &PlacementStudy) -> Option<String> {
         None => "comes the farthest, or is best at rest".to_owned(),
     };
     Some(format!("no static paddle reaches the full depth: the best one {compared}\n"))
+}
+
+/// What a jump is, where there is one.
+fn jumps(study: &PlacementStudy) -> Option<&'static str> {
+    let Placement { paddles, no_paddle, .. } = &study.placement;
+    let mut all = paddles.iter().map(|paddle| &paddle.static_study).chain([&no_paddle.static_study]);
+    all.any(|study| study.jump.is_some()).then_some(
+        "where an insertion jumps its tissue seems to go over to another equilibrium, as where a surface folds: numbers beyond depend \
+         on the nodes\n",
+    )
 }
 
 /// Where the errors come from, and what they do not cover.

@@ -5,6 +5,7 @@ use super::error::CliError;
 use super::for_paraview::ForParaView;
 use super::json::write_json;
 use super::solve_space::{self, SpaceArgs};
+use model_offline::model::jumps::{Jump, TargetPath};
 use model_offline::model::{Body, ModelError, Pose, TissueModel};
 use model_offline::needle::{EnergyAccount, Inserted, SlippingNeedle, Way, insert};
 use model_offline::number::{in_unit, length};
@@ -174,6 +175,7 @@ fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
     let increments = (depth / scene.needle.depth * f64::from(scene.needle.increments)).ceil().max(1.0) as u32;
     let way = Way { depth, paddle: displacement, increments, seconds: args.depth / scene.needle.speed };
     progress.follow(increments);
+    let mut path = None;
     let mut solved = match scene.needle.shaft {
         Some(_) => match insert(&model, position, way)? {
             Inserted::Pushing(body) => Solved::Pushing(body),
@@ -182,10 +184,17 @@ fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
         None => {
             let mut body = model.body(position, NewtonSettings::default()).map_err(ModelError::from)?;
             let end = Pose { depth: args.depth, paddle: displacement, ..Pose::default() };
+            // What tissue does that relaxes is no matter of the controls alone.
+            let is_followed = args.depth > 0.0 && !scene.relaxes();
+            path = is_followed.then(|| TargetPath::from_rest(&mut body, displacement / args.depth));
             for increment in 1..=increments {
                 let pose = Pose::default().towards(&end, f64::from(increment) / f64::from(increments));
                 if let Err(failure) = body.take_in(pose, way.seconds / f64::from(increments)) {
+                    warn(path.as_ref(), scene);
                     return Err(CliError::Solve { failure, depth: body.depth() });
+                }
+                if let Some(path) = &mut path {
+                    path.goes_on(&mut body);
                 }
                 progress.increment();
             }
@@ -194,11 +203,22 @@ fn solve(scene: &Scene, held: Held, args: &SolveArgs) -> Result<(), CliError> {
     };
     solved.dwell(args.dwell)?;
     progress.finish();
-    write(&model, &mut solved, held, args)?;
+    write(&model, &mut solved, (held, path.as_ref()), args)?;
+    warn(path.as_ref(), scene);
     if !args.run.quiet {
         print(scene, &solved, held, args);
     }
     Ok(())
+}
+
+/// Tells of a jump on the way.
+fn warn(path: Option<&TargetPath>, scene: &Scene) {
+    let Some(Jump { from, to, off }) = path.and_then(TargetPath::jump) else { return };
+    let [from, to, off] = [from, to, off].map(|length| in_unit(length, &scene.length_unit));
+    complain(&format!(
+        "warning: between depth {from} and {to} the tissue seems to go over to another equilibrium, as where a surface folds: the target \
+         ends {off} from where its slopes lead, and numbers beyond depend on the nodes"
+    ));
 }
 
 /// What the needle has come to.
@@ -330,8 +350,12 @@ fn print_balance(energy: EnergyAccount, relaxes: bool) {
 }
 
 /// Writes the files that are asked for.
-fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveArgs) -> Result<(), CliError> {
-    let Held { paddle, displacement } = held;
+fn write(
+    model: &TissueModel,
+    solved: &mut Solved<'_>,
+    (Held { paddle, displacement }, path): (Held, Option<&TargetPath>),
+    args: &SolveArgs,
+) -> Result<(), CliError> {
     let scene = model.scene();
     let target = solved.target_displacement();
     let jacobian = paddle.map(|_| solved.jacobian()).transpose()?;
@@ -353,6 +377,9 @@ fn write(model: &TissueModel, solved: &mut Solved<'_>, held: Held, args: &SolveA
         "strain": fields.strain, "von_mises": fields.von_mises,
         "failure": null,
     });
+    if let Some(path) = path {
+        document["jump"] = serde_json::json!(path.jump());
+    }
     if let (serde_json::Value::Object(needle), Some(document)) =
         (solved.needle(scene, args.depth), document.as_object_mut())
     {

@@ -5,6 +5,7 @@ mod derivatives;
 pub mod driven;
 mod error;
 mod graded;
+pub mod jumps;
 pub mod space;
 mod tissue;
 
@@ -536,6 +537,12 @@ impl Body<'_> {
         let responses = self.equilibrium.sensitivities(&rates)?;
         let columns = responses.chunks_exact(self.model.dofs()).map(|response| self.model.target.interpolate(response));
         Ok(Matrix2::from_columns(&columns.collect::<Vec<_>>()))
+    }
+
+    /// Across the needle, and along it.
+    fn directions(&self) -> [Vector2<f64>; 2] {
+        let needle = &self.model.scene.needle;
+        [needle.orthogonal(), needle.axis]
     }
 
     /// d(target displacement)/d(depth) with the paddle held, by exact linearisation.

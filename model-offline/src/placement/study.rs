@@ -6,6 +6,7 @@ use super::fixture::{self, Fixture};
 use super::hindrance::{Hindrance, best_to_control, hindrance};
 use super::rest::{RestResponse, rest_responses};
 use crate::discretization::Resolution;
+use crate::model::jumps::{Jump, TargetPath};
 use crate::model::{Body, ModelError, TissueModel};
 use crate::parallel;
 use crate::scene::Scene;
@@ -42,6 +43,8 @@ pub struct StaticStudy {
     pub reached_depth: f64,
     /// Why it stopped there; none when it reached the full depth.
     pub failure: Option<StaticFailure>,
+    /// Where the tissue went over to another equilibrium on the way, the first time; none when it did not.
+    pub jump: Option<Jump>,
 }
 
 /// What the study says about one paddle.
@@ -246,6 +249,7 @@ pub(super) fn follow(
     let per_depth = body.depth_sensitivity()?;
     let beside = at_rest.map(|better| better.beside(&mut body, per_depth)).transpose()?;
     study.target_per_depth = at_rest.map_or(per_depth, |better| better.per_depth).into();
+    let mut path = TargetPath::from_rest(&mut body, Vector2::zeros());
     let increments = scene.needle.increments;
     for increment in 1..=increments {
         progress();
@@ -271,6 +275,7 @@ pub(super) fn follow(
                 study.reached_depth = depth;
                 let added = beside.and_then(|beside| beside.jacobian).unwrap_or_else(Matrix2::zeros);
                 followed.jacobians.extend(jacobian.map(|jacobian| rows(&(jacobian + added))));
+                path.goes_on(&mut body);
             }
             Err(Failure { reason, detail, .. }) => {
                 study.reached_depth = body.depth();
@@ -279,6 +284,7 @@ pub(super) fn follow(
             }
         }
     }
+    study.jump = path.jump();
     Ok(followed)
 }
 

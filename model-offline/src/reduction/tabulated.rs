@@ -26,6 +26,7 @@ use crate::placement::space::insertion::InsertionModel;
 use crate::random::SplitMix64;
 use crate::solver::equilibrium::{Failure, NewtonSettings};
 use nalgebra::{DVector, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -57,7 +58,7 @@ pub struct TabulationOptions {
 }
 
 /// How tabulating went.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TabulationReport {
     /// Tabulated depths.
     pub knots: usize,

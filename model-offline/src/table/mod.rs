@@ -89,7 +89,7 @@ pub enum TableBuildError {
         from: f64,
         /// Depth of the knot behind.
         to: f64,
-        /// Distance between where the path is there and where its slopes at both lead, length.
+        /// How far the path is there outside of where its slopes at both lead, length.
         off: f64,
     },
     /// The paddle would have to go farther than its actuator can.

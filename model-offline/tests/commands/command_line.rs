@@ -102,6 +102,60 @@ fn a_table_ends_before_tissue_goes_over_to_another_equilibrium() {
     assert!(steps.windows(2).all(|s| s[1] < 2.0 * s[0]), "{steps:?}");
 }
 
+/// `solve`, whose paddle may move, and `place`, of every insertion by itself. The paper's tissue has no jump at any increments; where a
+/// limit is near, slopes grow beyond bounds and the path is smooth all the same. Nothing is said where nobody looks.
+#[test]
+fn a_target_that_jumps_is_told_and_one_that_does_not_is_not() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("folding.toml"), FOLDING).unwrap();
+    for increments in [1, 2, 40] {
+        let smooth =
+            include_str!("../../scenes/paper.toml").replace("increments = 10", &format!("increments = {increments}"));
+        assert!(smooth.contains(&format!("increments = {increments}\n")), "{smooth}");
+        std::fs::write(folder.path().join(format!("smooth-{increments}.toml")), smooth).unwrap();
+    }
+    let run = |words: &str| {
+        let json = folder.path().join("result.json");
+        let mut command = model_offline();
+        command.args(words.split(' ')).arg("--json").arg(&json).current_dir(folder.path());
+        let output = command.assert().success().get_output().clone();
+        let said = [output.stdout, output.stderr].map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).concat();
+        let result: serde_json::Value = serde_json::from_slice(&std::fs::read(json).unwrap()).unwrap();
+        (said, result)
+    };
+    for paddle in ["", " --paddle-displacement 0.2,-0.2"] {
+        let (said, result) = run(&format!("solve folding.toml --depth 6 --paddle 2{paddle}"));
+        assert!(
+            said.contains("between depth 5 mm and 6 mm the tissue seems to go over to another equilibrium"),
+            "{said}"
+        );
+        assert!(result["jump"]["from"] == 5.0 && result["jump"]["off"].as_f64().unwrap() > 0.1, "{}", result["jump"]);
+    }
+    let breast = include_str!("../../scenes/breast.toml").replace("increments = 12", "increments = 100");
+    std::fs::write(folder.path().join("limit.toml"), breast).unwrap();
+    let near_the_limit = "solve limit.toml --depth 11.4 --paddle 4 --paddle-displacement 7.615865,-15.600425";
+    for words in ["solve folding.toml --depth 5 --paddle 2", near_the_limit] {
+        let (said, result) = run(words);
+        assert!(!said.contains("equilibrium") && result["jump"].is_null() && result.get("jump").is_some(), "{said}");
+    }
+    let (_, result) = run("solve folding.toml --depth 0 --paddle 2 --paddle-displacement 0.2,-0.2");
+    assert!(result.get("jump").is_none(), "{}", result["jump"]);
+    // The tissue fails later, and the jump is told.
+    let mut command = model_offline();
+    let output =
+        command.args("solve folding.toml --depth 20 --paddle 2".split(' ')).current_dir(folder.path()).assert().code(1);
+    let said = String::from_utf8_lossy(&output.get_output().stderr).into_owned();
+    assert!(said.contains("between depth 5 mm and 6 mm"), "{said}");
+    let (said, result) = run("place folding.toml");
+    assert!(said.contains("  jumps from depth 5.0000 to 6.0000\n") && said.contains("depend on the nodes"), "{said}");
+    assert_eq!(result["paddles"][0]["static"]["jump"]["to"], 6.0);
+    assert!(result["no_paddle"]["static"]["jump"].is_null(), "{}", result["no_paddle"]["static"]["jump"]);
+    for increments in [1, 2, 40] {
+        let (said, _) = run(&format!("place smooth-{increments}.toml"));
+        assert!(!said.contains("jump"), "{said}");
+    }
+}
+
 /// `| head` and a full disk. Nobody reads the first, and the files are wanted all the same; the second loses what was said.
 #[test]
 fn standard_output_may_be_closed_but_not_be_full() {

@@ -42,6 +42,7 @@ fn a_tolerance_of_one_percent_is_kept_by_quadratic_triangles() {
 }
 
 #[test]
+#[ignore = "a minute: `.ci/long` runs it"]
 fn a_tolerance_of_one_percent_is_kept_by_scni() {
     map_each(cases(), threads(None), |(mut scene, limits)| {
         scene.discretization.resolution = Resolution::Tolerance(0.01);

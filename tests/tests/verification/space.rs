@@ -156,6 +156,7 @@ fn a_tolerance_is_kept_and_its_estimate_is_no_smaller_than_the_error() {
 
 /// A bundled scene as its user has it: at its own tolerance, by the method that `place` takes, against the continuum limits.
 #[test]
+#[ignore = "a minute: `.ci/long` runs it"]
 fn a_bundled_body_is_placed_at_its_own_tolerance() {
     let scene = SpaceScene::bundled("mound").unwrap();
     let Resolution::Tolerance(tolerance) = scene.discretization.resolution else { panic!("a tolerance") };
@@ -168,6 +169,7 @@ fn a_bundled_body_is_placed_at_its_own_tolerance() {
 
 /// The default rule is held against quadratic tetrahedra, which are refined as far as it needs.
 #[test]
+#[ignore = "half a minute: `.ci/long` runs it"]
 fn a_tolerance_of_the_default_rule_is_kept_with_what_its_reference_leaves_open() {
     let (mut scene, limits) = case("block", false, Integration::ScniStabilised);
     scene.discretization.resolution = Resolution::Tolerance(0.15);

@@ -7,6 +7,7 @@ use model_offline::scene::TissueVariant;
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
+use crate::report::PAST_ITS_TABLE;
 use crate::report::below_noise::{below_noise, below_noise_in_space};
 use crate::report::paper::paper_optima;
 use crate::runtime::accounting::ledger::LedgerResult;
@@ -24,7 +25,7 @@ pub(super) fn sentences(run: &RunResult) -> Vec<String> {
 /// Which tables end before the needle does.
 fn early_ends<'r>(tables: impl Iterator<Item = (TissueVariant, Option<&'r str>)>) -> Option<String> {
     let ends: Vec<String> = tables.filter_map(|(tissue, ends)| Some(format!("tissue {tissue}, {}", ends?))).collect();
-    (!ends.is_empty()).then(|| format!("Beyond its table the controller does not run: {}.", ends.join("; ")))
+    (!ends.is_empty()).then(|| format!("{PAST_ITS_TABLE}: {}.", ends.join("; ")).replacen("past", "Past", 1))
 }
 
 /// The best paddles, held and controlled.

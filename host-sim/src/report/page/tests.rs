@@ -433,7 +433,13 @@ fn the_conclusion_says_what_spoils_it() {
     assert!(!said(&run).contains("trusted"), "{}", said(&run));
     let mut run = good.clone();
     run.cases[1].table.ends_early = Some("it ends".to_owned());
-    assert!(said(&run).contains("Beyond its table the controller does not run: tissue "), "{}", said(&run));
+    assert!(
+        said(&run).contains(
+            "Past the end of its table the controller goes on with the last knot, to twice that depth at most: tissue "
+        ),
+        "{}",
+        said(&run)
+    );
     let mut run = good.clone();
     free_run(&mut run, |strategy| strategy.plant_timing.as_mut().unwrap().deadline_misses = 2);
     assert!(said(&run).contains("2 of 12 deadlines were MISSED"), "{}", said(&run));

@@ -9,6 +9,7 @@ use model_offline::output::chart::number::plain;
 use model_offline::scene::{PlantModel, TissueVariant};
 
 use crate::bench::result::{CaseResult, RunResult, SimulationSettings, StrategyResult};
+use crate::report::PAST_ITS_TABLE;
 use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
 use crate::runtime::accounting::ledger::LedgerResult;
@@ -151,7 +152,7 @@ fn write_case(text: &mut String, run: &RunResult, case: &CaseResult, digits: usi
 
 /// Says so where a table ends before the needle does.
 pub(super) fn write_early_end(text: &mut String, tissue: TissueVariant, ends: Option<&str>) -> std::fmt::Result {
-    ends.map_or(Ok(()), |ends| writeln!(text, "  {tissue}: beyond its table the controller does not run: {ends}"))
+    ends.map_or(Ok(()), |ends| writeln!(text, "  {tissue}: {PAST_ITS_TABLE}: {ends}"))
 }
 
 /// What the controller's error is made of, where that was asked for.

@@ -3,10 +3,11 @@
 use crate::geometry::{Point, box_of};
 use crate::model::space::surfaces::Surfaces;
 use crate::model::space::{SpaceBody, SpaceModel};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A body at rest, as pictures need it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceGeometry {
     /// Name of the scene.
     pub name: String,
@@ -37,7 +38,7 @@ pub struct SpaceGeometry {
 }
 
 /// Where a paddle may be attached.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PaddlePatch {
     /// Its index in the scene.
     pub index: u32,
@@ -46,7 +47,7 @@ pub struct PaddlePatch {
 }
 
 /// A body with needle and paddles somewhere.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpaceState {
     /// Needle depth, length.
     pub depth: f64,
