@@ -22,7 +22,7 @@ pub(crate) fn elsewhere<const R: usize, const C: usize>(
     slopes: [SMatrix<f64, R, C>; 2],
 ) -> Option<f64> {
     let bounds = slopes[0].zip_map(&slopes[1], |a, b| (a.min(b), a.max(b)));
-    let off = gone.zip_map(&bounds, |gone, (least, most)| gone - gone.clamp(least, most)).norm();
+    let off = gone.zip_map(&bounds, |gone, (least, most)| gone - gone.max(least).min(most)).norm();
     let steepest = slopes[0].norm().max(slopes[1].norm());
     (off > ROUNDING * way && off > SMOOTH * gone.norm().max(steepest)).then_some(off)
 }
