@@ -71,9 +71,10 @@ pub mod view;
 
 pub mod guide;
 
-pub use bench::comparison::{Compared, Comparison, ComparisonOptions, Progress, Silent};
+pub use bench::comparison::{Compared, Comparison, ComparisonOptions};
 pub use bench::error::SimError;
 pub use bench::insertion::{ControllerSetup, Extras, Label, SimulatedInsertion};
+pub use bench::progress::{Progress, Silent};
 pub use bench::result::RunResult;
 pub use bench::strategy::Strategy;
 pub use exchange::Space;

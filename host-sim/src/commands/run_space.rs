@@ -12,7 +12,7 @@ use host_sim::runtime::executor::Hardware;
 use host_sim::runtime::plant::observer::Spectator;
 use host_sim::runtime::time::mode::RunMode;
 use host_sim::view::{View, insertions_in_space};
-use model_offline::output::terminal::complain;
+use model_offline::output::terminal::{LongRun, complain};
 use model_offline::parallel;
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
@@ -42,7 +42,7 @@ pub(super) struct SpaceJob<'a> {
     pub(super) out: &'a Path,
     /// File for the result.
     pub(super) json: Option<&'a Path>,
-    /// No summary.
+    /// Neither progress nor summary.
     pub(super) quiet: bool,
     /// Threads.
     pub(super) threads: Option<usize>,
@@ -68,7 +68,8 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     let program = std::env::current_exe().map_err(RuntimeError::Spawn)?;
     let SpaceJob { tissue, table_tissue, mode, hardware, extras, .. } = *args;
     let options = SpaceOptions { program: &program, tissue, table_tissue, mode, hardware, extras, threads };
-    let comparison = SpaceComparison::prepare(scene, &options, &simulation)?;
+    let progress = if args.quiet { LongRun::hidden() } else { LongRun::new() };
+    let comparison = SpaceComparison::prepare(scene, &options, &simulation, &progress)?;
     let units = [scene.length_unit.clone(), scene.stress_unit.clone()];
     let start = |port| {
         let knobs = first_knobs(&simulation.loop_settings);
@@ -76,6 +77,7 @@ pub(super) fn run(args: &SpaceJob<'_>, scene: &SpaceScene) -> Result<(), SimErro
     };
     let view = args.view_port.map(start).transpose()?;
     let (compared, artifacts) = comparison.run(view.as_ref().map(|view| view as &dyn Spectator))?;
+    progress.bar.finish_and_clear();
     write_space_run(args.out, &compared, artifacts)?;
     if let Some(path) = args.json {
         write_json(path, &compared)?;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::bench::comparison::Progress as _;
 use host_sim::bench::loop_stability::simulate;
+use host_sim::bench::progress::Progress as _;
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;
 use host_sim::report::studies::loop_stability::{csv, summary};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::bench::comparison::Progress as _;
+use host_sim::bench::progress::Progress as _;
 use host_sim::bench::tables::{KNOTS, compare};
 use host_sim::record::error::FileError;
 use host_sim::record::files::write_bytes;

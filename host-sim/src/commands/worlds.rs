@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use host_sim::SimError;
-use host_sim::bench::comparison::Progress as _;
+use host_sim::bench::progress::Progress as _;
 use host_sim::bench::worlds::{compare, count};
 use host_sim::record::files::{write_bytes, write_json};
 use host_sim::report::studies::worlds::summary;

@@ -18,5 +18,8 @@ pub use self::page::{Attachments, pictures, render, render_with, timing_histogra
 const PAST_ITS_TABLE: &str =
     "past the end of its table the controller goes on with the last knot, to twice that depth at most";
 
+/// An error that is so many times another one is held against nothing: the other is what rounding leaves of 0.
+const AGAINST_NOTHING: f64 = 1e-6;
+
 // Needles further past the table's end are refused by the controller: as far as the table is long is "twice".
 const _: () = assert!(DEPTH_MARGIN == 1.0);

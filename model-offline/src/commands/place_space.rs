@@ -10,6 +10,7 @@ use model_offline::output::terminal::complain;
 use model_offline::parallel;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
 use model_offline::placement::space::{SecondPaddle, SpaceErrorEstimate, SpaceStudy};
+use model_offline::placement::verdict::times_as_far;
 use model_offline::scene::space::SpaceScene;
 use model_offline::tell;
 use serde_json::{Value, json};
@@ -211,9 +212,7 @@ fn harms(what: &str, study: &SpaceStudy, best: &[u32]) -> Option<String> {
     let factor = of.over(of_none).filter(|factor| *factor > 1.0)?;
     let is_open = study.uncertain().and_then(|uncertain| uncertain.may_hold_as_well(held, without)) == Some(true);
     let open = if is_open { LEFT_OPEN } else { "" };
-    Some(format!(
-        "no static {what} helps: the best moves the target {factor:.2} times as far as no paddle does{open}\n"
-    ))
+    Some(format!("no static {what} helps: {}{open}\n", times_as_far("the best moves the target", factor)))
 }
 
 /// Whether the second paddle buys anything at rest.

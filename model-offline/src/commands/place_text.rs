@@ -6,6 +6,7 @@ use model_offline::model::ModelError;
 use model_offline::number::{decimals, length, smallest_told};
 use model_offline::placement::accuracy::{AsGood, PaddleErrors, StaticErrors};
 use model_offline::placement::study::{Optimum, StaticStudy};
+use model_offline::placement::verdict::AGAINST_NOTHING;
 use model_offline::placement::workflow::StudyAccuracy;
 use model_offline::placement::{PaddleResult, Placement, PlacementStudy};
 use std::fmt::Write as _;
@@ -80,7 +81,10 @@ fn static_part(
     digits: usize,
 ) -> String {
     let error = errors.and_then(|e| e.max_orthogonal).map_or(NONE.to_owned(), |e| format!("{e:.digits$}"));
-    let share = share.map_or(NONE.to_owned(), |share| format!("{share:.3}"));
+    let share = share.map_or(NONE.to_owned(), |share| match share > AGAINST_NOTHING {
+        true => format!("{share:.0e}"),
+        false => format!("{share:.3}"),
+    });
     let stopped = study
         .failure
         .as_ref()

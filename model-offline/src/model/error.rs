@@ -5,6 +5,7 @@ use crate::discretization::{DiscretizationError, Integration, ShapeError, Spatia
 use crate::material::MaterialError;
 use crate::number::{length, short};
 use crate::scene::NoSuchPaddle;
+use crate::scene::space::{FilePlace, SpaceScene};
 use crate::solver::equilibrium::{Failure, FailureReason};
 use std::fmt;
 
@@ -149,6 +150,16 @@ pub enum ModelError {
         other: BoundaryPart,
         /// A point of both, length units.
         at: [f64; 3],
+    },
+    /// What is wrong with a part of a scene in space, and where the scene's file has it.
+    #[error("{place}: {error}")]
+    InFile {
+        /// Where.
+        place: FilePlace,
+        /// What: [`NothingCaught`](Self::NothingCaught), [`PatchesTouch`](Self::PatchesTouch),
+        /// [`NothingConstrained`](Self::NothingConstrained), [`LoosePart`](Self::LoosePart) or
+        /// [`UnseenInclusion`](Self::UnseenInclusion).
+        error: Box<ModelError>,
     },
     /// The body cannot be discretised.
     #[error(transparent)]
@@ -322,11 +333,33 @@ impl ModelError {
             Self::Uncontrollable { .. } | Self::NoPaddleControls | Self::NotHeld { .. } => {
                 ModelFailure::SingularJacobian
             }
+            Self::InFile { error, .. } => error.kind(),
             Self::StudyTooLarge { .. } => ModelFailure::Solve(FailureReason::TooLarge),
             Self::TooManyNodes { .. } | Self::ToleranceNotReached { .. } | Self::NothingToCompare => {
                 ModelFailure::ToleranceNotReached
             }
             _ => ModelFailure::Unsupported,
+        }
+    }
+
+    /// The error of a part of a scene with where the scene's file has that part; others as they are.
+    pub(super) fn in_file(self, scene: &SpaceScene) -> Self {
+        let parts = &scene.in_file;
+        let place = match &self {
+            Self::UnseenInclusion { number } => parts.inclusions.get(number - 1),
+            Self::LoosePart { .. } => Some(&parts.immobile),
+            Self::NothingCaught { part, .. } | Self::PatchesTouch { part, .. } | Self::NothingConstrained(part) => {
+                match part {
+                    BoundaryPart::Immobile => Some(&parts.immobile),
+                    BoundaryPart::Needle => Some(&parts.needle),
+                    BoundaryPart::Paddle(index) => parts.paddle(*index),
+                }
+            }
+            _ => None,
+        };
+        match place.cloned() {
+            Some(place) => Self::InFile { place, error: Box::new(self) },
+            None => self,
         }
     }
 
@@ -346,6 +379,9 @@ impl ModelError {
 
     /// Whether it is the question that was wrong, and not a computation that failed.
     pub fn is_usage(&self) -> bool {
+        if let Self::InFile { error, .. } = self {
+            return error.is_usage();
+        }
         matches!(
             self,
             Self::ToleranceIsNoResolution

@@ -8,6 +8,8 @@ use crate::placement::accuracy::measure_range;
 use serde::Deserialize;
 use std::path::Path;
 
+/// Measures that differ by less than this part are equal but for rounding.
+const EQUAL: f64 = 1e-6;
 /// Pairs of paddles that are drawn, the best ones; all are in the file.
 const PAIRS: usize = 10;
 /// How far an earlier value stands from the middle of its bar, where the estimated error is drawn.
@@ -190,6 +192,11 @@ impl DrawnStudy {
         self.paddles.iter().find(|single| single.index.to_string() == name).map(|single| &single.does).or_else(pair)
     }
 
+    /// How far the needle moves the target with these paddles held, length.
+    fn largest(&self, paddles: &Set) -> f64 {
+        self.does(&paddles.name()).map_or(f64::NAN, |does| does.held.largest())
+    }
+
     fn length(&self) -> &str {
         self.units.as_ref().map_or("1", |units| units[0].as_str())
     }
@@ -250,6 +257,9 @@ pub fn svg(study: &DrawnStudy, earlier: Earlier) -> String {
         None => "Moved: no paddle controls the target".to_owned(),
     };
     let holds = match held {
+        Some(set) if study.largest(set) > study.no_paddle.held.largest() => {
+            "Held: no paddle moves the target less than none".to_owned()
+        }
         Some(set) => format!("Held: {} moves the target least", set.in_words()),
         None => "Held: no paddle".to_owned(),
     };
@@ -282,7 +292,7 @@ fn title(study: &DrawnStudy, earlier: Earlier) -> String {
     let name = format!("{}, {}", study.scene, study.tissue);
     let (Some((words, set)), Some((_, before))) = (best(study), earlier) else {
         let words = best(study).map_or("no paddle".to_owned(), |(words, _)| words);
-        return format!("{name}: {words} controls the target best");
+        return format!("{name}: {words} controls the target best{}", as_well(study));
     };
     let measure = |study: &DrawnStudy| study.does(&set).map_or(f64::NAN, Does::measure);
     let [was, is] = [before, study].map(measure);
@@ -292,6 +302,16 @@ fn title(study: &DrawnStudy, earlier: Earlier) -> String {
         None => "is the best to move, where none was".to_owned(),
     };
     format!("{name}: {words} {held}; its travel per displacement is {} where it was {}", number(is, 3), number(was, 3))
+}
+
+/// Those that control the target as well as the best, but for rounding.
+fn as_well(study: &DrawnStudy) -> String {
+    let Some(best) = study.optimum.dynamic.as_ref().map(Set::name) else { return String::new() };
+    let least = study.does(&best).map_or(f64::NAN, Does::measure);
+    let is_equal = |does: &Does| (does.measure() - least).abs() <= EQUAL * least;
+    let all = study.sets().into_iter().filter(|(name, does)| *name != best && is_equal(does));
+    let all: Vec<String> = all.map(|(name, _)| name).collect();
+    if all.is_empty() { String::new() } else { format!(", {} as well", all.join(", ")) }
 }
 
 fn caption(study: &DrawnStudy, earlier: Earlier) -> String {

@@ -68,7 +68,7 @@ pub fn all_was_said() -> bool {
 /// few seconds until the bar is finished or dropped.
 pub fn progress(steps: u64) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
-        return with_lines(steps, TimeLeft::default());
+        return with_lines(steps, None);
     }
     styled(ProgressBar::new(steps), ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left  {msg}"))
 }
@@ -87,7 +87,7 @@ impl LongRun {
     pub fn new() -> Self {
         let left = TimeLeft::default();
         if !std::io::stderr().is_terminal() {
-            return Self { bar: with_lines(0, left.clone()), left };
+            return Self { bar: with_lines(0, Some(left.clone())), left };
         }
         let shown = left.clone();
         let told = move |_: &ProgressState, out: &mut dyn std::fmt::Write| {
@@ -116,8 +116,8 @@ fn styled<E>(bar: ProgressBar, style: Result<ProgressStyle, E>) -> ProgressBar {
     if let Ok(style) = style { bar.with_style(style) } else { bar }
 }
 
-/// A bar that nobody sees, and lines in its place.
-fn with_lines(steps: u64, left: TimeLeft) -> ProgressBar {
+/// A bar that nobody sees, and lines in its place; where nobody foretells what is left, steps are taken for equally long.
+fn with_lines(steps: u64, left: Option<TimeLeft>) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(steps), ProgressDrawTarget::hidden());
     let observed = bar.downgrade();
     std::thread::spawn(move || {
@@ -125,12 +125,19 @@ fn with_lines(steps: u64, left: TimeLeft) -> ProgressBar {
             std::thread::sleep(LINES_EVERY);
             let Some(bar) = observed.upgrade().filter(|bar| !bar.is_finished()) else { return };
             // Where nobody listens any more there is nobody to tell.
-            if writeln!(std::io::stderr(), "{}", progress_line(&bar, left.seconds())).is_err() {
+            let left_s = left.as_ref().map_or_else(|| left_at_this_rate(&bar), TimeLeft::seconds);
+            if writeln!(std::io::stderr(), "{}", progress_line(&bar, left_s)).is_err() {
                 return;
             }
         }
     });
     bar
+}
+
+/// What is left of steps that go on as they have gone, s; nothing is known before the first.
+fn left_at_this_rate(bar: &ProgressBar) -> Option<f64> {
+    let (done, of) = (bar.position() as f64, bar.length()? as f64);
+    (done > 0.0).then(|| bar.elapsed().as_secs_f64() * (of - done).max(0.0) / done)
 }
 
 /// How far something has come, in one line.
@@ -264,5 +271,13 @@ mod tests {
         early.set_position(41);
         assert!(progress_line(&early, None).starts_with("100 % of the steps"), "{}", progress_line(&early, None));
         assert!(progress_line(&bar, Some(7.2)).contains(", about 8 s left  controller"));
+        // A quarter is done, and the rest takes three times as long.
+        let bar = bar.with_elapsed(Duration::from_secs(100));
+        let left = left_at_this_rate(&bar).unwrap();
+        assert!((left - 300.0).abs() < 30.0, "{left}");
+        bar.set_position(0);
+        assert_eq!(left_at_this_rate(&bar), None);
+        bar.set_position(41);
+        assert_eq!(left_at_this_rate(&bar), Some(0.0));
     }
 }

@@ -38,10 +38,19 @@ pub fn verdict(placement: &Placement) -> Vec<String> {
 fn static_paddles_no_better_than_none(placement: &Placement) -> Option<String> {
     let best = placement.paddles.iter().find(|p| p.index == placement.optimum.static_paddle)?;
     let factor = best.static_over_no_paddle.filter(|factor| *factor > 1.0)?;
-    Some(format!(
-        "no static paddle helps: the best one, {}, moves the target {factor:.2} times as far as no paddle does",
-        best.index
-    ))
+    let best = format!("the best one, {}, moves the target", best.index);
+    Some(format!("no static paddle helps: {}", times_as_far(&best, factor)))
+}
+
+/// Factors beyond this hold a displacement against what rounding leaves of none.
+pub const AGAINST_NOTHING: f64 = 1e6;
+
+/// "What it does" so many times as far as no paddle does, in words.
+pub fn times_as_far(what_it_does: &str, factor: f64) -> String {
+    if factor > AGAINST_NOTHING {
+        return "without one the target does not leave the needle's line".to_owned();
+    }
+    format!("{what_it_does} {factor:.2} times as far as no paddle does")
 }
 
 #[cfg(test)]
@@ -64,6 +73,9 @@ mod tests {
         assert!(tethered[..3].iter().all(|line| line.contains("ill-conditioned")), "{tethered:#?}");
         assert!(tethered[3].starts_with("no paddle"), "{tethered:#?}");
         assert_eq!(lines("paper"), Vec::<String>::new());
+        assert_eq!(times_as_far("it moves", 2.5), "it moves 2.50 times as far as no paddle does");
+        // On the needle's line nothing but rounding moves the target.
+        assert!(times_as_far("it moves", 1.6e14).ends_with("does not leave the needle's line"));
         assert_eq!(lines("prostate"), Vec::<String>::new());
     }
 }

@@ -92,16 +92,22 @@ impl Source<'_> {
         self.error(error.span().unwrap_or(0..0), message, help)
     }
 
+    /// Line and column of a byte of the text, both from 1, the latter in characters.
+    pub(crate) fn line_and_column(self, byte: usize) -> (usize, usize) {
+        let before = &self.text[..self.text.floor_char_boundary(byte.min(self.text.len()))];
+        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
+    }
+
     pub(crate) fn error(self, span: Range<usize>, message: impl Into<String>, help: impl Into<String>) -> SceneError {
         let start = span.start.min(self.text.len());
-        let before = &self.text[..self.text.floor_char_boundary(start)];
-        let line_start = before.rfind('\n').map_or(0, |i| i + 1);
+        let (line, column) = self.line_and_column(start);
         let end = span.end.clamp(start, self.text.len());
         let (shown, at) = excerpt(self.text, start..end);
         SceneError {
             file: self.file.to_owned(),
-            line: before.matches('\n').count() + 1,
-            column: before[line_start..].chars().count() + 1,
+            line,
+            column,
             message: message.into(),
             help: help.into(),
             source_text: Arc::new(NamedSource::new(self.file, shown)),

@@ -100,7 +100,14 @@ fn a_check_says_what_is_seldom_meant() {
         let warnings = read("a.json", folder.path())["warnings"].to_string();
         assert!(warnings.contains(expected), "{warnings}");
     }
-    // What cannot be is refused, as by `place`.
+    // Line and column of what comes behind a text that is there once.
+    let behind = |text: &str, lead: &str| {
+        let at = text.find(lead).unwrap() + lead.len();
+        assert_eq!(text.matches(lead).count(), 1, "{lead}");
+        let line = text[..at].lines().last().unwrap();
+        format!("a.toml:{}:{}: ", text[..at].lines().count(), line.len() + 1)
+    };
+    // What cannot be is refused, as by `place`: where the scene's file has it.
     for (from, to, expected) in [
         (
             "min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]",
@@ -126,9 +133,12 @@ fn a_check_says_what_is_seldom_meant() {
         let folder = tempfile::tempdir().unwrap();
         let text = include_str!("../../scenes/block.toml");
         assert!(text.contains(from));
-        std::fs::write(folder.path().join("a.toml"), text.replacen(from, to, 1)).unwrap();
+        let text = text.replacen(from, to, 1);
+        std::fs::write(folder.path().join("a.toml"), &text).unwrap();
         let (code, _, said) = run(&["check", "a.toml", "--json", "a.json"], folder.path());
         let told = said.replace(['\n', '│'], " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        let at = behind(&text, "index = 1\nregion = ");
+        assert!(told.contains(&format!("{at}the ")) && told.contains("paddle 1"), "{at} {told}");
         assert!(code == 2 && told.contains(expected) && !folder.path().join("a.json").exists(), "{to}: {said}");
         assert_eq!(run(&["place", "a.toml", "--spacing", "0.2", "--quiet"], folder.path()), (2, String::new(), said));
     }
@@ -140,6 +150,7 @@ fn a_check_says_what_is_seldom_meant() {
     std::fs::write(folder.path().join("a.toml"), text).unwrap();
     let (code, _, said) = run(&["check", "a.toml", "--json", "a.json"], folder.path());
     assert!(code == 2 && said.contains("hangs on nothing") && !folder.path().join("a.json").exists(), "{said}");
+    assert!(said.contains(&behind(include_str!("../../scenes/block.toml"), "regions = [")), "{said}");
 }
 
 /// What a scene of inclusions, supports and parts says of itself; `place` says it too.

@@ -2,9 +2,9 @@
 
 mod cases;
 mod encoded_table;
-mod forecast;
 mod lockstep;
-mod progress;
+mod parts;
+mod training;
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -25,8 +25,6 @@ use sha2::{Digest, Sha256};
 use self::cases::{Case, cases};
 pub(super) use self::encoded_table::ends_early;
 pub use self::encoded_table::{EncodedTable, check_units, is_of, read_table};
-use self::forecast::Forecast;
-pub use self::progress::{Progress, Silent};
 use super::causes::{CausesResult, Examined};
 use super::describe;
 use super::insertion::{ControllerSetup, Extras, Label, MeasuredInsertion, SimulatedInsertion, digits, rounding};
@@ -34,6 +32,8 @@ use super::result::{CaseResult, FORMAT, PlacementResult, RunResult, Strategies, 
 use super::strategy::Strategy;
 use super::table_tissue::TableTissue;
 use crate::bench::error::SimError;
+use crate::bench::forecast::Forecast;
+use crate::bench::progress::Progress;
 use crate::exchange::board::{Image, Processor};
 use crate::record::files::Artifact;
 use crate::runtime::executor::{Hardware, encode_in};
@@ -183,6 +183,8 @@ pub struct Comparison<'p> {
     cases: Vec<Case>,
     studied: Vec<Studied>,
     tables: Vec<EncodedTable>,
+    /// What computing the tables took, s.
+    tables_took_s: f64,
 }
 
 impl std::fmt::Debug for Comparison<'_> {
@@ -247,10 +249,13 @@ impl<'p> Comparison<'p> {
             cases,
             studied: Vec::new(),
             tables: Vec::new(),
+            tables_took_s: 0.0,
         };
         comparison.forecast = Forecast::of(comparison.parts());
         comparison.study()?;
+        let before = Instant::now();
         comparison.tables = comparison.compute_tables(given.as_ref())?;
+        comparison.tables_took_s = before.elapsed().as_secs_f64();
         Ok(comparison)
     }
 
@@ -263,6 +268,7 @@ impl<'p> Comparison<'p> {
         let (mut results, mut not_kept) = (Vec::new(), None);
         let uncontrolled = self.uncontrolled()?;
         let in_lockstep = self.in_lockstep(spectator)?;
+        self.train_for_free_run();
         for (i, ((none, static_paddle), dynamic)) in uncontrolled.into_iter().zip(in_lockstep).enumerate() {
             let (case, table) = (&self.cases[i], &self.tables[i]);
             let known = [none, static_paddle, dynamic];

@@ -7,9 +7,9 @@ use model_offline::scene::TissueVariant;
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::bench::result::{CaseResult, PlacementResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
-use crate::report::PAST_ITS_TABLE;
 use crate::report::below_noise::{below_noise, below_noise_in_space};
 use crate::report::paper::paper_optima;
+use crate::report::{AGAINST_NOTHING, PAST_ITS_TABLE};
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
@@ -88,6 +88,10 @@ pub(super) fn factors(run: &RunResult, factor: impl Fn(&CaseResult) -> Option<f6
 pub(super) fn change(factors: &[f64]) -> String {
     // Small factors with a digit behind the point: "1 times smaller" says nothing.
     let times = |factor: f64| if factor < 10.0 { number(factor, 2) } else { plain(factor.round()) };
+    let larger = |factor: f64| match factor < AGAINST_NOTHING {
+        true => "incomparably larger".to_owned(),
+        false => format!("{} times larger", times(factor.recip())),
+    };
     let low = factors.iter().copied().fold(f64::INFINITY, f64::min);
     let high = factors.iter().copied().fold(0.0, f64::max);
     let range = |from: f64, to: f64| {
@@ -96,10 +100,14 @@ pub(super) fn change(factors: &[f64]) -> String {
     };
     if low >= 1.0 {
         format!("{} times smaller", range(low, high))
-    } else if high < 1.0 {
+    } else if high >= 1.0 {
+        format!("between {} and {} times smaller", larger(low), times(high))
+    } else if low >= AGAINST_NOTHING {
         format!("{} times larger", range(high.recip(), low.recip()))
+    } else if high < AGAINST_NOTHING {
+        larger(low)
     } else {
-        format!("between {} times larger and {} times smaller", times(low.recip()), times(high))
+        format!("{} to {}", larger(high), larger(low))
     }
 }
 

@@ -52,6 +52,9 @@ impl CaseCharts {
     }
 }
 
+/// The sensor's noise is drawn beside errors of which it is at most so many times the largest.
+pub(super) const NOISE_BESIDE: f64 = 3.0;
+
 fn zero() -> ReferenceLine {
     ReferenceLine::new("", Place::Y(0.0), Dash::Solid)
 }
@@ -95,13 +98,15 @@ fn error_panel(run: &RunResult, case: &CaseResult) -> Panel {
 fn enlarged_panel(run: &RunResult, case: &CaseResult) -> Panel {
     let dynamic = || case.strategies.iter().filter(|shown| shown.0.has_controller());
     let largest = dynamic().map(|(_, result)| result.max_orthogonal_error).fold(0.0, f64::max);
-    let title = format!("Dynamic alone, enlarged: at most {}", number(largest, 2));
+    let noise = run.settings.noise;
+    // Beside much larger noise the curve would be a line.
+    let hides = noise > NOISE_BESIDE * largest;
+    let title = dynamic_alone(largest, noise, hides, &run.units[0]);
     let depth = Axis::linear("needle depth", &run.units[0]).range(0.0, run.settings.depth);
     let mut panel = Panel::new(&title, depth, Axis::linear("orthogonal error", &run.units[0]));
     panel.description = format!("Orthogonal error of the dynamic paddle, enlarged, {}", case_name(case));
     panel.lines.push(zero());
-    let noise = run.settings.noise;
-    if noise > 0.0 {
+    if noise > 0.0 && !hides {
         for level in [noise, -noise] {
             panel.lines.push(ReferenceLine::new("±1 σ of the sensor's noise", Place::Y(level), Dash::DashDot));
         }
@@ -113,6 +118,17 @@ fn enlarged_panel(run: &RunResult, case: &CaseResult) -> Panel {
     panel
 }
 
+/// What a panel of the dynamic error alone is called, with the noise that is not drawn in it.
+pub(super) fn dynamic_alone(largest: f64, noise: f64, hides_noise: bool, unit: &str) -> String {
+    let beyond = if hides_noise { format!(", of noise {}", with_unit(noise, unit)) } else { String::new() };
+    format!("Dynamic alone, enlarged: at most {}{beyond}", with_unit(largest, unit))
+}
+
+/// Two digits with their unit, if there is one.
+pub(super) fn with_unit(value: f64, unit: &str) -> String {
+    if unit == "1" { number(value, 2) } else { format!("{}\u{a0}{unit}", number(value, 2)) }
+}
+
 /// Displacement of the paddle over time.
 fn paddle_panel(run: &RunResult, case: &CaseResult, name: &str, strategy: &StrategyResult) -> Panel {
     // Before that, the controller waits for its sensors.
@@ -120,7 +136,7 @@ fn paddle_panel(run: &RunResult, case: &CaseResult, name: &str, strategy: &Strat
     let farthest = series().map(|p| p.paddle[0].hypot(p.paddle[1])).fold(0.0, f64::max);
     let times = series().map(|p| p.time_s).chain([0.0, run.settings.duration_s]);
     let mut panel = Panel::new(
-        &format!("Paddle displacement: at most {}", number(farthest, 2)),
+        &format!("Paddle displacement: at most {}", with_unit(farthest, &run.units[0])),
         Axis::linear("time since the start of the needle", "s").enclosing(times),
         Axis::linear("displacement", &run.units[0]),
     );

@@ -59,7 +59,7 @@ fn head(run: &RunResult) -> Markup {
         div.scroll { table.cards {
             caption { span {
                 (in_unit("Largest target displacement orthogonal to the needle", unit)) " over an insertion of "
-                (plain(run.settings.depth)) " in " (plain(run.settings.insertion_s)) " s; paddle in brackets"
+                (plain(run.settings.depth)) @if unit != "1" { " " (unit) } " in " (plain(run.settings.insertion_s)) " s; paddle in brackets"
             } }
             thead { tr {
                 @for (place, title) in COLUMNS.into_iter().enumerate() { th.left[place + 1 == COLUMNS.len()] { (title) } }

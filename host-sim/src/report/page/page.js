@@ -86,8 +86,8 @@
     reading.textContent = number(depth) + (end ? " (end)" : "");
     for (const body of bodies) {
       const now = at(body.series, depth, end);
-      body.numbers.textContent = `orthogonal error ${number(now[1])}` +
-        (body.tool ? `, paddle moved (${number(now[3])}, ${number(now[4])})` : "");
+      body.numbers.textContent = `orthogonal error ${number(now[1])}${data.unit}` +
+        (body.tool ? `, paddle moved (${number(now[3])}, ${number(now[4])})${data.unit}` : "");
       const along = (row) => [0, 1].map((i) => data.axis[i] * row[2] + data.normal[i] * row[1]);
       const [here, there] = [along(now), along(body.final)];
       shift(body.aim, [here[0] - there[0], here[1] - there[1]]);

@@ -38,6 +38,17 @@ fn over(placement: &PlacementResult, value: impl Fn(&PaddlePlacement) -> f64) ->
     placement.paddles.iter().enumerate().map(|(i, paddle)| (i as f64, value(paddle))).collect()
 }
 
+/// Which paddle to hold, if any.
+fn static_answer(placement: &PlacementResult) -> String {
+    let best = placement.paddles.iter().find(|paddle| paddle.index == placement.best_static);
+    match best.zip(placement.no_paddle.as_ref()) {
+        Some((best, none)) if best.max_orthogonal > none.max_orthogonal => {
+            "no paddle moves the target less than none".to_owned()
+        }
+        _ => format!("paddle {} moves the target least", placement.best_static),
+    }
+}
+
 /// Orthogonal displacement with every paddle held, one chart per tissue on the same scale.
 pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
     let all = run.placements.iter().flat_map(|placement| &placement.paddles);
@@ -52,10 +63,7 @@ pub(super) fn static_charts(run: &RunResult) -> Vec<Panel> {
                 TissueVariant::Inclusion => " (the paper's Figure 3)",
             };
             let mut panel = Panel::new(
-                &format!(
-                    "Tissue {}: paddle {} moves the target least{figure}",
-                    placement.tissue, placement.best_static
-                ),
+                &format!("Tissue {}: {}{figure}", placement.tissue, static_answer(placement)),
                 places(placement, Some(placement.best_static), "best static"),
                 Axis::linear("orthogonal displacement", &run.units[0]).enclosing(values.iter().copied()),
             );

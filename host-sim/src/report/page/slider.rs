@@ -26,6 +26,8 @@ struct Data<'a> {
     target: [f64; 2],
     axis: [f64; 2],
     normal: [f64; 2],
+    /// Behind lengths; empty where there is none.
+    unit: String,
     scale: f64,
     bodies: Vec<DrawnBody<'a>>,
     charts: Vec<(String, [f64; 4])>,
@@ -104,6 +106,7 @@ pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) ->
         target: surface.view.at(geometry.target),
         axis: geometry.needle_axis,
         normal: geometry.orthogonal,
+        unit: if run.units[0] == "1" { String::new() } else { format!(" {}", run.units[0]) },
         scale: surface.view.length(1.0),
         bodies,
         charts: charts.iter().flat_map(CaseCharts::spans).collect(),

@@ -8,6 +8,7 @@ use model_offline::output::chart::{Axis, Colour, Dash, Figure, Panel, Place, Ref
 use super::attachments::Attachments;
 use super::conclusion::{self, change};
 use super::embed::{head_of, panels};
+use super::insertion::{NOISE_BESIDE, dynamic_alone, with_unit};
 use super::space_view::{self, STRATEGIES};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
 use crate::runtime::time::mode::RunMode;
@@ -131,8 +132,12 @@ fn depth_axis(run: &SpaceRun) -> Axis {
 
 /// Error of all strategies: the length of the target's way off the needle's line.
 fn error_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
-    let mut panel =
-        Panel::new("Off the needle's line", depth_axis(run), Axis::linear("orthogonal error", &run.units[0]));
+    let title = match case.improvement {
+        factor if !factor.is_finite() => "Error of all strategies".to_owned(),
+        factor if factor < 1.0 => format!("Dynamic error {} × static", number(1.0 / factor, 2)),
+        factor => format!("Static error {} × dynamic", number(factor, 2)),
+    };
+    let mut panel = Panel::new(&title, depth_axis(run), Axis::linear("orthogonal error", &run.units[0]));
     panel.description = format!("Orthogonal error along the insertion, tissue {}", case.tissue.name());
     for (name, colour, dash, result) in [
         ("no paddle", Colour::Quiet, Dash::Dotted, &case.none),
@@ -146,10 +151,12 @@ fn error_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
 
 /// The dynamic paddles' error alone, beside the sensor's noise.
 fn enlarged_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
-    let title = format!("Dynamic alone: at most {}", number(case.dynamic.max_orthogonal_error, 2));
+    let largest = case.dynamic.max_orthogonal_error;
+    let hides = run.noise > NOISE_BESIDE * largest;
+    let title = dynamic_alone(largest, run.noise, hides, &run.units[0]);
     let mut panel = Panel::new(&title, depth_axis(run), Axis::linear("orthogonal error", &run.units[0]));
     panel.description = format!("Orthogonal error of the dynamic paddles, tissue {}", case.tissue.name());
-    if run.noise > 0.0 {
+    if run.noise > 0.0 && !hides {
         panel.lines.push(ReferenceLine::new("1 σ of the sensor's noise", Place::Y(run.noise), Dash::DashDot));
     }
     panel.series.push(Series::curve("dynamic", Colour::Blue, Dash::Solid, errors(&case.dynamic)));
@@ -158,11 +165,13 @@ fn enlarged_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
 
 /// How far the dynamic paddles are displaced.
 fn paddle_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
-    let mut panel = Panel::new("Paddles", depth_axis(run), Axis::linear("displacement", &run.units[0]));
+    let norm = |p: &[f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let farthest = case.dynamic.series.iter().flat_map(|point| &point.paddles).map(norm).fold(0.0, f64::max);
+    let title = format!("Paddle displacement: at most {}", with_unit(farthest, &run.units[0]));
+    let mut panel = Panel::new(&title, depth_axis(run), Axis::linear("displacement", &run.units[0]));
     panel.description = "Length of the dynamic paddles' displacements along the insertion".to_owned();
     let looks = [(Colour::Blue, Dash::Solid), (Colour::Green, Dash::DashDot)];
     for ((place, index), (colour, dash)) in case.dynamic.paddles.iter().enumerate().zip(looks) {
-        let norm = |p: &[f64; 3]| p.iter().map(|x| x * x).sum::<f64>().sqrt();
         let points =
             case.dynamic.series.iter().filter_map(|point| Some((point.depth, norm(point.paddles.get(place)?))));
         panel.series.push(Series::curve(&format!("paddle {index}"), colour, dash, points.collect()));

@@ -9,9 +9,9 @@ use model_offline::output::chart::number::plain;
 use model_offline::scene::{PlantModel, TissueVariant};
 
 use crate::bench::result::{CaseResult, RunResult, SimulationSettings, StrategyResult};
-use crate::report::PAST_ITS_TABLE;
 use crate::report::below_noise::below_noise;
 use crate::report::paper::paper_optima;
+use crate::report::{AGAINST_NOTHING, PAST_ITS_TABLE};
 use crate::runtime::accounting::ledger::LedgerResult;
 use crate::runtime::names;
 use crate::runtime::time::durations::LoopTiming;
@@ -178,7 +178,9 @@ fn write_causes(text: &mut String, run: &RunResult, digits: usize) -> std::fmt::
 
 /// An error over another one, of which it is this many times smaller; a digit more where that is few.
 pub(super) fn share(factor: f64, other: &str) -> String {
-    if factor < 1.0 {
+    if factor < AGAINST_NOTHING {
+        format!("beyond {other}, which is 0 but for rounding")
+    } else if factor < 1.0 {
         format!("{:.1} times {other}", 1.0 / factor)
     } else if factor < 10.0 {
         format!("1/{factor:.1} of {other}")

@@ -63,24 +63,66 @@ pub fn world_in_time<'m>(
     simulation: &Simulation,
     reductions: &Reductions,
 ) -> Result<World<TissuePlant<'m>>, WorldError> {
-    let at_rest = |simulation: &Simulation| World::sharing(model, paddle, simulation, reductions);
-    let mut world = at_rest(simulation)?;
-    world.tissue.solve_every_step()?;
-    let full = rehearse(&mut world.tissue, simulation)?;
+    let (world, full) = timed_full(model, paddle, simulation, reductions)?;
     if full.keeps_the_period() {
         return Ok(world);
     }
     if simulation.plant.is_some() {
         return Err(full.too_slow());
     }
-    let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..simulation.clone() };
-    let mut world = at_rest(&reduced).map_err(|why| full.too_slow_without(Some(why)))?;
+    let mut world =
+        reduced_world(model, paddle, simulation, reductions).map_err(|why| full.too_slow_without(Some(why)))?;
     let rehearsed = rehearse(&mut world.tissue, simulation)?;
     if !rehearsed.keeps_the_period() {
         return Err(rehearsed.too_slow());
     }
     world.tissue.stands_in_for_full(full.step_us);
     Ok(world)
+}
+
+/// Whether [`world_in_time`] will ask for a reduced model, since the full one takes too long.
+pub fn needs_reduction(
+    model: &TissueModel,
+    paddle: AttachedPaddle<'_>,
+    simulation: &Simulation,
+    reductions: &Reductions,
+) -> bool {
+    // Tissue with a past is never reduced to its states alone.
+    simulation.plant.is_none()
+        && !model.scene().has_a_past()
+        && timed_full(model, paddle, simulation, reductions).is_ok_and(|(_, full)| !full.keeps_the_period())
+}
+
+/// Trains that reduced model; refusals are remembered as well, and told by [`world_in_time`].
+pub fn train_reduction(
+    model: &TissueModel,
+    paddle: AttachedPaddle<'_>,
+    simulation: &Simulation,
+    reductions: &Reductions,
+) {
+    let _ = reduced_world(model, paddle, simulation, reductions);
+}
+
+fn timed_full<'m>(
+    model: &'m TissueModel,
+    paddle: AttachedPaddle<'_>,
+    simulation: &Simulation,
+    reductions: &Reductions,
+) -> Result<(World<TissuePlant<'m>>, Rehearsal), WorldError> {
+    let mut world = World::sharing(model, paddle, simulation, reductions)?;
+    world.tissue.solve_every_step()?;
+    let full = rehearse(&mut world.tissue, simulation)?;
+    Ok((world, full))
+}
+
+fn reduced_world<'m>(
+    model: &'m TissueModel,
+    paddle: AttachedPaddle<'_>,
+    simulation: &Simulation,
+    reductions: &Reductions,
+) -> Result<World<TissuePlant<'m>>, WorldError> {
+    let reduced = Simulation { plant: Some(WantedPlant::Reduced), ..simulation.clone() };
+    World::sharing(model, paddle, &reduced, reductions)
 }
 
 /// Takes the tissue through some steps from the middle of the insertion, and back to rest.

@@ -136,7 +136,8 @@ impl<'a, 'c> Subcells<'a, 'c> {
         self.areas
             .iter()
             .map(|a| a.abs())
-            .zip(self.gradients.chunks_exact(self.nodes.len()))
+            // A cell that is empty has neither triangles nor nodes.
+            .zip(self.gradients.chunks_exact(self.nodes.len().max(1)))
             .filter(|(area, _)| *area > self.no_area)
     }
 

@@ -189,7 +189,7 @@ fn stuffed(scene: &SpaceScene, mut grading: Grading, coarsest: &Grading) -> Resu
         let missed = surface.missed(&mesh, &|x| grading.size(x), most);
         match (unseen.first(), missed.all.first()) {
             (None, None) => return Ok(mesh),
-            (Some(first), _) if left == 0 => return Err(ModelError::UnseenInclusion { number: first + 1 }),
+            (Some(first), _) if left == 0 => return Err(lost(scene, *first)),
             (None, Some(at)) if left == 0 => return Err(ModelError::Mesh(StuffingError::Unresolved { at: *at })),
             _ => {}
         }
@@ -216,13 +216,18 @@ fn halved(present: &Grading, grading: Grading, points: Vec<Point<3>>) -> Grading
     by_power.into_iter().fold(grading, |grading, (power, points)| grading.with(&points, 2.0_f64.powi(power)))
 }
 
+/// An inclusion of which the elements see nothing.
+fn lost(scene: &SpaceScene, place: usize) -> ModelError {
+    ModelError::UnseenInclusion { number: place + 1 }.in_file(scene)
+}
+
 /// Half the size on the surface of an inclusion.
 fn finer(scene: &SpaceScene, grading: Grading, place: usize) -> Result<Grading, ModelError> {
-    let (inclusion, lost) = (&scene.inclusions[place], ModelError::UnseenInclusion { number: place + 1 });
+    let inclusion = &scene.inclusions[place];
     let points = |spacing: f64| surface_points(scene.body.as_ref(), inclusion.region.as_ref(), &|_| spacing);
     let few = points(sampling(inclusion, extent(scene)));
     let size = 0.5 * few.iter().map(|x| grading.size(x)).fold(f64::INFINITY, f64::min);
-    let all = if size.is_finite() { points(SAMPLED * size) } else { return Err(lost) };
+    let all = if size.is_finite() { points(SAMPLED * size) } else { return Err(lost(scene, place)) };
     // Without a point nothing changes; few are where a cube of the search misses a small surface.
     let all = if all.is_empty() { few } else { all };
     Ok(grading.with(&all, size))
@@ -240,13 +245,14 @@ fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<T
         pinned: &[scene.target],
     };
     stuff(&request).map_err(|error| match error {
-        StuffingError::EmptyPatch { patch } => ModelError::NothingCaught {
-            part: match patch.checked_sub(1) {
+        StuffingError::EmptyPatch { patch } => {
+            let part = match patch.checked_sub(1) {
                 None => BoundaryPart::Needle,
                 Some(k) => scene.paddles.get(k).map_or(BoundaryPart::Immobile, |p| BoundaryPart::Paddle(p.index)),
-            },
-            distance: patches.get(patch).and_then(|region| from_surface(scene, *region)),
-        },
+            };
+            let distance = patches.get(patch).and_then(|region| from_surface(scene, *region));
+            ModelError::NothingCaught { part, distance }.in_file(scene)
+        }
         other => ModelError::Mesh(other),
     })
 }

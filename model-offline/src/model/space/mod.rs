@@ -96,7 +96,7 @@ impl SpaceModel {
     pub fn on(scene: &SpaceScene, mesh: &TetMesh) -> Result<Self, ModelError> {
         let surface = Surface::new(mesh, scene.size());
         let patches = patches_of(scene, &surface)?;
-        loose_part(mesh, &patches)?;
+        loose_part(scene, mesh, &patches)?;
         let patch_of = |region: &'_ _| surface.patch(&[region]);
         let regions = scene.immobile.iter().map(|r| r as &dyn Implicit).chain([&scene.needle.region as &dyn Implicit]);
         let regions = regions.chain(scene.paddles.iter().map(|p| &p.region as &dyn Implicit));
@@ -296,7 +296,8 @@ impl HeldNodes {
         let (immobile, needle) = (nodes.next().unwrap_or_default(), nodes.next().unwrap_or_default());
         let paddles: Vec<Vec<u32>> = nodes.collect();
         if let Some((part, other, node)) = touching(scene, [&immobile, &needle], &paddles) {
-            return Err(ModelError::PatchesTouch { part, other, at: spatial.positions()[node as usize].into() });
+            let touch = ModelError::PatchesTouch { part, other, at: spatial.positions()[node as usize].into() };
+            return Err(touch.in_file(scene));
         }
         let all = immobile.iter().chain(&needle).chain(paddles.iter().flatten());
         let rows = all.map(|&node| Ok((node, spatial.nodal_stencil(node)?))).collect::<Result<_, ModelError>>()?;
@@ -328,16 +329,16 @@ fn patches_of(scene: &SpaceScene, surface: &Surface<'_>) -> Result<Vec<Vec<[u32;
     let paddles = scene.paddles.iter().map(|p| (vec![&p.region as &dyn Implicit], BoundaryPart::Paddle(p.index)));
     let all = held.into_iter().chain(paddles);
     all.map(|(regions, part): (Vec<&dyn Implicit>, _)| match surface.patch(&regions) {
-        patch if patch.is_empty() => Err(ModelError::NothingConstrained(part)),
+        patch if patch.is_empty() => Err(ModelError::NothingConstrained(part).in_file(scene)),
         patch => Ok(patch),
     })
     .collect()
 }
 
 /// Refuses a part of the body that neither of the first two patches holds, immobile part and needle.
-fn loose_part(mesh: &TetMesh, patches: &[Vec<[u32; 3]>]) -> Result<(), ModelError> {
+fn loose_part(scene: &SpaceScene, mesh: &TetMesh, patches: &[Vec<[u32; 3]>]) -> Result<(), ModelError> {
     let at = loose(mesh, patches[..2].iter().flatten().flatten());
-    at.map_or(Ok(()), |at| Err(ModelError::LoosePart { at: at.into() }))
+    at.map_or(Ok(()), |at| Err(ModelError::LoosePart { at: at.into() }.in_file(scene)))
 }
 
 /// Those of the scene's pairs whose patches overlap.

@@ -164,7 +164,7 @@ impl Survey {
     pub fn of(scene: &SpaceScene, mesh: &TetMesh) -> Result<Self, ModelError> {
         let surface = Surface::new(mesh, scene.size());
         let patches = patches_of(scene, &surface)?;
-        loose_part(mesh, &patches)?;
+        loose_part(scene, mesh, &patches)?;
         let measured: Vec<PatchSurvey> = patches.iter().map(|patch| PatchSurvey::of(mesh, patch)).collect();
         let volumes = mesh.volumes();
         let inclusions = scene.inclusions.iter().enumerate().map(|(i, inclusion)| {
@@ -265,7 +265,7 @@ fn refused(scene: &SpaceScene, mesh: &TetMesh, patches: &[Vec<[u32; 3]>]) -> Opt
     let corners: Vec<Vec<u32>> = patches.iter().map(|patch| nodes_of(patch, &BTreeMap::new())).collect();
     let [immobile, needle, paddles @ ..] = &corners[..] else { return None };
     let (part, other, node) = touching(scene, [immobile, needle], paddles)?;
-    Some(ModelError::PatchesTouch { part, other, at: mesh.nodes[node as usize].into() })
+    Some(ModelError::PatchesTouch { part, other, at: mesh.nodes[node as usize].into() }.in_file(scene))
 }
 
 /// Depth at which a line that goes into a body comes out of it again, to a thousandth of its size.

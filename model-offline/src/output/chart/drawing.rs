@@ -89,8 +89,23 @@ pub(super) fn text_width(text: &str, size: f64) -> f64 {
     0.6 * size * bold * text.chars().count() as f64
 }
 
-/// A text in lines that are at most this wide; a single word may be wider.
+/// A text in as few lines as there can be that are at most this wide, about equally long, lest the last one be a single word; a
+/// word of its own may be wider.
 pub(super) fn wrap(text: &str, width: f64, size: f64) -> Vec<String> {
+    let widest = |lines: &[String]| lines.iter().map(|line| text_width(line, size)).fold(0.0, f64::max);
+    let mut lines = filled(text, width, size);
+    loop {
+        // Narrower by less than a letter: the longest line gives a word to the next one.
+        let narrower = filled(text, widest(&lines) - 0.5 * text_width("i", size), size);
+        if narrower.len() > lines.len() || widest(&narrower) >= widest(&lines) {
+            return lines;
+        }
+        lines = narrower;
+    }
+}
+
+/// A text in lines that each take all the words that they hold.
+fn filled(text: &str, width: f64, size: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     // What may not be parted, as a number and its power of ten, is one word.
     for word in text.split([' ', '\n']).filter(|word| !word.is_empty()) {
@@ -347,6 +362,10 @@ mod tests {
     fn text_is_wrapped_between_words() {
         assert_eq!(wrap("one two three", text_width("one two", TEXT), TEXT), ["one two", "three"]);
         assert_eq!(wrap("unbreakable", 1.0, TEXT), ["unbreakable"]);
+        // No more lines than are needed, and no word alone on the last.
+        let five = "one two three four five";
+        assert_eq!(wrap(five, text_width("one two three four", TEXT), TEXT), ["one two three", "four five"]);
+        assert_eq!(wrap(five, text_width("one two", TEXT), TEXT), ["one two", "three", "four", "five"]);
         assert!(wrap(" ", 100.0, TEXT).is_empty());
     }
 }

@@ -2,10 +2,13 @@
 
 mod bodies;
 pub mod import;
+mod in_file;
 mod parts;
 pub mod schema;
 pub mod starter;
 mod validate;
+
+pub use in_file::{FilePlace, PartsInFile};
 
 use super::error::{NoSuchPaddle, SceneError, Source};
 use super::limits::{self, LimitError};
@@ -110,6 +113,8 @@ pub struct SpaceScene {
     pub notes: Vec<String>,
     /// Files that the scene names.
     pub files: Vec<PathBuf>,
+    /// Where its parts stand in its file.
+    pub in_file: PartsInFile,
 }
 
 /// A region of another stiffness or material.

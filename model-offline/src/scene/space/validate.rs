@@ -3,7 +3,7 @@
 use super::bodies::Bodies;
 use super::import;
 use super::schema::{DiscretizationSection, InclusionSection, PairsOf, SolidSection, SpaceSceneFile};
-use super::{SpaceInclusion, SpaceNeedle, SpacePaddle, SpaceScene};
+use super::{FilePlace, PartsInFile, SpaceInclusion, SpaceNeedle, SpacePaddle, SpaceScene};
 use crate::discretization::{Discretization, Integration, Method, Resolution};
 use crate::geometry::implicit::share;
 use crate::geometry::{Implicit, Point, Solid};
@@ -95,10 +95,22 @@ impl Validator<'_> {
             discretization: self.discretization(&file.discretization, high - low)?,
             names_method: file.discretization.get().names_method(),
             unit_of_body: bodies.unit_of_body,
+            in_file: self.parts_in_file(),
             needle,
             paddles,
             body,
         })
+    }
+
+    /// Where what is held, what moves and what is elsewhere stiffer stand: only a mesh shows whether they meet.
+    fn parts_in_file(&self) -> PartsInFile {
+        let place = |span: Range<usize>| FilePlace::of(self.source, span.start);
+        PartsInFile {
+            immobile: place(self.file.immobile.regions.first().map_or(0..0, Located::span)),
+            needle: place(self.file.needle.region.span()),
+            paddles: self.file.paddle.iter().map(|p| (p.get().index, place(p.get().region.span()))).collect(),
+            inclusions: self.file.inclusion.iter().map(|inclusion| place(inclusion.span())).collect(),
+        }
     }
 
     /// The diagonal of the body's bounding box; products of three such lengths have to be numbers.

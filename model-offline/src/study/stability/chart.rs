@@ -75,7 +75,11 @@ fn depth_panel(study: &Stability, title: &str, x: Axis, place: Abscissa<'_>) -> 
     let title = ends(&series).map_or_else(
         || title.to_owned(),
         |[left, right]| {
-            format!("{title}: depth {} → {}", plain((left * 1e3).round() / 1e3), plain((right * 1e3).round() / 1e3))
+            format!(
+                "{title}: depth {}\u{a0}→\u{a0}{}",
+                plain((left * 1e3).round() / 1e3),
+                plain((right * 1e3).round() / 1e3)
+            )
         },
     );
     let y = Axis::linear("depth reached", &setting.length_unit).range(0.0, 1.06 * deepest(study));

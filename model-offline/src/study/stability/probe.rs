@@ -188,8 +188,9 @@ fn jittered(scene: &Scene, experiment: &Experiment) -> Vec<Point2> {
     let mut random = SplitMix64(experiment.seed);
     for x in &mut nodes {
         let shift = Point2::new(random.symmetric(), random.symmetric()) * (experiment.jitter * experiment.spacing);
-        let inside = scene.outline.locate(*x, tolerance) == Location::Inside;
-        if inside && distance_to_polyline(*x, &scene.needle.contact) > tolerance {
+        let is_inside = |x: Point2| scene.outline.locate(x, tolerance) == Location::Inside;
+        // Beside an edge that goes across the lattice nodes would be shifted out of the body, where they have no cell.
+        if is_inside(*x) && is_inside(*x + shift) && distance_to_polyline(*x, &scene.needle.contact) > tolerance {
             *x += shift;
         }
     }
@@ -210,4 +211,42 @@ pub(super) fn model(scene: &Scene, experiment: &Experiment) -> Result<TissueMode
     let scene = scene.without_inclusions();
     let nodes = jittered(&scene, experiment);
     with_nodes(&scene, nodes, experiment)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretization::Integration::{self, Dni, FemT3, FemT6, Gauss, Mscni, Nsni, Scni, ScniStabilised};
+    use crate::discretization::Method;
+
+    #[test]
+    fn jittered_nodes_stay_in_the_body_and_one_outside_ends_no_program() {
+        let scene = Scene::bundled("breast").unwrap();
+        let experiment = |integration: Integration, seed| Experiment {
+            method: Method::new(integration),
+            spacing: 5.0,
+            jitter: 0.4,
+            seed,
+            contrast: None,
+            poisson: None,
+            c: None,
+            barrier: None,
+            increments: 10,
+            line_search: true,
+            cutback: true,
+        };
+        let tolerance = 1e-9 * scene.outline.size();
+        let is_outside = |x: &Point2| scene.outline.locate(*x, tolerance) == Location::Outside;
+        for seed in 0..20 {
+            let experiment = experiment(Scni, seed);
+            assert!(!jittered(&scene, &experiment).iter().any(is_outside), "seed {seed}");
+        }
+        for integration in [Dni, Scni, ScniStabilised, Mscni, Nsni, Gauss, FemT3, FemT6] {
+            let experiment = experiment(integration, 0);
+            let mut nodes = jittered(&scene, &experiment);
+            nodes.push(Point2::new(0.0, 1e3));
+            // A model without the node's cell, or an error: which one is the triangulation's.
+            let _ = with_nodes(&scene, nodes, &experiment);
+        }
+    }
 }

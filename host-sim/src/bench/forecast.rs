@@ -1,39 +1,33 @@
-//! When a comparison will have ended, as far as its finished parts tell.
+//! When something will have ended, as far as its finished parts tell.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use super::Comparison;
-use crate::runtime::executor::Hardware;
-use crate::runtime::time::mode::RunMode;
-use model_offline::scene::TissueVariant;
+use super::progress::Progress;
+
+/// What beginning and ending the two processes of a free-run take beside its duration, s.
+const AROUND_FREE_RUN_S: f64 = 1.2;
 
 /// A part of a comparison; parts follow each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Part {
-    /// What it takes, over what the table of the same scene takes.
+    /// What it takes, over what any one of the parts takes.
     work: f64,
     /// What it takes on the machine's clock, s.
     clock_s: f64,
 }
 
-/// Work of the jobs of a comparison, on one thread: medians of scenes of 100 to 2,700 nodes, from which single ones differ by
-/// a factor of up to two.
-struct Jobs {
-    study: f64,
-    table: f64,
-    uncontrolled: f64,
-    controlled: f64,
+impl Part {
+    /// What takes as long as the machine needs.
+    pub(super) fn work(work: f64) -> Self {
+        Self { work, clock_s: 0.0 }
+    }
+
+    /// An insertion in free-run that takes so long, s.
+    pub(super) fn free_run(duration_s: f64) -> Self {
+        Self { work: 0.0, clock_s: duration_s + AROUND_FREE_RUN_S }
+    }
 }
-
-/// Of tissue that answers to where needle and paddle are.
-const ELASTIC: Jobs = Jobs { study: 0.2, table: 1.0, uncontrolled: 0.6, controlled: 0.87 };
-
-/// Of tissue and needles that have a past: they are solved for at more moments.
-const WITH_A_PAST: Jobs = Jobs { study: 0.2, table: 1.0, uncontrolled: 1.4, controlled: 3.2 };
-
-/// What beginning and ending the two processes of a free-run take beside its duration, s.
-const AROUND_FREE_RUN_S: f64 = 1.2;
 
 /// The parts of a comparison in their order, and how fast they go.
 #[derive(Debug, Default)]
@@ -59,11 +53,40 @@ impl Forecast {
         Self { state: Mutex::new(State { parts, ..State::default() }) }
     }
 
+    /// What is known by now to come behind the parts that have begun.
+    pub(super) fn foresee(&self, rest: Vec<Part>) {
+        let mut state = self.lock();
+        let begun = state.begun;
+        state.parts.truncate(begun);
+        state.parts.extend(rest);
+    }
+
+    /// The next of the parts begins, and whoever follows the progress is told.
+    pub(super) fn begins(&self, what: &str, progress: &dyn Progress) {
+        progress.say(what);
+        if let Some([this_s, then_s]) = self.next(Instant::now()) {
+            progress.expect(this_s, then_s);
+        }
+    }
+
+    /// The next of the parts begins, each of which is a step of the progress.
+    pub(super) fn steps_on(&self, what: &str, progress: &dyn Progress) {
+        if self.lock().begun > 0 {
+            progress.step();
+        }
+        progress.begin(self.lock().parts.len() as u64);
+        self.begins(what, progress);
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// What nobody foresaw is to be done next, and takes so long, s.
     pub(super) fn interpose(&self, takes_s: f64) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut state = self.lock();
         let part = match state.pace_s {
-            Some(pace_s) if pace_s > 0.0 => Part { work: takes_s / pace_s, clock_s: 0.0 },
+            Some(pace_s) if pace_s > 0.0 => Part::work(takes_s / pace_s),
             _ => Part { work: 0.0, clock_s: takes_s },
         };
         let next = state.begun;
@@ -74,8 +97,8 @@ impl Forecast {
 
     /// The next part begins now, and the one before has ended: what this part and all behind it will take, s; none where no
     /// part has told yet how fast it goes.
-    pub(super) fn next(&self, now: Instant) -> Option<[f64; 2]> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+    fn next(&self, now: Instant) -> Option<[f64; 2]> {
+        let mut state = self.lock();
         let before = state.begun.checked_sub(1).and_then(|last| state.parts.get(last).copied());
         if let (Some(part), Some(since)) = (before, state.since) {
             let took_s = (now - since).as_secs_f64();
@@ -97,64 +120,16 @@ impl Forecast {
     }
 }
 
-impl Comparison<'_> {
-    /// What the comparison consists of, in the order in which it is done; nothing where that says too little of how long it
-    /// takes.
-    pub(super) fn parts(&self) -> Vec<Part> {
-        let options = &self.options;
-        if options.hardware == Hardware::Qemu || options.causes {
-            return Vec::new();
-        }
-        let has_a_past = TissueVariant::ALL.iter().any(|tissue| tissue.of(&self.scene).has_a_past());
-        let jobs = if has_a_past { WITH_A_PAST } else { ELASTIC };
-        let tissues = self.tissues();
-        let tables = tissues.iter().filter(|tissue| self.needs_table(**tissue)).count();
-        let uncontrolled = self.cases.iter().map(|case| if case.is_mismatch { 1 } else { 2 }).sum();
-        let in_parallel = |count: usize, work: f64| {
-            let rounds = (count as f64 / options.threads as f64).max(1.0);
-            Part { work: work * rounds, clock_s: 0.0 }
-        };
-        let mut parts: Vec<Part> = tissues.iter().map(|_| in_parallel(1, jobs.study)).collect();
-        parts.extend((tables > 0).then(|| in_parallel(tables, jobs.table)));
-        parts.push(in_parallel(uncontrolled, jobs.uncontrolled));
-        if options.mode != Some(RunMode::FreeRun) {
-            parts.push(in_parallel(self.cases.len(), jobs.controlled));
-        }
-        let clock_s = self.simulation.duration_s + AROUND_FREE_RUN_S;
-        parts.extend(self.cases.iter().filter(|case| self.is_in_free_run(case)).map(|_| Part { work: 0.0, clock_s }));
-        parts
-    }
-
-    /// Something that nobody foresaw begins: of so many steps, and of so many seconds.
-    pub(super) fn begins_in_addition(&self, what: &str, steps: u64, takes_s: f64) {
-        self.progress.extend(steps);
-        self.forecast.interpose(takes_s);
-        self.begins(what);
-    }
-
-    /// The next of the parts begins.
-    pub(super) fn begins(&self, what: &str) {
-        self.progress.say(what);
-        if let Some([this_s, then_s]) = self.forecast.next(Instant::now()) {
-            self.progress.expect(this_s, then_s);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
     use super::*;
 
-    fn work(work: f64) -> Part {
-        Part { work, clock_s: 0.0 }
-    }
-
     #[test]
     fn what_is_left_follows_from_the_last_part() {
         let free_run = Part { work: 0.0, clock_s: 7.0 };
-        let forecast = Forecast::of(vec![work(1.0), work(2.0), free_run, free_run, work(4.0)]);
+        let forecast = Forecast::of(vec![Part::work(1.0), Part::work(2.0), free_run, free_run, Part::work(4.0)]);
         let start = Instant::now();
         let at = |seconds: u64| start + Duration::from_secs(seconds);
         assert_eq!(forecast.next(at(0)), None, "nobody knows how fast it goes");
@@ -170,7 +145,7 @@ mod tests {
     #[test]
     fn what_nobody_foresaw_is_done_before_the_rest() {
         let free_run = Part { work: 0.0, clock_s: 7.0 };
-        let forecast = Forecast::of(vec![work(1.0), work(2.0), free_run]);
+        let forecast = Forecast::of(vec![Part::work(1.0), Part::work(2.0), free_run]);
         let start = Instant::now();
         let at = |seconds: u64| start + Duration::from_secs(seconds);
         assert_eq!(forecast.next(at(0)), None);

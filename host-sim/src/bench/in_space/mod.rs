@@ -2,7 +2,9 @@
 //!
 //! The controller is a process of its own, as in the plane; a [table of states](model_offline::reduction::tabulated) is the tissue.
 
-use std::hint::black_box;
+mod insertion;
+mod parts;
+
 use std::path::Path;
 use std::time::Instant;
 
@@ -15,45 +17,38 @@ use model_offline::parallel;
 use model_offline::placement::space::insertion::InsertionModel;
 use model_offline::placement::space::study::{SpaceOptimum, place_in_space};
 use model_offline::placement::space::workflow::insertion_model;
-use model_offline::reduction::{TabulatedBody, TabulationReport};
+use model_offline::reduction::TabulationReport;
 use model_offline::scene::TissueVariant;
 use model_offline::scene::space::SpaceScene;
 use model_offline::table::space::SpaceTable;
-use model_offline::table::{BuiltTable, TableBuildError, TableOptions};
+use model_offline::table::{BuiltTable, TableOptions};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::comparison::ends_early;
 use super::error::SimError;
-use super::insertion::linked::{LinkedController, LinkedInsertion, RunShare};
+use super::forecast::Forecast;
+use super::insertion::linked::LinkedController;
 use super::insertion::{Extras, Label};
+use super::progress::{Progress, Silent};
 use super::result::{FORMAT, RecordingResult, stillest};
 use super::space_bodies::{self, CaseBodies, SpaceBodies};
 use super::strategy::Strategy;
 use crate::exchange::board::{Control, Image, Processor};
-use crate::record::export::foxglove::{Scenery as _, SpaceStage};
-use crate::record::export::{csv, mcap, paraview};
 use crate::record::files::Artifact;
-use crate::record::recording::{Record, Recording};
 use crate::runtime::accounting::ledger::LedgerResult;
-use crate::runtime::executor::{AnyTable, Hardware};
+use crate::runtime::executor::Hardware;
 use crate::runtime::names;
-use crate::runtime::plant::PlantLoop;
-use crate::runtime::plant::observer::{ObservedInsertion, Spectator};
-use crate::runtime::plant::rehearsal::space_in_time;
+use crate::runtime::plant::observer::Spectator;
 use crate::runtime::signals;
 use crate::runtime::time::durations::LoopTiming;
 use crate::runtime::time::mode::RunMode;
-use crate::world::retrace::solved_bodies;
 use crate::world::simulation::Simulation;
-use crate::world::space::{PreparedBody, SpaceTissue};
-use crate::world::truth::{Truth, from_frame};
+use crate::world::space::PreparedBody;
 
-/// Points of a time series in the result.
-const SERIES_POINTS: usize = 500;
-/// States at which the tissue is held against the model that it was tabulated from, after a run.
-const CHECKS: usize = 20;
+use self::insertion::Insertion;
+use self::parts::Shared;
 
 /// A run on a body in space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -261,18 +256,32 @@ pub struct SpaceOptions<'a> {
     pub threads: usize,
 }
 
+impl SpaceOptions<'_> {
+    /// Whether a case of this tissue and this one of its table is controlled once more, in free-run.
+    fn is_once_more(&self, [tissue, table_tissue]: [TissueVariant; 2]) -> bool {
+        self.mode.is_none() && tissue == table_tissue && self.hardware == Hardware::Native
+    }
+}
+
 /// Strategies on a body in space that are about to be compared: on both of its tissues, and on the one with inclusions by what
 /// homogeneous tissue says; or on one tissue alone.
-#[derive(Debug)]
 pub struct SpaceComparison<'a> {
     scene: &'a SpaceScene,
     options: SpaceOptions<'a>,
     simulation: &'a Simulation,
+    progress: &'a dyn Progress,
+    forecast: Forecast,
     homogeneous: Tissue,
     inclusion: Option<Tissue>,
     /// Tissues of simulation and table.
     wanted: Vec<(TissueVariant, TissueVariant)>,
     start: Instant,
+}
+
+impl std::fmt::Debug for SpaceComparison<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SpaceComparison").field("options", &self.options).finish_non_exhaustive()
+    }
 }
 
 impl<'a> SpaceComparison<'a> {
@@ -284,6 +293,7 @@ impl<'a> SpaceComparison<'a> {
         scene: &'a SpaceScene,
         options: &SpaceOptions<'a>,
         simulation: &'a Simulation,
+        progress: &'a dyn Progress,
     ) -> Result<Self, SimError> {
         let start = Instant::now();
         let SpaceOptions { tissue, table_tissue, threads, .. } = *options;
@@ -304,8 +314,19 @@ impl<'a> SpaceComparison<'a> {
                 (TissueVariant::Inclusion, TissueVariant::Homogeneous),
             ],
         };
-        let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads))?;
-        let prepared = Self { scene, options: *options, simulation, homogeneous, inclusion, wanted, start };
+        let mut parts = parts::before(if scene.inclusions.is_empty() { 1 } else { 2 });
+        // Which paddles are controlled the studies will tell: as a rule the same ones by every table.
+        parts.extend(parts::insertions(&wanted, options, simulation.duration_s, |_| [&[], &[]]));
+        let forecast = Forecast::of(parts);
+        let begins = |what: &str| forecast.steps_on(what, progress);
+        let (homogeneous, inclusion) = signals::ends_at_once(|| tissues(scene, threads, &begins))?;
+        let prepared =
+            Self { scene, options: *options, simulation, progress, forecast, homogeneous, inclusion, wanted, start };
+        let best = |variant| {
+            let SpaceOptimum { fixture, dynamic, .. } = &prepared.of(variant).optimum;
+            [fixture.as_slice(), dynamic.as_slice()]
+        };
+        prepared.forecast.foresee(parts::insertions(&prepared.wanted, options, simulation.duration_s, best));
         if options.hardware == Hardware::Qemu {
             prepared.build_images()?;
         }
@@ -345,10 +366,10 @@ impl<'a> SpaceComparison<'a> {
     pub fn run(&self, spectator: Option<&dyn Spectator>) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
         let Self { scene, options, simulation, homogeneous, .. } = self;
         let mut bodies = SpaceBodies { geometry: self.geometry(), cases: Vec::new() };
-        let (mut cases, mut artifacts) = (Vec::new(), Vec::new());
+        let (mut cases, mut artifacts, mut shared) = (Vec::new(), Vec::new(), Shared::default());
         for &(tissue, believed) in &self.wanted {
-            let (world, table) = ((tissue, self.of(tissue)), (believed, self.of(believed)));
-            let compared = case(world, table, simulation, (options, spectator), &mut artifacts)?;
+            let compared = self.case([tissue, believed], spectator, &mut shared, &mut artifacts)?;
+            self.begins(&format!("{tissue}: the body at the end"));
             bodies.cases.push(signals::ends_at_once(|| bodies_of(&self.of(tissue).model, &compared)));
             cases.push(compared);
         }
@@ -373,6 +394,79 @@ impl<'a> SpaceComparison<'a> {
             bodies,
         };
         Ok((result, artifacts))
+    }
+
+    /// A tissue, by the table of what is believed to be one.
+    fn case<'s>(
+        &'s self,
+        [tissue, table_tissue]: [TissueVariant; 2],
+        spectator: Option<&dyn Spectator>,
+        shared: &mut Shared<'s>,
+        artifacts: &mut Vec<Artifact>,
+    ) -> Result<SpaceCase, SimError> {
+        let (world, believed) = (self.of(tissue), self.of(table_tissue));
+        let Self { simulation, options, .. } = *self;
+        let SpaceOptions { program, threads, extras, hardware, .. } = options;
+        let label = |strategy| Label { tissue, table_tissue, strategy };
+        let Shared { tables, bodies, none } = shared;
+        let built = tables.get(table_tissue, || {
+            self.begins(&format!("{table_tissue}: table"));
+            signals::ends_at_once(|| table_of(believed, simulation))
+        })?;
+        let BuiltTable { table, ended } = &*built;
+        let mut still = |strategy, paddles: &[u32]| {
+            self.begins(&format!("{tissue}: {strategy}"));
+            signals::ends_at_once(|| -> Result<SpaceStrategyResult, SimError> {
+                let key = (tissue, false, paddles.to_vec());
+                let body = bodies.get(key, || PreparedBody::new(&world.model, paddles, false, threads))?;
+                let label = label(strategy);
+                Insertion { body: &body, simulation, label, extras, spectator: None, is_held_against_full: true }
+                    .uncontrolled(artifacts)
+            })
+        };
+        // What no paddle touches is the same whatever a table knows.
+        let none = (*none.get(tissue, || still(Strategy::None, &[]))?).clone();
+        let fixture = still(Strategy::Static, &believed.optimum.fixture)?;
+        let bytes = table.to_bytes()?;
+        let key = (tissue, true, table.paddles());
+        let body = bodies.get(key, || {
+            self.begins(&format!("{tissue}: states of the controlled body"));
+            signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))
+        })?;
+        let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
+            self.begins(&format!("{tissue}: dynamic, {mode}"));
+            let is_watched = spectator.is_some();
+            let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
+            let label = label(Strategy::dynamic(mode));
+            Insertion { body: &body, simulation, label, extras, spectator, is_held_against_full: true }
+                .controlled(controller, artifacts)
+        };
+        let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
+        // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
+        let dynamic_free_run =
+            if options.is_once_more([tissue, table_tissue]) { Some(controlled(RunMode::FreeRun)?) } else { None };
+        Ok(SpaceCase {
+            tissue,
+            table_tissue,
+            table: SpaceTableResult {
+                hash: hex(&Sha256::digest(&bytes)),
+                scene_hash: hex(&believed.model.scene().hash()),
+                paddles: table.paddles(),
+                bytes: bytes.len(),
+                depth_end: table.validity().depth_end,
+                ends_early: ends_early(table.validity().depth_end, simulation.needle.depth(), ended.as_ref()),
+            },
+            improvement: fixture.max_orthogonal_error / dynamic.max_orthogonal_error,
+            improvement_over_none: none.max_orthogonal_error / dynamic.max_orthogonal_error,
+            none,
+            fixture,
+            dynamic,
+            dynamic_free_run,
+        })
+    }
+
+    fn begins(&self, what: &str) {
+        self.forecast.steps_on(what, self.progress);
     }
 
     /// The controlled insertion of the last case, to be repeated; it is tabulated again.
@@ -433,11 +527,12 @@ pub fn compare(
     options: &SpaceOptions<'_>,
     simulation: &Simulation,
 ) -> Result<(SpaceRun, Vec<Artifact>), SimError> {
-    SpaceComparison::prepare(scene, options, simulation)?.run(None)
+    SpaceComparison::prepare(scene, options, simulation, &Silent)?.run(None)
 }
 
 /// The homogeneous tissue of a scene, and the one with its inclusions where there are any, with what is best on them.
-fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>), SimError> {
+fn tissues(scene: &SpaceScene, threads: usize, begins: &dyn Fn(&str)) -> Result<(Tissue, Option<Tissue>), SimError> {
+    begins(&format!("{}: placement", TissueVariant::Homogeneous));
     let with = parallel::within(threads, || insertion_model(scene));
     let with = with.map_err(|source| SimError::of_tissue(scene.tissue(), None, source))?;
     let study = |model: InsertionModel| {
@@ -447,8 +542,11 @@ fn tissues(scene: &SpaceScene, threads: usize) -> Result<(Tissue, Option<Tissue>
     let of = |tissue| move |source: ModelError| SimError::of_tissue(tissue, None, source);
     let homogeneous = parallel::within(threads, || with.without_inclusions()).and_then(study);
     let homogeneous = homogeneous.map_err(of(TissueVariant::Homogeneous))?;
-    let inclusion = (!scene.inclusions.is_empty()).then(|| study(with)).transpose();
-    let inclusion = inclusion.map_err(of(TissueVariant::Inclusion))?;
+    let with = (!scene.inclusions.is_empty()).then(|| {
+        begins(&format!("{}: placement", TissueVariant::Inclusion));
+        study(with)
+    });
+    let inclusion = with.transpose().map_err(of(TissueVariant::Inclusion))?;
     Ok((homogeneous, inclusion))
 }
 
@@ -464,240 +562,4 @@ fn bodies_of(model: &InsertionModel, case: &SpaceCase) -> CaseBodies {
 fn table_of(believed: &Tissue, simulation: &Simulation) -> Result<BuiltTable<SpaceTable>, SimError> {
     let options = TableOptions { needle_speed: simulation.needle_speed(), ..TableOptions::default() };
     Ok(SpaceTable::build_as_deep_as_it_goes(&believed.model, &believed.optimum.dynamic, &options)?)
-}
-
-fn case(
-    (tissue, world): (TissueVariant, &Tissue),
-    (table_tissue, believed): (TissueVariant, &Tissue),
-    simulation: &Simulation,
-    (options, spectator): (&SpaceOptions<'_>, Option<&dyn Spectator>),
-    artifacts: &mut Vec<Artifact>,
-) -> Result<SpaceCase, SimError> {
-    let SpaceOptions { program, threads, extras, hardware, .. } = *options;
-    let label = |strategy| Label { tissue, table_tissue, strategy };
-    let mut still = |strategy, paddles: &[u32]| -> Result<SpaceStrategyResult, SimError> {
-        let body = PreparedBody::new(&world.model, paddles, false, threads)?;
-        let label = label(strategy);
-        Insertion { body: &body, simulation, label, extras, spectator: None, is_held_against_full: true }
-            .uncontrolled(artifacts)
-    };
-    let ((table, ended), none, fixture) = signals::ends_at_once(|| -> Result<_, SimError> {
-        let BuiltTable { table, ended } = table_of(believed, simulation)?;
-        Ok(((table, ended), still(Strategy::None, &[])?, still(Strategy::Static, &believed.optimum.fixture)?))
-    })?;
-    let bytes = table.to_bytes()?;
-    let body = signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))?;
-    let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
-        let is_watched = spectator.is_some();
-        let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
-        let label = label(Strategy::dynamic(mode));
-        Insertion { body: &body, simulation, label, extras, spectator, is_held_against_full: true }
-            .controlled(controller, artifacts)
-    };
-    let dynamic = controlled(options.mode.unwrap_or(RunMode::Lockstep))?;
-    // As in the plane: a table of another tissue repeats nothing that this tissue's own case shows already.
-    let once_more = options.mode.is_none() && tissue == table_tissue && hardware == Hardware::Native;
-    let dynamic_free_run = if once_more { Some(controlled(RunMode::FreeRun)?) } else { None };
-    Ok(SpaceCase {
-        tissue,
-        table_tissue,
-        table: SpaceTableResult {
-            hash: hex(&Sha256::digest(&bytes)),
-            scene_hash: hex(&believed.model.scene().hash()),
-            paddles: table.paddles(),
-            bytes: bytes.len(),
-            depth_end: table.validity().depth_end,
-            ends_early: ends_early(table.validity().depth_end, simulation.needle.depth(), ended.as_ref()),
-        },
-        improvement: fixture.max_orthogonal_error / dynamic.max_orthogonal_error,
-        improvement_over_none: none.max_orthogonal_error / dynamic.max_orthogonal_error,
-        none,
-        fixture,
-        dynamic,
-        dynamic_free_run,
-    })
-}
-
-/// An insertion that is to be simulated.
-struct Insertion<'a, 'm> {
-    body: &'a PreparedBody<'m>,
-    simulation: &'a Simulation,
-    label: Label,
-    extras: Extras,
-    spectator: Option<&'a dyn Spectator>,
-    /// Whether it is told how well the tissue was answered for, which takes further solves.
-    is_held_against_full: bool,
-}
-
-impl Insertion<'_, '_> {
-    /// Without a controller: paddles stay where they rest.
-    fn uncontrolled(&self, artifacts: &mut Vec<Artifact>) -> Result<SpaceStrategyResult, SimError> {
-        let mut plant = PlantLoop::new(self.body.world(self.simulation), self.simulation);
-        plant.uncontrolled(self.simulation.loop_settings.period_ns(), &|| ())?;
-        let result = self.measured(&mut plant, RunMode::Lockstep, &[], artifacts);
-        artifacts.extend(self.extras(plant.truths(), None)?);
-        Ok(result)
-    }
-
-    /// Steered by a controller in a process of its own.
-    fn controlled(
-        &self,
-        controller: LinkedController<'_>,
-        artifacts: &mut Vec<Artifact>,
-    ) -> Result<SpaceStrategyResult, SimError> {
-        let Self { body, simulation, label, .. } = *self;
-        let world = match controller.mode {
-            RunMode::Lockstep => body.world(simulation),
-            RunMode::FreeRun => signals::ends_at_once(|| space_in_time(body, simulation))?,
-        };
-        let linked = LinkedInsertion { controller, simulation, progress: &|| () };
-        let mut run = linked.run(PlantLoop::new(world, simulation), |plant| {
-            if let Some(spectator) = self.spectator {
-                let (mode, period_ns) = (controller.mode, simulation.loop_settings.period_ns());
-                let insertion = ObservedInsertion { body, mode, period_ns, title: label.title() };
-                plant.observed_by(spectator.observe_in_space(insertion));
-            }
-        })?;
-        let table = AnyTable::decode(controller.table_bytes).map_err(TableBuildError::Invalid)?;
-        let recording = run.recording(&controller, simulation, body.model().scene().hash(), table.depth_end());
-        let started_ns = run.plant.world().needle_started_ns().unwrap_or(0);
-        let RunShare { share, outside } = run.run_share(started_ns);
-        let measured = || self.measured(&mut run.plant, controller.mode, &recording.records, artifacts);
-        let mut result = signals::ends_at_once(measured);
-        let file = Artifact { name: label.file("rec"), bytes: recording.encode() };
-        result.recording = Some(RecordingResult::of(&file, recording.records.len() as u64));
-        artifacts.push(file);
-        artifacts.extend(signals::ends_at_once(|| self.extras(&recording.truths(), Some(&recording)))?);
-        result.table_hash = Some(hex(&Sha256::digest(controller.table_bytes)));
-        (result.run_share, result.outside_run_for) = (Some(share), outside);
-        (result.final_state, result.faults) = (run.accounts.final_state, run.accounts.faults);
-        (result.timing, result.plant_timing) = (run.accounts.timing, run.plant_timing);
-        result.ledger = Some(run.ledger);
-        Ok(result)
-    }
-
-    /// What an insertion is for other tools, as far as that was asked for: its bodies are solved for once more.
-    fn extras(&self, truths: &[Truth], recording: Option<&Recording>) -> Result<Vec<Artifact>, SimError> {
-        let Self { body, label, extras, .. } = *self;
-        let recording = recording.filter(|_| extras.mcap);
-        let (coarse, mut files) = (body.model().coarse(), Vec::new());
-        if recording.is_none() && !extras.vtu {
-            return Ok(files);
-        }
-        let solved = solved_bodies(coarse, body.paddles(), truths)?;
-        if let Some(recording) = recording {
-            let scene = body.model().scene();
-            let stage = SpaceStage::new(SpaceGeometry::new(coarse), body.paddles(), &solved);
-            let (orthogonal, paddles) = (scene.needle.orthogonal(), body.paddles().len());
-            let series = csv::Series { orthogonal: &orthogonal, paddles, length: &scene.length_unit };
-            let known = mcap::Known { stage: Some(&stage), ..mcap::Known::default() };
-            let bytes = mcap::encode(recording, &series, known)?;
-            files.push(Artifact { name: label.file("mcap"), bytes });
-            files.push(Artifact { name: label.file("foxglove.json"), bytes: stage.layout_file() });
-        }
-        if extras.vtu {
-            let started_ns = solved.first().map_or(0, |body| body.truth.time_ns);
-            files.extend(paraview::series_in_space(coarse, body.paddles(), &solved, started_ns, &label.stem()));
-        }
-        Ok(files)
-    }
-
-    /// What the true motion of the target amounts to, with its time series.
-    fn measured(
-        &self,
-        plant: &mut PlantLoop<SpaceTissue<'_>, 3>,
-        mode: RunMode,
-        records: &[Record],
-        artifacts: &mut Vec<Artifact>,
-    ) -> SpaceStrategyResult {
-        let Self { body, simulation, label, .. } = *self;
-        let (scene, paddles) = (body.model().scene(), body.paddles());
-        let (orthogonal, axis) = (scene.needle.orthogonal(), scene.needle.axis);
-        let series = csv::Series { orthogonal: &orthogonal, paddles: paddles.len(), length: &scene.length_unit };
-        let table = Artifact { name: label.file("csv"), bytes: series.insertion(plant.truths(), records) };
-        let started_ns = plant.world().needle_started_ns().unwrap_or(0);
-        let moving = plant.truths().partition_point(|truth| truth.time_ns < started_ns);
-        let truths = plant.truths()[moving..].to_vec();
-        let error = |truth: &Truth| orthogonal.tr_mul(&truth.target::<3>()).norm();
-        let worst = truths.iter().max_by(|a, b| error(a).total_cmp(&error(b)));
-        let squares: f64 = truths.iter().map(|truth| error(truth).powi(2)).sum();
-        let way = |pair: &[Truth]| -> f64 {
-            let steps = pair[0].paddles.iter().zip(&pair[1].paddles);
-            steps.map(|(from, to)| (from_frame::<3>(*to) - from_frame::<3>(*from)).norm()).sum()
-        };
-        let stride = truths.len().div_ceil(SERIES_POINTS - 1).max(1);
-        let last = truths.len().saturating_sub(1);
-        let kept = truths.iter().enumerate().filter(|(i, _)| i % stride == 0 || *i == last);
-        let result = SpaceStrategyResult {
-            mode,
-            paddles: paddles.to_vec(),
-            max_orthogonal_error: worst.map_or(0.0, error),
-            max_error_depth: worst.map_or(0.0, |truth| truth.depth),
-            rms_orthogonal_error: (squares / truths.len().max(1) as f64).sqrt(),
-            // The sum of nothing is −0.
-            paddle_travel: truths.windows(2).map(way).sum::<f64>() + 0.0,
-            final_state: None,
-            run_share: None,
-            faults: Faults::NONE,
-            outside_run_for: Faults::NONE,
-            ledger: None,
-            timing: None,
-            plant_timing: None,
-            seed: simulation.seed,
-            table_hash: None,
-            recording: None,
-            csv: Some(table.name.clone()),
-            plant: self.plant_account(&mut plant.world().tissue, &truths),
-            series: kept
-                .map(|(_, truth)| SpaceSeriesPoint {
-                    time_s: csv::seconds_since(truth.time_ns, started_ns),
-                    depth: truth.depth,
-                    orthogonal_error: error(truth),
-                    axial: axis.dot(&truth.target::<3>()),
-                    paddles: truth.paddles.iter().take(paddles.len()).copied().collect(),
-                })
-                .collect(),
-        };
-        artifacts.push(table);
-        result
-    }
-
-    /// What answered for the tissue, and how well.
-    fn plant_account(&self, tissue: &mut SpaceTissue<'_>, truths: &[Truth]) -> SpacePlantAccount {
-        let Self { body, .. } = *self;
-        let (fallbacks, first_fallback) = (tissue.fallbacks, tissue.first_fallback.clone());
-        SpacePlantAccount {
-            tabulation: body.report.clone(),
-            step_us: if self.is_held_against_full {
-                step_us(body.table().body(), body.paddles().len(), truths)
-            } else {
-                f64::NAN
-            },
-            fallbacks,
-            first_fallback,
-            largest_estimate: tissue.largest_estimate,
-            largest_error: if self.is_held_against_full { held_against_full(tissue, truths) } else { None },
-        }
-    }
-}
-
-/// Mean time of a step, µs, on the way of a run.
-fn step_us(mut body: TabulatedBody, paddles: usize, truths: &[Truth]) -> f64 {
-    let start = Instant::now();
-    for truth in truths {
-        // Where the table does not reach, finding that out is what a step takes.
-        let places = truth.paddles.map(from_frame);
-        let _ = black_box(body.drive(truth.depth, &places[..paddles]));
-    }
-    start.elapsed().as_secs_f64() * 1e6 / truths.len().max(1) as f64
-}
-
-/// The largest distance of the tissue from its full model at some states of a run, in their order.
-fn held_against_full(tissue: &mut SpaceTissue<'_>, truths: &[Truth]) -> Option<f64> {
-    let every = truths.len().div_ceil(CHECKS).max(1);
-    let mut largest = 0.0_f64;
-    for truth in truths.iter().step_by(every).chain(truths.last()) {
-        largest = largest.max(tissue.held_against_full(truth).ok()?);
-    }
-    Some(largest)
 }
