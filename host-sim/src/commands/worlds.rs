@@ -49,6 +49,7 @@ pub(crate) fn worlds(args: &WorldsArgs) -> Result<(), SimError> {
     check_outputs(&inputs, &[("--json", args.json.as_deref()), ("--svg", args.svg.as_deref())])?;
     let bar = super::progress_bar(args.quiet);
     bar.begin(count());
+    bar.say("insertions into worlds");
     let threads = parallel::threads(args.threads);
     let result = signals::ends_at_once(|| compare(&scene, args.seeds, threads, &|| bar.step()))?;
     bar.finish_and_clear();

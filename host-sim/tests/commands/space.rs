@@ -2,17 +2,23 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::LazyLock;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{LazyLock, Mutex};
 
 use crate::scenes::{quick_with_pairs, with_pairs};
+use host_sim::bench::in_space::{SpaceComparison, SpaceOptions, compare};
+use host_sim::bench::insertion::Extras;
+use host_sim::bench::paper_table::BRICK;
+use host_sim::bench::progress::Progress;
 use host_sim::record::recording::{Record, Recording};
 use host_sim::runtime::accounting::tick::ControllerTick;
-use host_sim::runtime::executor::AnyTable;
+use host_sim::runtime::executor::{AnyTable, Hardware};
+use host_sim::runtime::time::mode::RunMode;
 use host_sim::world::simulation::Simulation;
 use host_sim::world::space::PreparedBody;
 use model_offline::placement::space::workflow::insertion_model;
-use model_offline::scene::SensorPreset;
 use model_offline::scene::space::{AnyScene, SpaceScene};
+use model_offline::scene::{SensorPreset, TissueVariant};
 use nalgebra::Vector3;
 use serde_json::Value;
 
@@ -370,6 +376,69 @@ fn a_free_run_in_space_accounts_for_everything() {
     let file = directory.path().join("report").join(dynamic["recording"]["file"].as_str().unwrap());
     let replayed = host_sim(&["replay"], &file);
     assert!(replayed.status.success(), "{replayed:?}");
+}
+
+/// Who follows a comparison.
+#[derive(Default)]
+struct Followed {
+    steps: AtomicU64,
+    of: AtomicU64,
+    said: Mutex<Vec<String>>,
+}
+
+impl Progress for Followed {
+    fn begin(&self, steps: u64) {
+        self.of.store(steps, Ordering::Relaxed);
+    }
+
+    fn step(&self) {
+        self.steps.fetch_add(1, Ordering::Relaxed);
+    }
+
+    fn say(&self, what: &str) {
+        self.said.lock().unwrap().push(what.to_owned());
+    }
+}
+
+/// Cases share tables, bodies and the insertion without a paddle: each is made once, told once, and changes nothing.
+#[test]
+fn what_cases_share_is_made_once_and_every_part_is_foreseen() {
+    let text =
+        format!("{BRICK}\n[[inclusion]]\nbox = {{ min = [0.6, 0.4, 0.3], max = [0.8, 0.6, 0.5] }}\nstiffness = 10.0\n");
+    let AnyScene::Space(scene) = AnyScene::parse(&text, "brick.toml").unwrap() else { panic!("planar") };
+    let sensor = SensorPreset::of_unit(&scene.length_unit).sensor(scene.needle.depth, &scene.length_unit).unwrap();
+    let simulation = Simulation::in_space(&scene, sensor);
+    let options = |tissue, table_tissue| SpaceOptions {
+        program: Path::new(env!("CARGO_BIN_EXE_host-sim")),
+        tissue,
+        table_tissue,
+        mode: Some(RunMode::Lockstep),
+        hardware: Hardware::Native,
+        extras: Extras::default(),
+        threads: 2,
+    };
+    let followed = Followed::default();
+    let prepared = SpaceComparison::prepare(&scene, &options(None, None), &simulation, &followed).unwrap();
+    let (run, artifacts) = prepared.run(None).unwrap();
+    // The last part is a step when it ends.
+    let [steps, of] = [&followed.steps, &followed.of].map(|count| count.load(Ordering::Relaxed));
+    assert_eq!(steps + 1, of, "{:?}", followed.said);
+    let said = followed.said.into_inner().unwrap();
+    for part in ["homogeneous: placement", "homogeneous: table", "inclusion: table", "inclusion: none"] {
+        assert_eq!(said.iter().filter(|said| *said == part).count(), 1, "{part}: {said:?}");
+    }
+    assert_eq!(said.iter().filter(|said| *said == "inclusion: static").count(), 2, "{said:?}");
+    let [_, known, unknown] = &run.cases[..] else { panic!("{} cases", run.cases.len()) };
+    assert_eq!(known.none, unknown.none);
+    assert!(known.dynamic.series != unknown.dynamic.series && known.table.hash != unknown.table.hash);
+    assert_eq!(artifacts.iter().filter(|artifact| artifact.name.ends_with("none.csv")).count(), 2);
+    // Alone, with nothing to share.
+    let (inclusion, homogeneous) = (TissueVariant::Inclusion, TissueVariant::Homogeneous);
+    let (alone, _) = compare(&scene, &options(Some(inclusion), Some(homogeneous)), &simulation).unwrap();
+    let [alone] = &alone.cases[..] else { panic!("{} cases", alone.cases.len()) };
+    assert_eq!(alone.none.series, unknown.none.series);
+    assert_eq!(alone.fixture.series, unknown.fixture.series);
+    assert_eq!(alone.dynamic.series, unknown.dynamic.series);
 }
 
 /// What no simulation in space has is refused by name, before anything is computed or written.

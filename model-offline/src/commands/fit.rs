@@ -4,10 +4,11 @@ use super::common::SceneArgs;
 use super::error::CliError;
 use super::fit_space;
 use super::json::write_json;
+use indicatif::ProgressBar;
 use model_offline::discretization::Resolution;
 use model_offline::output;
 use model_offline::output::check_outputs;
-use model_offline::output::terminal::complain;
+use model_offline::output::terminal::{self, complain};
 use model_offline::parallel;
 use model_offline::scene::{Scene, limits};
 use model_offline::study::fit;
@@ -71,14 +72,17 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
     };
     limits::check_tolerance(args.tolerance)?;
     check_outputs(&[&args.scene.scene], &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
+    let bar = if args.quiet { ProgressBar::hidden() } else { terminal::progress(0) };
     let told = |what: &str| {
         if !args.quiet {
-            complain(&format!("{what} …"));
+            bar.suspend(|| complain(&format!("{what} …")));
         }
+        bar.set_message(what.to_owned());
     };
     let outcome = fit::fit_told(&scene, args.tolerance, parallel::threads(args.threads), &told)
         .map_err(CliError::from)
         .and_then(|fit| Ok((scene_with(&fit, &args.scene.scene)?, fit)));
+    bar.finish_and_clear();
     let (text, fit) = outcome.map_err(|error| error.reported(args.json.as_deref(), &scene))?;
     let together = output::together();
     if let Some(file) = &args.output {

@@ -168,7 +168,8 @@ pub(crate) fn parse() -> Cli {
         let word = error.get(clap::error::ContextKind::InvalidSubcommand).map(ToString::to_string);
         let argument = error.get(clap::error::ContextKind::InvalidArg).map(ToString::to_string);
         let _ = error.print();
-        if argument.is_some_and(|argument| VARIED.iter().any(|option| argument.starts_with(option))) {
+        let is_unknown = error.kind() == clap::error::ErrorKind::UnknownArgument;
+        if is_unknown && argument.is_some_and(|argument| VARIED.iter().any(|option| argument.starts_with(option))) {
             terminal::complain("\n  tip: studies vary this themselves: leave it out");
         }
         if let Some(word) = word {

@@ -96,3 +96,17 @@ pub(super) fn insertions<'p>(
     }
     parts
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_is_made_once_and_a_failure_is_none() {
+        let mut once = Once::<u32, u32>::default();
+        assert_eq!(once.get(1, || Err("not yet")), Err("not yet"));
+        assert_eq!(once.get::<&str>(1, || Ok(10)).as_deref(), Ok(&10));
+        assert_eq!(once.get(1, || Err("again")).as_deref(), Ok(&10));
+        assert_eq!(once.get::<&str>(2, || Ok(20)).as_deref(), Ok(&20));
+    }
+}

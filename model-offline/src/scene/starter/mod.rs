@@ -165,7 +165,8 @@ impl Layout {
              [target]                            # the point to hold still\nposition = {}\n",
             self.immobile.iter().map(|path| points(path)).collect::<Vec<_>>().join(", "),
             points(&self.contact),
-            point(self.axis),
+            // Of a line in a drawing rounding is left across it.
+            point(self.axis.map(|part| if part.abs() < 1e-12 { 0.0 } else { part })),
             number(self.depth),
             point(self.target)
         );
