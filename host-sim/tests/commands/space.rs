@@ -403,8 +403,8 @@ impl Progress for Followed {
 /// Cases share tables, bodies and the insertion without a paddle: each is made once, told once, and changes nothing.
 #[test]
 fn what_cases_share_is_made_once_and_every_part_is_foreseen() {
-    let text =
-        format!("{BRICK}\n[[inclusion]]\nbox = {{ min = [0.6, 0.4, 0.3], max = [0.8, 0.6, 0.5] }}\nstiffness = 10.0\n");
+    let stiff = "box = { min = [0.5, 0.25, 0.25], max = [1.0, 0.75, 0.75] }\nstiffness = 10.0\n";
+    let text = format!("{}\n[[inclusion]]\n{stiff}", BRICK.replacen("depth = 0.1", "depth = 0.05", 1));
     let AnyScene::Space(scene) = AnyScene::parse(&text, "brick.toml").unwrap() else { panic!("planar") };
     let sensor = SensorPreset::of_unit(&scene.length_unit).sensor(scene.needle.depth, &scene.length_unit).unwrap();
     let simulation = Simulation::in_space(&scene, sensor);
