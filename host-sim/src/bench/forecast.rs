@@ -23,9 +23,14 @@ impl Part {
         Self { work, clock_s: 0.0 }
     }
 
+    /// What takes so long, s, whatever the rest of the parts take.
+    pub(super) fn on_the_clock(clock_s: f64) -> Self {
+        Self { work: 0.0, clock_s }
+    }
+
     /// An insertion in free-run that takes so long, s.
     pub(super) fn free_run(duration_s: f64) -> Self {
-        Self { work: 0.0, clock_s: duration_s + AROUND_FREE_RUN_S }
+        Self::on_the_clock(duration_s + AROUND_FREE_RUN_S)
     }
 }
 

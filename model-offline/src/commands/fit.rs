@@ -72,7 +72,7 @@ pub(super) fn run(args: &FitArgs) -> Result<(), CliError> {
     };
     limits::check_tolerance(args.tolerance)?;
     check_outputs(&[&args.scene.scene], &[("--output", args.output.as_deref()), ("--json", args.json.as_deref())])?;
-    let bar = if args.quiet { ProgressBar::hidden() } else { terminal::progress(0) };
+    let bar = if args.quiet { ProgressBar::hidden() } else { terminal::stages() };
     let told = |what: &str| {
         if !args.quiet {
             bar.suspend(|| complain(&format!("{what} …")));

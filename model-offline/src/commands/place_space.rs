@@ -10,7 +10,7 @@ use model_offline::output::terminal::complain;
 use model_offline::parallel;
 use model_offline::placement::space::study::{SpaceAnswer, SpaceStatic};
 use model_offline::placement::space::{SecondPaddle, SpaceErrorEstimate, SpaceStudy};
-use model_offline::placement::verdict::times_as_far;
+use model_offline::placement::verdict::{ON_ITS_LINE, stays_on_the_line, times_as_far};
 use model_offline::scene::space::SpaceScene;
 use model_offline::tell;
 use serde_json::{Value, json};
@@ -209,6 +209,10 @@ fn harms(what: &str, study: &SpaceStudy, best: &[u32]) -> Option<String> {
     let placement = &study.placement;
     let (held, without) = (placement.sets().position(|(paddles, _)| paddles == best)?, placement.without());
     let (of, of_none) = (placement.static_study(held)?, placement.static_study(without)?);
+    let largest = of_none.orthogonal.iter().copied().fold(0.0, f64::max);
+    if of_none.depth.last().is_some_and(|depth| stays_on_the_line(largest, *depth)) {
+        return Some(format!("no static {what} helps: {ON_ITS_LINE}\n"));
+    }
     let factor = of.over(of_none).filter(|factor| *factor > 1.0)?;
     let is_open = study.uncertain().and_then(|uncertain| uncertain.may_hold_as_well(held, without)) == Some(true);
     let open = if is_open { LEFT_OPEN } else { "" };

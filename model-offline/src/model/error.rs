@@ -347,17 +347,22 @@ impl ModelError {
         let parts = &scene.in_file;
         let place = match &self {
             Self::UnseenInclusion { number } => parts.inclusions.get(number - 1),
-            Self::LoosePart { .. } => Some(&parts.immobile),
+            Self::LoosePart { .. } => parts.immobile.first(),
             Self::NothingCaught { part, .. } | Self::PatchesTouch { part, .. } | Self::NothingConstrained(part) => {
                 match part {
-                    BoundaryPart::Immobile => Some(&parts.immobile),
+                    BoundaryPart::Immobile => parts.immobile.first(),
                     BoundaryPart::Needle => Some(&parts.needle),
                     BoundaryPart::Paddle(index) => parts.paddle(*index),
                 }
             }
             _ => None,
         };
-        match place.cloned() {
+        self.at(place.cloned())
+    }
+
+    /// The error with this place of a file, if there is one.
+    pub(super) fn at(self, place: Option<FilePlace>) -> Self {
+        match place {
             Some(place) => Self::InFile { place, error: Box::new(self) },
             None => self,
         }

@@ -5,6 +5,7 @@ use super::chart::number::number;
 use super::chart::{Axis, Bars, Colour, Figure, Marker, Panel, Place, ReferenceLine, Series};
 use super::result_file::{ResultError, read_value};
 use crate::placement::accuracy::measure_range;
+use crate::placement::verdict::stays_on_the_line;
 use serde::Deserialize;
 use std::path::Path;
 
@@ -71,6 +72,12 @@ impl Held {
     fn largest(&self) -> f64 {
         let stopped_at_once = self.failure.is_some() && self.depth.as_ref().is_some_and(Vec::is_empty);
         if stopped_at_once { f64::NAN } else { self.max_orthogonal }
+    }
+
+    /// Whether the target does not leave the needle's line, but for rounding.
+    fn stays_on_the_line(&self) -> bool {
+        let deepest = self.depth.as_ref().and_then(|depth| depth.last());
+        deepest.is_some_and(|depth| stays_on_the_line(self.max_orthogonal, *depth))
     }
 }
 
@@ -253,12 +260,14 @@ pub fn svg(study: &DrawnStudy, earlier: Earlier) -> String {
     let Optimum { held, dynamic } = &study.optimum;
     let symbol = if study.pairs.is_empty() { "‖J⁻¹n‖" } else { "1/σ_min(NᵀJ)" };
     let controls = match dynamic {
-        Some(set) => format!("Moved: {} needs the least travel", set.in_words()),
+        Some(set) => format!("Moved: {} needs the least travel{}", set.in_words(), as_well(study)),
         None => "Moved: no paddle controls the target".to_owned(),
     };
     let holds = match held {
-        Some(set) if study.largest(set) > study.no_paddle.held.largest() => {
-            "Held: no paddle moves the target less than none".to_owned()
+        Some(set)
+            if study.largest(set) > study.no_paddle.held.largest() || study.no_paddle.held.stays_on_the_line() =>
+        {
+            "Held: no paddle helps".to_owned()
         }
         Some(set) => format!("Held: {} moves the target least", set.in_words()),
         None => "Held: no paddle".to_owned(),

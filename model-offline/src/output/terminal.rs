@@ -73,6 +73,16 @@ pub fn progress(steps: u64) -> ProgressBar {
     styled(ProgressBar::new(steps), ProgressStyle::with_template("{wide_bar} {percent} %, {eta} left  {msg}"))
 }
 
+/// The progress of something of which only the present stage is known: its message.
+pub fn stages() -> ProgressBar {
+    if !std::io::stderr().is_terminal() {
+        return with_lines(0, Some(TimeLeft::default()));
+    }
+    let bar = styled(ProgressBar::new_spinner(), ProgressStyle::with_template("{spinner} {msg}, {elapsed}"));
+    bar.enable_steady_tick(Duration::from_millis(500));
+    bar
+}
+
 /// The progress of something whose steps differ in what they take: what is left is said where somebody foretells it.
 #[derive(Clone, Debug)]
 pub struct LongRun {

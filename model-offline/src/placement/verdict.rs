@@ -37,9 +37,24 @@ pub fn verdict(placement: &Placement) -> Vec<String> {
 /// Says so where even the best static paddle moves the target more than no paddle does.
 fn static_paddles_no_better_than_none(placement: &Placement) -> Option<String> {
     let best = placement.paddles.iter().find(|p| p.index == placement.optimum.static_paddle)?;
+    let none = &placement.no_paddle.static_study;
+    if none.depth.last().is_some_and(|depth| stays_on_the_line(none.max_orthogonal, *depth)) {
+        return Some(format!("no static paddle helps: {ON_ITS_LINE}"));
+    }
     let factor = best.static_over_no_paddle.filter(|factor| *factor > 1.0)?;
     let best = format!("the best one, {}, moves the target", best.index);
     Some(format!("no static paddle helps: {}", times_as_far(&best, factor)))
+}
+
+/// What is said where a paddle has nothing to hold.
+pub const ON_ITS_LINE: &str = "without one the target does not leave the needle's line";
+
+/// Part of its depth to which rounding moves the target off the line of a needle that pushes it along that line.
+const ON_THE_LINE: f64 = 1e-10;
+
+/// Whether a needle that goes so deep leaves the target on its line, but for rounding.
+pub fn stays_on_the_line(largest_orthogonal: f64, depth: f64) -> bool {
+    largest_orthogonal <= ON_THE_LINE * depth
 }
 
 /// Factors beyond this hold a displacement against what rounding leaves of none.
@@ -48,7 +63,7 @@ pub const AGAINST_NOTHING: f64 = 1e6;
 /// "What it does" so many times as far as no paddle does, in words.
 pub fn times_as_far(what_it_does: &str, factor: f64) -> String {
     if factor > AGAINST_NOTHING {
-        return "without one the target does not leave the needle's line".to_owned();
+        return ON_ITS_LINE.to_owned();
     }
     format!("{what_it_does} {factor:.2} times as far as no paddle does")
 }

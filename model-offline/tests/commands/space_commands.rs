@@ -142,6 +142,13 @@ fn a_check_says_what_is_seldom_meant() {
         assert!(code == 2 && told.contains(expected) && !folder.path().join("a.json").exists(), "{to}: {said}");
         assert_eq!(run(&["place", "a.toml", "--spacing", "0.2", "--quiet"], folder.path()), (2, String::new(), said));
     }
+    // Of several regions the one that is at fault.
+    let folder = tempfile::tempdir().unwrap();
+    let (held, off) = ("max = [1.0, 1.0, 1.0] } }", "{ box = { min = [1.2, 0.0, 0.0], max = [1.3, 1.0, 1.0] } }");
+    let text = include_str!("../../scenes/block.toml").replacen(&format!("{held}]"), &format!("{held}, {off}]"), 1);
+    std::fs::write(folder.path().join("a.toml"), &text).unwrap();
+    let (code, _, said) = run(&["check", "a.toml"], folder.path());
+    assert!(code == 2 && said.contains(&behind(&text, &format!("{held}, "))), "{said}");
     let folder = tempfile::tempdir().unwrap();
     let apart = "solid = { union = [{ box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }, \
                  { box = { min = [2.0, 0.0, 0.0], max = [3.0, 1.0, 1.0] } }] }";

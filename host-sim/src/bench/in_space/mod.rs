@@ -408,6 +408,10 @@ impl<'a> SpaceComparison<'a> {
         let Self { simulation, options, .. } = *self;
         let SpaceOptions { program, threads, extras, hardware, .. } = options;
         let label = |strategy| Label { tissue, table_tissue, strategy };
+        let case = match tissue == table_tissue {
+            true => tissue.to_string(),
+            false => format!("{tissue} (table: {table_tissue})"),
+        };
         let Shared { tables, bodies, none } = shared;
         let built = tables.get(table_tissue, || {
             self.begins(&format!("{table_tissue}: table"));
@@ -415,7 +419,7 @@ impl<'a> SpaceComparison<'a> {
         })?;
         let BuiltTable { table, ended } = &*built;
         let mut still = |strategy, paddles: &[u32]| {
-            self.begins(&format!("{tissue}: {strategy}"));
+            self.begins(&format!("{case}: {strategy}"));
             signals::ends_at_once(|| -> Result<SpaceStrategyResult, SimError> {
                 let key = (tissue, false, paddles.to_vec());
                 let body = bodies.get(key, || PreparedBody::new(&world.model, paddles, false, threads))?;
@@ -430,11 +434,11 @@ impl<'a> SpaceComparison<'a> {
         let bytes = table.to_bytes()?;
         let key = (tissue, true, table.paddles());
         let body = bodies.get(key, || {
-            self.begins(&format!("{tissue}: states of the controlled body"));
+            self.begins(&format!("{case}: states of the controlled body"));
             signals::ends_at_once(|| PreparedBody::new(&world.model, &table.paddles(), true, threads))
         })?;
         let mut controlled = |mode| -> Result<SpaceStrategyResult, SimError> {
-            self.begins(&format!("{tissue}: dynamic, {mode}"));
+            self.begins(&format!("{case}: dynamic, {mode}"));
             let is_watched = spectator.is_some();
             let controller = LinkedController { program, table_bytes: &bytes, mode, hardware, is_watched };
             let label = label(Strategy::dynamic(mode));

@@ -8,6 +8,7 @@ use model_offline::table::space::SpaceTable;
 
 use super::{SpaceOptions, SpaceStrategyResult};
 use crate::bench::forecast::Part;
+use crate::runtime::executor::Hardware;
 use crate::runtime::time::mode::RunMode;
 use crate::world::space::PreparedBody;
 
@@ -58,6 +59,8 @@ const STILL_AGAIN: f64 = 0.3;
 const STATES: f64 = 1.8;
 const LOCKSTEP: f64 = 0.25;
 const BODY_AT_THE_END: f64 = 0.25;
+/// What an insertion by the emulated board takes over its own duration.
+const EMULATED: f64 = 3.0;
 
 /// What comes before any insertion, of so many tissues: the body is meshed for the first.
 pub(super) fn before(tissues: usize) -> Vec<Part> {
@@ -89,7 +92,10 @@ pub(super) fn insertions<'p>(
         parts.push(Part::work(if is_new { STILL } else { STILL_AGAIN }));
         parts.extend(first(&mut bodies, (tissue, true, steered)).then_some(Part::work(STATES)));
         let is_in_lockstep = options.mode != Some(RunMode::FreeRun);
-        parts.extend(is_in_lockstep.then_some(Part::work(LOCKSTEP)));
+        parts.extend(is_in_lockstep.then_some(match options.hardware {
+            Hardware::Native => Part::work(LOCKSTEP),
+            Hardware::Qemu => Part::on_the_clock(EMULATED * duration_s),
+        }));
         let is_in_free_run = !is_in_lockstep || options.is_once_more([tissue, believed]);
         parts.extend(is_in_free_run.then(|| Part::free_run(duration_s)));
         parts.push(Part::work(BODY_AT_THE_END));

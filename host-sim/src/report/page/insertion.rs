@@ -9,6 +9,7 @@ use crate::bench::in_process::Errors;
 use crate::bench::result::{CaseResult, NeedlePoint, NeedleResult, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
 use crate::record::export::csv;
+use crate::report::AGAINST_NOTHING;
 use crate::runtime::names;
 
 /// A case in words.
@@ -74,7 +75,7 @@ fn short_name(case: &CaseResult) -> String {
 
 /// Error of all strategies.
 fn error_panel(run: &RunResult, case: &CaseResult) -> Panel {
-    let title = case.improvement.filter(|factor| factor.is_finite()).map_or_else(
+    let title = case.improvement.filter(|factor| factor.is_finite() && *factor > AGAINST_NOTHING).map_or_else(
         || format!("Tissue {}: all strategies", short_name(case)),
         |factor| match factor < 1.0 {
             true => format!("Tissue {}: dynamic error {} × static", short_name(case), number(1.0 / factor, 2)),

@@ -3,6 +3,7 @@
 use maud::{Markup, html};
 use model_offline::output::chart::number::{NO_NUMBER, in_unit, minus, number, plain};
 use model_offline::output::chart::{Axis, Bars, Colour, Dash, Marker, Panel, Place, ReferenceLine, Series, Strip};
+use model_offline::placement::verdict::stays_on_the_line;
 use model_offline::scene::TissueVariant;
 
 use crate::bench::result::{PaddlePlacement, PlacementResult, RunResult};
@@ -41,10 +42,11 @@ fn over(placement: &PlacementResult, value: impl Fn(&PaddlePlacement) -> f64) ->
 /// Which paddle to hold, if any.
 fn static_answer(placement: &PlacementResult) -> String {
     let best = placement.paddles.iter().find(|paddle| paddle.index == placement.best_static);
-    match best.zip(placement.no_paddle.as_ref()) {
-        Some((best, none)) if best.max_orthogonal > none.max_orthogonal => {
-            "no paddle moves the target less than none".to_owned()
-        }
+    // Of an insertion that stopped at once nothing is known.
+    let none = placement.no_paddle.as_ref().and_then(|none| Some((none.max_orthogonal, *none.depth.last()?)));
+    match best.zip(none) {
+        Some((_, (none, depth))) if stays_on_the_line(none, depth) => "no held paddle helps".to_owned(),
+        Some((best, (none, _))) if best.max_orthogonal > none => "no held paddle helps".to_owned(),
         _ => format!("paddle {} moves the target least", placement.best_static),
     }
 }

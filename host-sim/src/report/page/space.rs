@@ -11,6 +11,7 @@ use super::embed::{head_of, panels};
 use super::insertion::{NOISE_BESIDE, dynamic_alone, with_unit};
 use super::space_view::{self, STRATEGIES};
 use crate::bench::in_space::{SpaceCase, SpaceRun, SpaceStrategyResult};
+use crate::report::AGAINST_NOTHING;
 use crate::runtime::time::mode::RunMode;
 
 /// Numbers under the pointer, pictures to keep.
@@ -133,7 +134,7 @@ fn depth_axis(run: &SpaceRun) -> Axis {
 /// Error of all strategies: the length of the target's way off the needle's line.
 fn error_panel(run: &SpaceRun, case: &SpaceCase) -> Panel {
     let title = match case.improvement {
-        factor if !factor.is_finite() => "Error of all strategies".to_owned(),
+        factor if !factor.is_finite() || factor < AGAINST_NOTHING => "Error of all strategies".to_owned(),
         factor if factor < 1.0 => format!("Dynamic error {} × static", number(1.0 / factor, 2)),
         factor => format!("Static error {} × dynamic", number(factor, 2)),
     };

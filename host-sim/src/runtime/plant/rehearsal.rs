@@ -93,14 +93,14 @@ pub fn needs_reduction(
         && timed_full(model, paddle, simulation, reductions).is_ok_and(|(_, full)| !full.keeps_the_period())
 }
 
-/// Trains that reduced model; refusals are remembered as well, and told by [`world_in_time`].
+/// Trains that reduced model, and tells whether there is one; refusals are remembered as well, and told by [`world_in_time`].
 pub fn train_reduction(
     model: &TissueModel,
     paddle: AttachedPaddle<'_>,
     simulation: &Simulation,
     reductions: &Reductions,
-) {
-    let _ = reduced_world(model, paddle, simulation, reductions);
+) -> bool {
+    reduced_world(model, paddle, simulation, reductions).is_ok()
 }
 
 fn timed_full<'m>(

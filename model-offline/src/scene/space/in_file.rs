@@ -32,8 +32,8 @@ impl fmt::Display for FilePlace {
 /// Where the regions of a scene are given.
 #[derive(Debug, Clone)]
 pub struct PartsInFile {
-    /// What is immobile, the first of its regions.
-    pub immobile: FilePlace,
+    /// Regions of what is immobile, in their order; at least one.
+    pub immobile: Vec<FilePlace>,
     /// The needle's contact.
     pub needle: FilePlace,
     /// Paddles, by their indices.

@@ -106,7 +106,7 @@ impl Validator<'_> {
     fn parts_in_file(&self) -> PartsInFile {
         let place = |span: Range<usize>| FilePlace::of(self.source, span.start);
         PartsInFile {
-            immobile: place(self.file.immobile.regions.first().map_or(0..0, Located::span)),
+            immobile: self.file.immobile.regions.iter().map(|region| place(region.span())).collect(),
             needle: place(self.file.needle.region.span()),
             paddles: self.file.paddle.iter().map(|p| (p.get().index, place(p.get().region.span()))).collect(),
             inclusions: self.file.inclusion.iter().map(|inclusion| place(inclusion.span())).collect(),
