@@ -249,7 +249,7 @@ fn stuffed_once(scene: &SpaceScene, size: &dyn Fn(&Point<3>) -> f64) -> Result<T
             let distance = patches.get(patch).and_then(|region| from_surface(scene, *region));
             let nothing = |part| ModelError::NothingCaught { part, distance };
             // In the order of `patches`.
-            match patch.checked_sub(1).map(|k| scene.paddles.get(k).ok_or(k - scene.paddles.len())) {
+            match patch.checked_sub(1).map(|k| scene.paddles.get(k).ok_or_else(|| k - scene.paddles.len())) {
                 None => nothing(BoundaryPart::Needle).in_file(scene),
                 Some(Ok(paddle)) => nothing(BoundaryPart::Paddle(paddle.index)).in_file(scene),
                 Some(Err(region)) => nothing(BoundaryPart::Immobile).at(scene.in_file.immobile.get(region).cloned()),
