@@ -70,6 +70,38 @@ fn the_report_has_every_chart_says_nothing_on_the_console_and_its_slider_works()
     assert_eq!(browser.complaints(), Vec::<String>::new());
 }
 
+/// In the middle of the view is the body, and in its corner nothing: the value under the pointer is within what the colour bar says,
+/// and called as there.
+fn values_are_read_under_the_pointer(browser: &Browser, views: &[(&str, &str)]) {
+    let over = |x: f64, y: f64| {
+        browser.run(&format!(
+            "const c = document.querySelector('#view canvas'), r = c.getBoundingClientRect(); \
+             c.dispatchEvent(new PointerEvent('pointermove', \
+             {{ clientX: r.left + {x} * r.width, clientY: r.top + {y} * r.height }})); \
+             const tip = document.querySelector('#tip'); return tip.hidden ? null : tip.textContent"
+        ))
+    };
+    let bar = |class: &str| {
+        browser.run(&format!(
+            "return [...document.querySelectorAll('#body .colours text.{class}')].map((t) => t.textContent)"
+        ))
+    };
+    let number = |text: &str| text.split([' ', '\u{a0}']).next().unwrap().parse::<f64>().unwrap();
+    for (field, part) in views {
+        for (name, value) in [("field", field), ("part", part)] {
+            browser.run(&format!(
+                "const s = document.querySelector('#view-{name}'); s.value = '{value}'; s.dispatchEvent(new Event('change'))"
+            ));
+        }
+        let label = bar("muted")[0].as_str().unwrap().to_owned();
+        let most = bar("tick")[2].as_str().unwrap().to_owned();
+        let told = over(0.5, 0.5).as_str().unwrap().to_owned();
+        let value = number(told.strip_prefix(&format!("{label}: ")).unwrap_or_else(|| panic!("{told} of {label}")));
+        assert!(value >= 0.0 && (value <= 1.01 * number(&most) || most.ends_with("and more")), "{told}, {most}");
+        assert!(over(0.01, 0.01).is_null(), "there is no body in the corner");
+    }
+}
+
 /// The view in space is turned, cut and coloured by its controls and by keys; pictures stand in its place on paper and without
 /// WebGL.
 #[test]
@@ -104,12 +136,23 @@ fn a_body_in_space_can_be_turned_and_cut() {
                  for (const kind of ['input', 'change']) s.dispatchEvent(new Event(kind))"
             ))
         };
-        for (name, value) in [("cut", "all"), ("strategy", "0"), ("field", "size"), ("times", "3"), ("cut", "none")] {
+        for (name, value) in [
+            ("cut", "all"),
+            ("strategy", "0"),
+            ("field", "size"),
+            ("times", "3"),
+            ("cut", "none"),
+            ("field", "strain"),
+            ("field", "von_mises"),
+            ("part", "near"),
+        ] {
             choose(name, value);
             let now = drawn();
             assert!(!seen.contains(&now), "{name} {value} changes nothing");
             seen.push(now);
         }
+        let views = [("size", "whole"), ("strain", "near"), ("von_mises", "whole"), ("orthogonal", "near")];
+        values_are_read_under_the_pointer(&browser, &views);
         for key in ["ArrowLeft", "ArrowUp", "+"] {
             browser.run(&format!(
                 "document.querySelector('#view canvas').dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}' }}))"
@@ -336,6 +379,7 @@ fn a_body_in_space_moves_in_the_live_view_and_is_turned() {
              done([...g.getImageData(0, 0, 200, 100).data].reduce((sum, part, i) => (31 * sum + part * (i % 251)) % 1000003, 7)); }); })";
         let drawn = |key: &str| browser.run(&picture.replace("KEY", key));
         assert_ne!(drawn("ArrowLeft"), drawn("ArrowUp"), "it is turned while time is held");
+        values_are_read_under_the_pointer(&browser, &[("size", "near"), ("orthogonal", "whole")]);
     }
     for (width, scheme) in [(1280, "light"), (1280, "dark"), (390, "dark")] {
         browser.look(width, 1000, scheme);

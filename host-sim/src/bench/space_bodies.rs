@@ -22,16 +22,9 @@ pub struct SpaceBodies {
 impl SpaceBodies {
     /// Whether they can be drawn as those of so many cases: what is read from a file may be anything.
     pub(super) fn are_of(&self, cases: usize) -> bool {
-        let (geometry, nodes) = (&self.geometry, self.geometry.nodes.len());
-        let known = |node: &u32| (*node as usize) < nodes;
-        let patches = geometry.paddles.iter().map(|paddle| &paddle.triangles).chain(&geometry.inclusions);
-        let mut triangles =
-            patches.chain([&geometry.outside, &geometry.immobile, &geometry.needle]).flatten().flatten();
         self.cases.len() == cases
-            && geometry.parts.len() == geometry.tetrahedra.len()
-            && geometry.tetrahedra.iter().flatten().all(known)
-            && triangles.all(known)
-            && self.cases.iter().flatten().flatten().all(|state| state.displacements.len() == nodes)
+            && self.geometry.check().is_ok()
+            && self.cases.iter().flatten().flatten().all(|state| state.check(&self.geometry).is_ok())
     }
 }
 

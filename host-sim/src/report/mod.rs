@@ -19,7 +19,7 @@ const PAST_ITS_TABLE: &str =
     "past the end of its table the controller goes on with the last knot, to twice that depth at most";
 
 /// An error that is so many times another one is held against nothing: the other is what rounding leaves of 0.
-const AGAINST_NOTHING: f64 = 1e-6;
+const AGAINST_NOTHING: f64 = 1.0 / model_offline::placement::verdict::AGAINST_NOTHING;
 
 // Needles further past the table's end are refused by the controller: as far as the table is long is "twice".
 const _: () = assert!(DEPTH_MARGIN == 1.0);

@@ -46,6 +46,9 @@ impl SpaceShown {
             paddle_displacements: places.into_iter().map(Into::into).collect(),
             displacements: moved.into_iter().map(Into::into).collect(),
             target: truth.target,
+            // Nobody waits for them while the needle moves.
+            strain: Vec::new(),
+            von_mises: Vec::new(),
         })
     }
 }

@@ -7,7 +7,7 @@ use std::process::Command;
 use assert_cmd::Command as Checked;
 use host_sim::bench::result::RunResult;
 use model_offline::output::field_picture::Field;
-use model_offline::output::result_file::{Which, read_body};
+use model_offline::output::result_file::{AnyBody, Which, read_body};
 use serde_json::Value;
 
 fn host_sim() -> Checked {
@@ -234,7 +234,7 @@ fn check_bodies(report: &Path) {
     for (strategy, found) in whole.cases[0].strategies.iter().map(|(strategy, found)| (strategy.to_string(), found)) {
         for frame in &found.frames {
             let which = Which { strategy: Some(strategy.clone()), depth: Some(frame.depth), ..Which::default() };
-            let body = read_body(&result, &which).unwrap();
+            let AnyBody::Planar(body) = read_body(&result, &which).unwrap() else { panic!("in the plane") };
             assert_eq!((body.depth, &body.nodes, &body.strain), (frame.depth, &frame.nodes, &frame.strain));
             assert_eq!((body.paddle, &body.units), (found.paddle, &whole.units));
             let fields = Field::ALL.map(|(_, field)| field.values(&body).unwrap());

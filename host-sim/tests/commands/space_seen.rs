@@ -7,11 +7,14 @@ use std::process::{Command, Output};
 
 use crate::files::check_schema;
 use crate::scenes::with_pairs;
+use host_sim::bench::in_space::SpaceRun;
 use host_sim::record::recording::Recording;
 use host_sim::world::truth::{Truth, from_frame};
 use model_offline::geometry::Point;
 use model_offline::model::space::SpaceModel;
 use model_offline::model::space::surfaces::Surfaces;
+use model_offline::output::field_picture::Field;
+use model_offline::output::result_file::{AnyBody, Which, read_body};
 use model_offline::placement::space::workflow::coarse;
 use model_offline::scene::space::{AnyScene, SpaceScene};
 use model_offline::solver::equilibrium::NewtonSettings;
@@ -125,6 +128,7 @@ fn a_run_in_space_can_be_opened_elsewhere() {
     mcap_shows_the_body_where_the_recording_and_the_model_have_it(directory.path(), &path, &model, &truths);
     vtu_has_what_the_displacement_tells(&report, &model, &truths);
     check_schema(&report, "result-in-space");
+    bodies_can_be_drawn(&report);
     the_report_is_made_again(directory.path(), &report);
 }
 
@@ -344,6 +348,30 @@ fn parts_go_where_the_run_took_them(text: &str, model: &SpaceModel, end: &Truth)
         assert_eq!(triangles[&(4, paddle.index)], patch.len());
     }
     assert_eq!(part.iter().filter(|part| **part == 2.0).count(), 1);
+}
+
+/// What `model-offline draw` makes pictures of: the body of every strategy, with every field; what is not there is said.
+fn bodies_can_be_drawn(report: &Path) {
+    let file = report.join("result.json");
+    let whole: SpaceRun = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    for (strategy, expected) in ["none", "static", "dynamic"].iter().zip(&whole.bodies.cases[0]) {
+        let which = Which { strategy: Some((*strategy).to_owned()), ..Which::default() };
+        let AnyBody::Space(body) = read_body(&file, &which).unwrap() else { panic!("in space") };
+        assert_eq!((&body.state, body.held_still), (expected.as_ref().unwrap(), *strategy == "static"));
+        assert!(body.name.starts_with(&format!("{}, inclusion, {strategy}, ", whole.scene)), "{}", body.name);
+        for (name, field) in Field::ALL {
+            let values = field.values_in_space(&body.geometry, &body.state).unwrap();
+            let largest = values.iter().copied().fold(0.0, f64::max);
+            assert!(values.len() == body.geometry.nodes.len() && largest > 0.0 && largest.is_finite(), "{name}");
+        }
+    }
+    let error = |which: &Which| read_body(&file, which).unwrap_err().to_string();
+    assert!(error(&Which { case: Some(9), ..Which::default() }).contains("has no case 9"));
+    assert!(
+        error(&Which { strategy: Some("dynamic-free-run".to_owned()), ..Which::default() })
+            .contains("case 1 has no dynamic-free-run")
+    );
+    assert!(error(&Which { depth: Some(0.0), ..Which::default() }).contains("at the end of the insertion alone"));
 }
 
 /// `report` makes the same page again from the result alone, takes in what lies beside it, and writes the pictures; a result

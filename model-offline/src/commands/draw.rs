@@ -7,7 +7,7 @@ use super::error::CliError;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use model_offline::output::field_picture::{self, Field};
 use model_offline::output::placement_picture::{self, DrawnStudy, read_study};
-use model_offline::output::result_file::{Which, read_body};
+use model_offline::output::result_file::{AnyBody, Which, read_body};
 use model_offline::output::space_picture::{self, SpaceGeometry};
 use model_offline::output::terminal::complain;
 use model_offline::output::{PictureFormat, check_outputs, scene_picture, write_picture};
@@ -23,8 +23,8 @@ pub(super) struct DrawArgs {
     /// Where to write the picture: a .svg, .png or .pdf file.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// What the colours of a result show; a result is a .json file of `place --json` or, in the plane, of `solve --json` or
-    /// `host-sim run`, in place of a scene.
+    /// What the colours of a result show; a result is a .json file of `place --json`, `solve --json` or `host-sim run`, in place of a
+    /// scene [default: size; in space orthogonal]
     #[arg(long, value_parser = PossibleValuesParser::new(Field::ALL.map(|(name, _)| name)).try_map(|name| field(&name)))]
     field: Option<Field>,
     /// Number of the case of a result of `host-sim run` [default: 1]
@@ -136,15 +136,38 @@ fn draw_result(args: &DrawArgs) -> Result<(), CliError> {
         return Err(no_study("with --beside", result));
     }
     let which = Which { case: args.case, strategy: args.strategy.clone(), depth: args.depth };
-    let body = read_body(result, &which)?;
-    let field = args.field.unwrap_or(Field::Size);
-    let Some(values) = field.values(&body) else {
-        let there: Vec<&str> =
-            Field::ALL.iter().filter(|(_, field)| field.values(&body).is_some()).map(|(name, _)| *name).collect();
-        return Err(CliError::usage(
-            format!("{}: it does not have this field", result.display()),
-            format!("--field {}; tissue that relaxes has no stress that a displacement tells", there.join(" or ")),
-        ));
+    let svg = match read_body(result, &which)? {
+        AnyBody::Planar(body) => {
+            let (field, values) = wanted(args, Field::Size, |field| field.values(&body))?;
+            field_picture::svg(&body, field, &values)
+        }
+        AnyBody::Space(body) => {
+            let values_of = |field: Field| field.values_in_space(&body.geometry, &body.state);
+            let (field, values) = wanted(args, Field::Orthogonal, values_of)?;
+            space_picture::svg(&body, field, &values)
+        }
     };
-    Ok(write_picture(&args.output, &field_picture::svg(&body, field, &values))?)
+    Ok(write_picture(&args.output, &svg)?)
+}
+
+/// The field that is asked for, and its values at the nodes.
+fn wanted(
+    args: &DrawArgs,
+    default: Field,
+    values_of: impl Fn(Field) -> Option<Vec<f64>>,
+) -> Result<(Field, Vec<f64>), CliError> {
+    let field = args.field.unwrap_or(default);
+    if let Some(values) = values_of(field) {
+        return Ok((field, values));
+    }
+    let there = Field::ALL.iter().filter(|(_, field)| values_of(*field).is_some());
+    let names: Vec<&str> = there.map(|(name, _)| *name).collect();
+    Err(CliError::usage(
+        format!("{}: it does not have this field", args.scene.scene.display()),
+        format!(
+            "--field {}; tissue that relaxes has no stress that a displacement tells, and results of older versions in space \
+             have displacements alone",
+            names.join(" or ")
+        ),
+    ))
 }

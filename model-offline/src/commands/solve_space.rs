@@ -8,7 +8,8 @@ use model_offline::model::ModelError;
 use model_offline::model::space::{SpaceBody, SpaceModel};
 use model_offline::number::{in_unit, short};
 use model_offline::output;
-use model_offline::output::space_picture::{self, SpaceGeometry, SpaceState};
+use model_offline::output::field_picture::Field;
+use model_offline::output::space_picture::{self, DrawnBody, SpaceGeometry, SpaceState};
 use model_offline::output::terminal::complain;
 use model_offline::output::vtu::{self, Shown, Sight};
 use model_offline::parallel;
@@ -144,6 +145,8 @@ fn write(
     let point = |p: &Vector3<f64>| <[f64; 3]>::from(*p);
     let coefficients = body.equilibrium().coefficients();
     let moved = model.nodal_displacements(coefficients);
+    let (geometry, state) = (SpaceGeometry::new(model), SpaceState::new(body, args.paddles));
+    let drawn = DrawnBody::new(geometry, state, scene.tissue().name(), false);
     let document = json!({
         "scene": scene.name, "dimension": 3, "tissue": scene.tissue(), "nodes": model.nodes(), "dofs": model.dofs(),
         "integration": scene.discretization.method.integration,
@@ -157,28 +160,33 @@ fn write(
         "newton_iterations": body.equilibrium().effort().iterations,
         "node_positions": model.spatial().positions().iter().map(point).collect::<Vec<_>>(),
         "node_displacements": moved.iter().map(point).collect::<Vec<_>>(),
+        "geometry": &drawn.geometry, "strain": &drawn.state.strain,
+        "von_mises": (!drawn.state.von_mises.is_empty()).then_some(&drawn.state.von_mises),
         "units": [&scene.length_unit, &scene.stress_unit],
         "failure": null,
     });
     let _together = output::together();
     write_json(args.json, &document)?;
-    draw(model, body, args)
+    draw(model, body, &drawn, args)
 }
 
 /// The pictures that are asked for.
-fn draw(model: &SpaceModel, body: &SpaceBody, args: SpaceArgs<'_>) -> Result<(), CliError> {
-    let (geometry, state) = (SpaceGeometry::new(model), SpaceState::new(body, args.paddles));
+fn draw(model: &SpaceModel, body: &SpaceBody, drawn: &DrawnBody, args: SpaceArgs<'_>) -> Result<(), CliError> {
+    let DrawnBody { geometry, state, .. } = drawn;
     if let Some(file) = args.vtu {
         let text = vtu::vtu_in_space(model, body.equilibrium().coefficients());
         let scene = model.scene();
         let units = [&scene.length_unit[..], &scene.stress_unit];
         let of_points = scene.discretization.method.integration.is_nodal();
-        let in_space = Some(Sight::new(&geometry, args.paddles));
+        let in_space = Some(Sight::new(geometry, args.paddles));
         let shown = Shown { scene: &scene.name, units, stress: true, of_points, in_space, ..Shown::default() };
-        ForParaView::beside(file).write(&text, &vtu::parts_in_space(&geometry, &state), shown)?;
+        ForParaView::beside(file).write(&text, &vtu::parts_in_space(geometry, state), shown)?;
     }
     if let Some(file) = args.svg {
-        output::write_whole(file, space_picture::svg(&geometry, &state).as_bytes())?;
+        // What paddles are to take away.
+        let field = Field::Orthogonal;
+        let values = field.values_in_space(geometry, state).unwrap_or_default();
+        output::write_whole(file, space_picture::svg(drawn, field, &values).as_bytes())?;
     }
     Ok(())
 }

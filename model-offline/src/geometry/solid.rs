@@ -6,6 +6,9 @@ use super::point::Point;
 /// A region in which a flat box lies this close to its plane, relative to the size of the box, lies in it.
 const FLAT: f64 = 1e-9;
 
+/// Boxes and joints of a union beyond which none is joined.
+const MOST_JOINED: usize = 200;
+
 /// Bodies made of simple ones. All lengths in scene length units.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Solid {
@@ -85,6 +88,43 @@ impl Solid {
 }
 
 impl Solid {
+    /// What lies in any of these. Boxes that share a part of a face are joined there: the levels of both are 0 in it, which is inside of
+    /// the union.
+    #[must_use]
+    pub fn union(mut members: Vec<Self>) -> Self {
+        let mut first = 0;
+        // Joints may share faces with boxes, and with each other, in their turn.
+        while first < members.len() && members.len() <= MOST_JOINED {
+            for other in 0..first {
+                let joint = members[first].joint(&members[other]);
+                let joint = joint.filter(|joint| !members.iter().any(|member| member.contains(joint)));
+                members.extend(joint);
+            }
+            first += 1;
+        }
+        Self::Union(members)
+    }
+
+    /// The largest box inside of two that holds what their faces have in common; none where no area of a face is.
+    fn joint(&self, other: &Self) -> Option<Self> {
+        let (Self::Box { min: a, max: b }, Self::Box { min: c, max: d }) = (self, other) else { return None };
+        let tolerance = FLAT * ((b - a).norm() + (d - c).norm());
+        let (low, high) = (a.sup(c), b.inf(d));
+        let k = (0..3).find(|k| (b[*k] - c[*k]).abs() <= tolerance || (d[*k] - a[*k]).abs() <= tolerance)?;
+        let is_shared = (0..3).filter(|i| *i != k).all(|i| high[i] - low[i] > tolerance);
+        let along = |i: usize, shared: f64, of_both: f64| if i == k { of_both } else { shared };
+        is_shared.then(|| Self::Box {
+            min: Point::from_fn(|i, _| along(i, low[i], a[i].min(c[i]))),
+            max: Point::from_fn(|i, _| along(i, high[i], b[i].max(d[i]))),
+        })
+    }
+
+    /// Whether it is a box that holds another one.
+    fn contains(&self, other: &Self) -> bool {
+        let (Self::Box { min: a, max: b }, Self::Box { min: c, max: d }) = (self, other) else { return false };
+        (0..3).all(|k| a[k] <= c[k] && d[k] <= b[k])
+    }
+
     /// The same with sides of boxes moved onto planes of the body that are nearer than `tolerance` (length units): faces
     /// from files lie where their digits say, and what ends with a face is to end there.
     #[must_use]
@@ -262,6 +302,57 @@ fn half_space_bounds(solid: &Solid) -> Option<(Point<3>, Point<3>)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An L, a cross of five and a block of eight, of boxes that share faces: what is inside is so where faces meet, too, and the surface
+    /// is where it was.
+    #[test]
+    fn boxes_that_share_faces_are_one_body() {
+        let cuboid = |min: [f64; 3], max: [f64; 3]| Solid::Box { min: min.into(), max: max.into() };
+        let unit = |at: [f64; 3]| cuboid(at, at.map(|x| x + 1.0));
+        let l = vec![cuboid([0.0; 3], [8.0, 4.0, 3.0]), cuboid([0.0, 0.0, 3.0], [4.0, 4.0, 6.0])];
+        let cross =
+            [[1.0, 1.0], [0.0, 1.0], [2.0, 1.0], [1.0, 0.0], [1.0, 2.0]].map(|[x, y]| unit([x, y, 0.0])).to_vec();
+        let eight = (0..8).map(|i| unit([0, 1, 2].map(|k| f64::from(i >> k & 1)))).collect();
+        // A third of a tenth is no third of 0.1: faces from a file meet within rounding.
+        let rounded = vec![cuboid([0.0; 3], [0.1 + 0.2, 1.0, 1.0]), cuboid([0.3, 0.2, 0.2], [1.0, 0.8, 0.8])];
+        for members in [l, cross, eight, rounded] {
+            let union = Solid::union(members.clone());
+            let (low, high) = union.bounds().unwrap();
+            let step = 0.05;
+            let inside = |x: &Point<3>| members.iter().map(|m| m.level(x)).fold(f64::INFINITY, f64::min);
+            // Off the faces the sign is that of the members.
+            let side = |k: usize| {
+                (0..).map(move |i| f64::from(i) * step - 0.12345).take_while(move |s| *s < high[k] - low[k] + 0.2)
+            };
+            for x in side(0)
+                .flat_map(|x| side(1).map(move |y| [x, y]))
+                .flat_map(|[x, y]| side(2).map(move |z| Point::from([x, y, z])))
+            {
+                assert_eq!(union.level(&x) < 0.0, inside(&x) < 0.0, "{x}");
+                assert!(union.level(&x) <= inside(&x) + 1e-12);
+            }
+            // On them it is inside where a little way off is on both sides of every one of them.
+            let Solid::Union(all) = &union else { panic!("a union") };
+            for face in members.iter().flat_map(|m| [m.bounds().unwrap().0, m.bounds().unwrap().1]) {
+                let centre = (low + high) * 0.5;
+                for k in 0..3 {
+                    let mut x = centre.map(|c| c + 0.01234);
+                    x[k] = face[k];
+                    let [mut before, mut after] = [x, x];
+                    (before[k], after[k]) = (face[k] - 1e-3, face[k] + 1e-3);
+                    if inside(&before) < 0.0 && inside(&after) < 0.0 {
+                        assert!(union.level(&x) < 0.0, "{x} of {all:?}");
+                    }
+                }
+            }
+        }
+        let centre = Point::from([1.0, 1.0, 1.0]);
+        let eight = (0..8).map(|i| unit([0, 1, 2].map(|k| f64::from(i >> k & 1)))).collect();
+        assert_eq!(Solid::union(eight).level(&centre), -1.0, "where all eight meet");
+        // Edges and corners hold nothing together, and what merely overlaps needs no joint.
+        let apart = vec![unit([0.0; 3]), unit([1.0, 1.0, 0.0]), unit([0.5, 0.5, 0.5])];
+        assert!(matches!(Solid::union(apart), Solid::Union(all) if all.len() == 3));
+    }
 
     #[test]
     fn levels_are_distances_to_first_order_and_gradients_match_differences() {

@@ -63,14 +63,19 @@ impl Field {
         }
     }
 
+    /// Part of the nodes whose values may be beyond the scale: some fields are without bound at the rim of a contact.
+    pub fn beyond(self) -> f64 {
+        match self {
+            Self::Size | Self::Orthogonal => 0.0,
+            Self::Strain | Self::VonMises => BEYOND,
+        }
+    }
+
     /// Where the colours end: at the largest value, or where only a few are beyond it.
-    fn scale(self, values: &[f64]) -> f64 {
+    pub fn scale(self, values: &[f64]) -> f64 {
         let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
-        let beyond = match self {
-            Self::Size | Self::Orthogonal => 0,
-            Self::Strain | Self::VonMises => (BEYOND * sorted.len() as f64) as usize,
-        };
+        let beyond = (self.beyond() * sorted.len() as f64) as usize;
         let last = sorted.len().saturating_sub(1 + beyond);
         sorted.get(last).copied().unwrap_or(0.0)
     }

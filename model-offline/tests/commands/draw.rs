@@ -1,6 +1,7 @@
 //! Results as pictures: every field in every format, and what is refused.
 
 use assert_cmd::Command;
+use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 
 fn model_offline() -> Command {
@@ -82,9 +83,9 @@ fn what_is_no_result_or_not_in_it_is_refused() {
     };
     assert!(refused(&with(&|v| v["geometry"] = serde_json::Value::Null), &[]).contains("no result of"));
     assert!(refused(&with(&|v| *v = 3.into()), &[]).contains("no result of"));
-    // As `solve` and `run` write it of a body in space, which has nothing of what a planar one has.
+    // It says that it is of a body in space, and has nothing of what one has.
     let in_space = refused(&with(&|v| *v = serde_json::json!({"dimension": 3, "cases": []})), &[]);
-    assert!(in_space.contains("a result in space") && in_space.contains("report.html"), "{in_space}");
+    assert!(in_space.contains("no result of") && in_space.contains("missing field `bodies`"), "{in_space}");
     let short = with(&|v| v["node_displacements"].as_array_mut().unwrap().truncate(5));
     assert!(refused(&short, &[]).contains("nodes has a place"));
     let short = with(&|v| v["strain"].as_array_mut().unwrap().truncate(5));
@@ -303,4 +304,131 @@ fn a_placement_study_is_drawn_alone_and_beside_an_earlier_one() {
         value["paddles"][0]["static"]["max_orthogonal"] = (-1.0).into();
     });
     assert!(refused(&negative, &[]).contains("a size in it is -1"));
+}
+
+/// A result of `solve` in space: every field is drawn, and its strain is the Green–Lagrange strain of the tetrahedra as they are moved,
+/// worked out here from nothing but their corners.
+#[test]
+fn a_result_in_space_is_drawn_with_every_field() {
+    let folder = tempfile::tempdir().unwrap();
+    let result = folder.path().join("solved.json");
+    let solve = [
+        "solve",
+        "block",
+        "--depth",
+        "0.05",
+        "--integration",
+        "fem-t4",
+        "--spacing",
+        "0.2",
+        "--paddle",
+        "3",
+        "--quiet",
+        "--json",
+    ];
+    model_offline().args(solve).arg(&result).assert().success();
+    let value: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&result).unwrap()).unwrap();
+    for (field, largest) in [
+        ("size", largest(&lengths(&value))),
+        ("strain", largest(&numbers(&value["strain"]))),
+        ("von-mises", largest(&numbers(&value["von_mises"]))),
+    ] {
+        let out = folder.path().join(format!("{field}.svg"));
+        model_offline().arg("draw").arg(&result).args(["--field", field, "-o"]).arg(&out).assert().success();
+        let svg = std::fs::read_to_string(&out).unwrap();
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let of = |class: &str| document.descendants().filter(|node| node.attribute("class") == Some(class)).count();
+        assert!((0..10).all(|band| of(&format!("f{band}")) > 0), "{field}: a colour is missing");
+        assert!(svg.contains("block, inclusion, paddle 3: depth\u{a0}0.05"));
+        let said = svg.split("Largest value at a node:\u{a0}").nth(1).unwrap();
+        let said: String = said.chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
+        let said: f64 = said.trim_end_matches('.').parse().unwrap();
+        assert!((said - largest).abs() < 0.01 * largest, "{field}: {said} {largest}");
+    }
+    let expected = strains(&value);
+    let found = numbers(&value["strain"]);
+    assert_eq!(found.len(), expected.len());
+    let most = largest(&expected);
+    assert!(most > 0.1 && found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-9 * most), "not the strain");
+
+    let with = |change: &dyn Fn(&mut serde_json::Value)| {
+        let mut value = value.clone();
+        change(&mut value);
+        let file = folder.path().join("changed.json");
+        std::fs::write(&file, value.to_string()).unwrap();
+        file
+    };
+    assert!(refused(&result, &["--case", "2"]).contains("has one state"));
+    assert!(refused(&with(&|v| v["geometry"] = serde_json::Value::Null), &[]).contains("no result of"));
+    assert!(refused(&with(&|v| drop(v.as_object_mut().unwrap().remove("geometry"))), &[]).contains("solve again"));
+    let short = with(&|v| v["node_displacements"].as_array_mut().unwrap().truncate(5));
+    assert!(refused(&short, &[]).contains("nodes has a place"));
+    let short = with(&|v| v["strain"].as_array_mut().unwrap().truncate(5));
+    assert!(refused(&short, &["--field", "strain"]).contains("nodes has a place"));
+    let without = with(&|v| v["von_mises"] = serde_json::Value::Null);
+    assert!(refused(&without, &["--field", "von-mises"]).contains("--field size or orthogonal or strain"));
+    let beyond = with(&|v| v["geometry"]["outside"][0][0] = u32::MAX.into());
+    assert!(refused(&beyond, &[]).contains("nodes that it does not have"));
+    let nowhere = with(&|v| v["geometry"]["axis"] = serde_json::json!([0, 0, 0]));
+    assert!(refused(&nowhere, &[]).contains("no unit vectors"));
+    let along = with(&|v| v["geometry"]["orthogonal"][1] = v["geometry"]["orthogonal"][0].clone());
+    assert!(refused(&along, &[]).contains("orthogonal to each other"));
+    let part = with(&|v| v["geometry"]["parts"][0] = 7.into());
+    assert!(refused(&part, &[]).contains("inclusions that it does not have"));
+    let twice = with(&|v| v["geometry"]["paddles"][0]["index"] = v["geometry"]["paddles"][1]["index"].clone());
+    assert!(refused(&twice, &[]).contains("one index"));
+    let long = with(&|v| v["geometry"]["units"][0] = "m".repeat(5_000).into());
+    assert!(refused(&long, &[]).contains("is no name"));
+    let huge = with(&|v| v["geometry"]["nodes"][0] = serde_json::json!([1e150, 0, 0]));
+    assert!(refused(&huge, &[]).contains("span no body"));
+    let below = with(&|v| v["strain"][0] = serde_json::json!(-1.0));
+    assert!(refused(&below, &[]).contains("no numbers from 0 on"));
+    let far = with(&|v| v["node_displacements"][0] = serde_json::json!([1e308, -1e308, 0.0]));
+    assert!(refused(&far, &[]).contains("farther than any body does"));
+    assert!(refused(&with(&|v| v["paddles"] = serde_json::json!([3, 3])), &[]).contains("there twice"));
+    let flat = with(&|v| {
+        let nodes = v["geometry"]["nodes"].as_array_mut().unwrap();
+        nodes.iter_mut().for_each(|node| *node = serde_json::json!([0.5, 0.5, 0.5]));
+    });
+    assert!(refused(&flat, &[]).contains("span no body"));
+    assert!(refused(&with(&|v| v["paddles"] = serde_json::json!([99])), &[]).contains("none of its scene"));
+    assert!(
+        refused(&with(&|v| v["paddles"] = serde_json::json!([3, 6])), &[]).contains("not every paddle has a place")
+    );
+}
+
+fn numbers(list: &serde_json::Value) -> Vec<f64> {
+    list.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+}
+
+fn lengths(value: &serde_json::Value) -> Vec<f64> {
+    let all = value["node_displacements"].as_array().unwrap();
+    all.iter().map(|u| numbers(u).iter().map(|part| part * part).sum::<f64>().sqrt()).collect()
+}
+
+fn largest(values: &[f64]) -> f64 {
+    values.iter().copied().fold(0.0, f64::max)
+}
+
+/// ½ ‖FᵀF − 1‖ at the corners of tetrahedra: the mean of those around by their volume.
+fn strains(value: &serde_json::Value) -> Vec<f64> {
+    let points = |list: &serde_json::Value| -> Vec<Vector3<f64>> {
+        list.as_array().unwrap().iter().map(|x| Vector3::from_vec(numbers(x))).collect()
+    };
+    let (rest, moved) = (points(&value["geometry"]["nodes"]), points(&value["node_displacements"]));
+    let mut sums = vec![(0.0, 0.0); rest.len()];
+    for corners in value["geometry"]["tetrahedra"].as_array().unwrap() {
+        let corners: Vec<usize> = numbers(corners).into_iter().map(|node| node as usize).collect();
+        let sides = |at: &dyn Fn(usize) -> Vector3<f64>| {
+            Matrix3::from_columns(&[1, 2, 3].map(|k| at(corners[k]) - at(corners[0])))
+        };
+        let before = sides(&|node| rest[node]);
+        let f = sides(&|node| rest[node] + moved[node]) * before.try_inverse().unwrap();
+        let strain = (0.5 * (f.transpose() * f - Matrix3::identity())).norm();
+        for node in corners {
+            sums[node].0 += strain * before.determinant().abs();
+            sums[node].1 += before.determinant().abs();
+        }
+    }
+    sums.into_iter().map(|(sum, weight)| sum / weight).collect()
 }

@@ -6,6 +6,7 @@
 mod attachments;
 mod conclusion;
 mod embed;
+mod fields;
 mod insertion;
 mod ledger;
 mod placement;
@@ -129,7 +130,7 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
         h3 { "The body under each strategy" }
         p { "At the end of the insertion, or wherever the slider is. Colour is what is chosen below, the size of the \
              displacement from rest at first; dashed is the outline at rest, white are inclusions. Displacements are drawn as they are, not enlarged." }
-        (controls(run, surface))
+        (controls(run))
         @for (i, case) in run.cases.iter().enumerate() {
             div data-case=(i) { h3 { "Tissue: " (case_name(case)) } (scene::bodies(run, surface, i, case)) }
         }
@@ -143,7 +144,7 @@ fn scene_part(run: &RunResult, surface: &scene::Surface) -> Markup {
 }
 
 /// What the bodies show: case, depth, field, and how much of the body.
-fn controls(run: &RunResult, surface: &scene::Surface) -> Markup {
+fn controls(run: &RunResult) -> Markup {
     html! {
         fieldset.needs-script.on-screen {
             legend { "Along the insertion" }
@@ -157,7 +158,7 @@ fn controls(run: &RunResult, surface: &scene::Surface) -> Markup {
             }
             div.slide {
                 label for="field" { "colour" }
-                select #field { @for field in surface.fields(run) { option value=(field.key) { (field.label) } } }
+                select #field { @for field in scene::Surface::fields(run) { option value=(field.key) { (field.label) } } }
                 label for="part" { "of" }
                 select #part { option value="whole" { "the whole body" } option value="near" { "the target's surroundings" } }
             }

@@ -3,16 +3,17 @@
 use std::collections::BTreeSet;
 
 use maud::{Markup, html};
-use serde::Serialize;
 
 use model_offline::output::chart::number::{in_unit, number};
 use model_offline::output::chart::style::band;
 use model_offline::output::chart::{Anchor, Drawing, Names, Px, colour_bar};
+use model_offline::output::field_picture::Field;
 use model_offline::output::surface;
 use model_offline::output::surface::Interpolated;
 use model_offline::scene::TissueVariant;
 
 use super::embed::inline;
+use super::fields::ShownField;
 use super::view::{PlaneView, along, inside, middle};
 use crate::bench::result::{BodyFrame, CaseResult, Geometry, RunResult, StrategyResult};
 use crate::bench::strategy::Strategy;
@@ -129,17 +130,6 @@ pub(super) fn displaced(view: &PlaneView, geometry: &Geometry, nodes: &[[f64; 2]
         .collect()
 }
 
-/// What the colour of a body can show.
-#[derive(Clone, Debug, Serialize)]
-pub(super) struct Field {
-    /// Its name in the page's script.
-    pub(super) key: &'static str,
-    /// What a reader sees, with its unit.
-    pub(super) label: String,
-    /// Part of the triangles whose values are beyond the scale: fields that are without bound at the rim of a contact.
-    pub(super) beyond: f64,
-}
-
 /// Half a side of the window around the target, as a part of the scene's size.
 const WINDOW: f64 = 0.18;
 
@@ -232,23 +222,18 @@ impl Surface {
     }
 
     /// What the colour can show: what the results have.
-    pub(super) fn fields(&self, run: &RunResult) -> Vec<Field> {
-        let unit = &run.units[0];
+    pub(super) fn fields(run: &RunResult) -> Vec<ShownField> {
         let has = |of: fn(&BodyFrame) -> &Vec<f64>| {
             run.results().flat_map(|result| &result.frames).any(|frame| !of(frame).is_empty())
         };
-        let field = |key, label: String, beyond| Field { key, label, beyond };
-        let strain = has(|frame| &frame.strain);
-        let stress = has(|frame| &frame.von_mises);
-        [
-            Some(field("size", in_unit("size of the displacement", unit), 0.0)),
-            Some(field("orthogonal", in_unit("displacement orthogonal to the needle, its size", unit), 0.0)),
-            strain.then(|| field("strain", "Green–Lagrange strain ‖E‖".to_owned(), 0.02)),
-            stress.then(|| field("von_mises", in_unit("von Mises stress", &run.units[1]), 0.02)),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let (strain, stress) = (has(|frame| &frame.strain), has(|frame| &frame.von_mises));
+        let is_there = |field: &Field| match field {
+            Field::Size | Field::Orthogonal => true,
+            Field::Strain => strain,
+            Field::VonMises => stress,
+        };
+        let all = [Field::Size, Field::Orthogonal, Field::Strain, Field::VonMises];
+        all.into_iter().filter(is_there).map(|field| ShownField::new(field, &run.units)).collect()
     }
 
     /// The window around the target: corner and size, px.

@@ -4,8 +4,9 @@ use model_offline::output::chart::style::BANDS;
 use model_offline::output::surface::Interpolated;
 use serde::Serialize;
 
+use super::fields::ShownField;
 use super::insertion::CaseCharts;
-use super::scene::{Field, Surface, body_id};
+use super::scene::{Surface, body_id};
 use crate::bench::result::{RunResult, StrategyResult};
 
 /// Points of a time series that the slider can show.
@@ -15,7 +16,7 @@ const POINTS: usize = 200;
 struct Data<'a> {
     depth: f64,
     bands: usize,
-    fields: Vec<Field>,
+    fields: Vec<ShownField>,
     /// The window around the target: corner and size, px.
     window: [f64; 4],
     size: [f64; 2],
@@ -96,7 +97,7 @@ pub(super) fn data(run: &RunResult, surface: &Surface, charts: &[CaseCharts]) ->
     let data = Data {
         depth: run.settings.depth,
         bands: BANDS,
-        fields: surface.fields(run),
+        fields: Surface::fields(run),
         window: surface.window(geometry).map(|px| if px.is_finite() { px } else { 0.0 }),
         size: surface.view.size(),
         triangles: &surface.triangles,

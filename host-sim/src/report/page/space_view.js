@@ -13,17 +13,19 @@
   if (standIn) standIn.classList.add("replaced");
   canvas.addEventListener("webglcontextlost", () => { view.hidden = true; if (standIn) standIn.classList.remove("replaced"); });
 
-  const { number } = common;
+  const { number, tip } = common;
   const input = (name) => document.getElementById("view-" + name);
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const indices = (text) => new (data.index === 2 ? Uint16Array : Uint32Array)(bytes(text).buffer);
   const vector = (numbers) => new THREE.Vector3(...numbers);
   const rest = new Float32Array(bytes(data.nodes).buffer), tetrahedra = indices(data.tetrahedra), parts = bytes(data.parts);
   const [axis, target, contact] = [data.axis, data.target, data.contact].map(vector);
-  const decoded = (body) => body && { ...body,
+  const scalars = (nodal) => nodal && Float32Array.from(new Uint16Array(bytes(nodal.values).buffer), (part) => part * nodal.step);
+  const decoded = (body) => body && { ...body, strain: scalars(body.strain), von_mises: scalars(body.von_mises),
     moved_nodes: Float32Array.from(new Int16Array(bytes(body.displacements).buffer), (part) => part * body.step) };
   const bodies = data.cases.map((one) => one.strategies.map(decoded));
   const valuesOf = (body, field) => {
+    if (body[field]) return body[field];
     const u = body.moved_nodes;
     return Float32Array.from({ length: u.length / 3 }, (_, i) => {
       const [x, y, z] = u.subarray(3 * i, 3 * i + 3);
@@ -76,11 +78,11 @@
   const size = data.extent;
   const shaft = new THREE.Group(), line = add(empty(), paint(new THREE.LineBasicMaterial({ transparent: true, opacity: 0.8 }), "quiet"), 5);
   const steel = paint(lambert(), "quiet");
-  const long = 0.3 * size, tip = 0.035 * size;
-  const rod = new THREE.Mesh(new THREE.CylinderGeometry(0.006 * size, 0.006 * size, long - tip, 16), steel);
-  const point = new THREE.Mesh(new THREE.ConeGeometry(0.016 * size, tip, 20), steel);
-  rod.position.y = -0.5 * (long + tip);
-  point.position.y = -0.5 * tip;
+  const long = 0.3 * size, pointed = 0.035 * size;
+  const rod = new THREE.Mesh(new THREE.CylinderGeometry(0.006 * size, 0.006 * size, long - pointed, 16), steel);
+  const point = new THREE.Mesh(new THREE.ConeGeometry(0.016 * size, pointed, 20), steel);
+  rod.position.y = -0.5 * (long + pointed);
+  point.position.y = -0.5 * pointed;
   shaft.add(rod, point);
   shaft.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), axis);
   scene.add(shaft);
@@ -106,10 +108,15 @@
   const ask = () => { if (!due) { due = true; requestAnimationFrame(draw); } };
   controls.addEventListener("change", ask);
 
+  // Where the colours end, and the colour of a value: never on the edge of the texture.
+  let largest = 1;
+  const shade = (value) => Math.min(0.9999, Math.max(1e-4, value / largest));
+  const shades = (values) => values.flatMap((value) => [shade(value), 0.5]);
+
   // Corners of triangles, each with its normal: that of its node among triangles that meet at less than 40°.
   const sharp = Math.cos(40 * Math.PI / 180);
   const surface = (mesh, triangles, nodes, values) => {
-    const count = triangles.length, flat = new Float32Array(count), at = new Map();
+    const count = triangles.length, flat = new Float32Array(count), at = new Map(), value = [];
     const [a, b, c] = [0, 1, 2].map(() => new THREE.Vector3());
     for (let t = 0; t < count; t += 3) {
       [a, b, c].forEach((corner, k) => corner.fromArray(nodes, 3 * triangles[t + k]));
@@ -120,7 +127,7 @@
         at.get(node).push(t);
       }
     }
-    const position = new Float32Array(3 * count), normal = new Float32Array(3 * count), uv = values && new Float32Array(2 * count);
+    const position = new Float32Array(3 * count), normal = new Float32Array(3 * count);
     for (let i = 0; i < count; i++) {
       const node = triangles[i], own = i - i % 3;
       a.fromArray(flat, own).normalize();
@@ -128,26 +135,27 @@
       for (const other of at.get(node)) if (c.fromArray(flat, other).dot(a) > sharp * c.length()) b.add(c);
       b.normalize().toArray(normal, 3 * i);
       position.set(nodes.subarray(3 * node, 3 * node + 3), 3 * i);
-      if (values) [uv[2 * i], uv[2 * i + 1]] = [values[node], 0.5];
+      if (values) value.push(values[node]);
     }
-    fill(mesh, { position, normal, ...(values && { uv }) });
+    fill(mesh, { position, normal, ...(values && { value: new Float32Array(value), uv: new Float32Array(shades(value)) }) });
   };
+  const sizes = { value: 1, uv: 2 };
   const fill = (mesh, attributes) => {
     mesh.geometry.dispose();
     mesh.geometry = empty();
     for (const [name, numbers] of Object.entries(attributes)) {
-      mesh.geometry.setAttribute(name, new THREE.BufferAttribute(numbers, name === "uv" ? 2 : 3));
+      mesh.geometry.setAttribute(name, new THREE.BufferAttribute(numbers, sizes[name] || 3));
     }
   };
 
   // Where a plane cuts tetrahedra, and the rims of parts in it.
   const cap = (plane, nodes, values) => {
     const distance = Float32Array.from(values, (_, i) => plane.normal.x * nodes[3 * i] + plane.normal.y * nodes[3 * i + 1] + plane.normal.z * nodes[3 * i + 2] - plane.offset);
-    const position = [], uv = [];
+    const position = [], value = [];
     const between = (i, j) => {
       const f = distance[i] / (distance[i] - distance[j]);
       for (let k = 0; k < 3; k++) position.push(nodes[3 * i + k] + f * (nodes[3 * j + k] - nodes[3 * i + k]));
-      uv.push(values[i] + f * (values[j] - values[i]), 0.5);
+      value.push(values[i] + f * (values[j] - values[i]));
     };
     for (let t = 0; t < tetrahedra.length; t += 4) {
       const corners = tetrahedra.subarray(t, t + 4);
@@ -158,7 +166,7 @@
       } else if (beyond.length === 1) before.forEach((other) => between(beyond[0], other));
       else if (before.length === 1) beyond.forEach((other) => between(other, before[0]));
     }
-    fill(plane.cap, { position: new Float32Array(position), uv: new Float32Array(uv) });
+    fill(plane.cap, { position: new Float32Array(position), value: new Float32Array(value), uv: new Float32Array(shades(value)) });
     const lines = [];
     for (const { triangles } of shownInclusions()) {
       for (let t = 0; t < triangles.length; t += 3) {
@@ -173,7 +181,8 @@
     fill(plane.rims, { position: new Float32Array(lines) });
   };
 
-  const chosen = () => ({ place: +input("case").value, strategy: +input("strategy").value, field: input("field").value,
+  const chosen = () => ({ place: +input("case").value, strategy: +input("strategy").value,
+    field: data.fields.find(({ key }) => key === input("field").value) || data.fields[0], isNear: input("part").value === "near",
     cut: input("cut").value, times: +input("times").value });
   const shownInclusions = () => data.cases[chosen().place].has_inclusions ? inclusions : [];
   const clip = (cut) => {
@@ -200,13 +209,50 @@
   };
   renderer.localClippingEnabled = true;
 
-  // Of a body that lives it is the largest that was, so that colours keep what they mean for longer.
+  // The nodes around the target; where the mesh is coarse, the nearest ones.
+  const fewest = 8;
+  const distances = Float32Array.from({ length: rest.length / 3 }, (_, i) => vector(rest.subarray(3 * i, 3 * i + 3)).distanceTo(target));
+  const reach = Math.max(data.near, distances.slice().sort()[Math.min(fewest, distances.length) - 1]);
+  // One scale for all strategies of a case, so that colours can be compared. Of a body that lives it is the largest that was, so that
+  // they keep what they mean for longer.
   let grown = {};
-  const largestOf = (place, field) => {
-    const now = Math.max(Number.MIN_VALUE, ...bodies[place].filter(Boolean).map((body) => valuesOf(body, field).reduce((a, b) => Math.max(a, b), 0)));
-    if (!data.live) return now;
-    return grown[field] = Math.max(now, grown[field] || 0);
+  const scaleOf = (place, { key, beyond }, isNear) => {
+    let [end, most] = [Number.MIN_VALUE, 0];
+    for (const body of bodies[place].filter(Boolean)) {
+      const values = valuesOf(body, key), counted = values.filter((value, i) => !isNear || distances[i] <= reach).sort();
+      end = Math.max(end, counted[counted.length - 1 - (isNear ? 0 : Math.floor(beyond * counted.length))]);
+      most = values.reduce((a, b) => Math.max(a, b), most);
+    }
+    const name = key + isNear;
+    if (data.live) end = grown[name] = Math.max(end, grown[name] || 0);
+    return { end, isOpen: most > end };
   };
+  // The value under the pointer: of the first surface there that is not cut off; again where the picture has changed.
+  const ray = new THREE.Raycaster();
+  let pointer = null;
+  const isCutOff = ({ point, object: { material } }) => {
+    const off = (material.clippingPlanes || []).map((plane) => plane.distanceToPoint(point) < -1e-6 * size);
+    return off.length > 0 && (material.clipIntersection ? off.every(Boolean) : off.some(Boolean));
+  };
+  const valueUnder = ({ clientX, clientY }) => {
+    const { left, top, width, height } = canvas.getBoundingClientRect();
+    camera.updateMatrixWorld();
+    ray.setFromCamera(new THREE.Vector2(2 * (clientX - left) / width - 1, 1 - 2 * (clientY - top) / height), camera);
+    const surfaces = [skin, ...patches.map(({ mesh }) => mesh), ...planes.map(({ cap }) => cap)]
+      .filter((mesh) => mesh.visible && !(mesh === skin && input("through").checked));
+    const hit = ray.intersectObjects(surfaces, false).find((one) => !isCutOff(one));
+    const value = hit && hit.object.geometry.getAttribute("value");
+    return value && [hit.face.a, hit.face.b, hit.face.c].reduce((sum, corner, k) => sum + value.getX(corner) * hit.barycoord.getComponent(k), 0);
+  };
+  const read = () => {
+    const value = pointer && scene.visible ? valueUnder(pointer) : undefined;
+    if (value === undefined) tip.hide();
+    else tip.show(pointer, [chosen().field.label + ": " + number(value)]);
+  };
+  canvas.addEventListener("pointermove", ({ clientX, clientY, buttons }) => { pointer = buttons ? null : { clientX, clientY }; read(); });
+  canvas.addEventListener("pointerleave", () => { pointer = null; read(); });
+  controls.addEventListener("change", read);
+
   const outsideOf = (body) => {
     const key = (triangles, t) => triangles[t] + "," + triangles[t + 1] + "," + triangles[t + 2];
     const taken = new Set();
@@ -219,18 +265,24 @@
     return left;
   };
   const show = () => {
-    const { place, strategy, field, cut, times } = chosen();
+    const { place, strategy, field, isNear, cut, times } = chosen();
     const body = bodies[place][strategy], reading = document.getElementById("view-reading");
     input("times-reading").textContent = times + " ×" + (times === usual && !data.live ? " (chosen for this run)" : "");
-    if (!body) { reading.textContent = "The model did not get to the end of this insertion: there is no body to show."; return; }
-    const largest = largestOf(place, field);
-    const values = valuesOf(body, field).map((value) => Math.min(0.9999, Math.max(1e-4, value / largest)));
+    scene.visible = Boolean(body);
+    if (!body) {
+      reading.textContent = "The model did not get to the end of this insertion: there is no body to show.";
+      read();
+      ask();
+      return;
+    }
+    const { end, isOpen } = scaleOf(place, field, isNear), values = valuesOf(body, field.key);
+    largest = end;
     const nodes = rest.map((part, i) => part + times * body.moved_nodes[i]);
     surface(skin, outsideOf(body), nodes, values);
     for (const { index, triangles, mesh } of patches) {
       mesh.visible = index === undefined || body.paddles.includes(index);
       if (index !== undefined) mesh.material = strategy === 1 ? held : led;
-      if (mesh.visible) surface(mesh, triangles, nodes);
+      if (mesh.visible) surface(mesh, triangles, nodes, values);
     }
     for (const { triangles, mesh } of inclusions) {
       mesh.visible = shownInclusions().length > 0;
@@ -251,8 +303,9 @@
     reading.textContent = `Target ${number(off)}${unit} off the needle's line, ${number(along)}${unit} along it. ` +
       (paddles.length ? paddles.join(", ") + "." : "No paddle.");
     const [low, middle, high] = bar.querySelectorAll("text.tick");
-    [low.textContent, middle.textContent, high.textContent] = ["0", number(largest / 2), number(largest)];
-    bar.querySelector("text.muted").textContent = data.labels[field === "orthogonal" ? 0 : 1];
+    [low.textContent, middle.textContent, high.textContent] = ["0", number(end / 2), number(end) + (isOpen ? " and more" : "")];
+    bar.querySelector("text.muted").textContent = field.label;
+    read();
     ask();
   };
   const fit = () => {
@@ -267,9 +320,12 @@
   const home = () => {
     const [low, high] = [new THREE.Vector3(Infinity, Infinity, Infinity), new THREE.Vector3(-Infinity, -Infinity, -Infinity)];
     for (let i = 0; i < rest.length; i += 3) { const x = vector(rest.subarray(i, i + 3)); low.min(x); high.max(x); }
-    controls.target.copy(low.add(high).multiplyScalar(0.5));
+    const { isNear } = chosen();
+    controls.target.copy(isNear ? target : low.add(high).multiplyScalar(0.5));
     const narrow = Math.min(1, canvas.clientWidth / Math.max(1, canvas.clientHeight));
-    camera.position.copy(controls.target).addScaledVector(vector(data.view[0]), 1.8 * size / narrow);
+    // Twice as far as the surroundings of the target fill the height.
+    const far = isNear ? 2 * reach / Math.tan(camera.fov * Math.PI / 360) : 1.8 * size;
+    camera.position.copy(controls.target).addScaledVector(vector(data.view[0]), far / narrow);
     controls.update();
   };
   const turn = (aside, upwards, nearer) => {
@@ -301,6 +357,7 @@
   const usual = data.live ? 1 : Math.min(20, Math.max(1, Math.round(0.1 * size / most) || 1));
   input("times").value = usual;
   for (const name of ["case", "strategy", "field", "through", "rest"]) input(name).addEventListener("change", show);
+  input("part").addEventListener("change", () => { home(); face(); show(); });
   input("cut").addEventListener("change", () => { face(); show(); });
   input("times").addEventListener("input", show);
   const scheme = matchMedia("(prefers-color-scheme: dark)");

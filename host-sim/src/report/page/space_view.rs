@@ -11,12 +11,13 @@ use model_offline::number::in_unit;
 use model_offline::output::chart::{colour_bar, heading, sheet};
 use model_offline::output::field_picture::Field;
 use model_offline::output::space_picture::{
-    Colours, CutPlane, Shown, SpaceGeometry, SpaceState, orthogonal, outside, planes, sections, seen_from,
+    Colours, CutPlane, Shown, SpaceGeometry, SpaceState, outside, planes, sections, seen_from,
 };
 use model_offline::scene::TissueVariant;
 use serde::Serialize;
 
 use super::embed::{CHART_WIDTH, charts, inline};
+use super::fields::{ShownField, key};
 use super::style;
 use crate::bench::in_space::{SpaceCase, SpaceRun};
 
@@ -28,13 +29,17 @@ const SCRIPT: &str = include_str!("space_view.js");
 pub(super) const STRATEGIES: [&str; 3] = ["no paddle", "static", "dynamic"];
 /// The field of the pictures without script, which the view begins with as well.
 const FIELD: Field = Field::Orthogonal;
+/// How far from the target its surroundings reach, part of the body's diagonal.
+const NEAR: f64 = 0.12;
+/// What the normal of a plane has in common with the direction of view, at least: 25°.
+const EDGE_ON: f64 = 0.42;
 /// Steps of a displacement in the page, over the largest one.
 const STEPS: f64 = 32_767.0;
 
 /// The same scale for all strategies of a case: the largest value at a node.
 fn scale(run: &SpaceRun, place: usize) -> f64 {
     let states = run.bodies.cases[place].iter().flatten();
-    let all = states.flat_map(|state| orthogonal(&run.bodies.geometry, state));
+    let all = states.flat_map(|state| FIELD.values_in_space(&run.bodies.geometry, state)).flatten();
     all.fold(0.0, f64::max)
 }
 
@@ -50,7 +55,7 @@ fn geometry(run: &SpaceRun, case: &SpaceCase) -> SpaceGeometry {
 fn drawn<T>(run: &SpaceRun, place: usize, strategy: usize, draw: impl FnOnce(&Shown<'_>) -> T) -> Result<T, &str> {
     let state = run.bodies.cases[place][strategy].as_ref().map_err(String::as_str)?;
     let geometry = geometry(run, &run.cases[place]);
-    let values = orthogonal(&geometry, state);
+    let values = FIELD.values_in_space(&geometry, state).unwrap_or_default();
     let colours = Colours::Field { values: &values, scale: scale(run, place) };
     let shown = Shown { geometry: &geometry, state, colours, way: None, held_still: strategy == 1 };
     Ok(draw(&shown))
@@ -117,23 +122,60 @@ fn controls(run: &SpaceRun) -> Markup {
             option value=(i) selected[i == 2] { (name) }
         } } }
     };
-    steering(&run.bodies.geometry, &run.units, &attached(run), &which)
+    steering((&run.bodies.geometry, &run.units), &attached(run), &fields(run), &which)
+}
+
+/// What the colours can show: what all bodies have.
+fn fields(run: &SpaceRun) -> Vec<Field> {
+    let states: Vec<&SpaceState> = run.bodies.cases.iter().flatten().flatten().collect();
+    let of_all = |field: &Field| {
+        DISPLACEMENTS.contains(field) || !states.is_empty() && states.iter().all(|state| has(*field, run, state))
+    };
+    FIELDS.into_iter().filter(of_all).collect()
+}
+
+fn has(field: Field, run: &SpaceRun, state: &SpaceState) -> bool {
+    field.values_in_space(&run.bodies.geometry, state).is_some()
+}
+
+/// The fields in the order in which they are offered.
+const FIELDS: [Field; 4] = [Field::Orthogonal, Field::Size, Field::Strain, Field::VonMises];
+/// Those that every displacement tells.
+const DISPLACEMENTS: [Field; 2] = [Field::Orthogonal, Field::Size];
+
+/// What the reader is offered.
+fn called(field: Field) -> &'static str {
+    match field {
+        Field::Orthogonal => "orthogonal to the needle",
+        Field::Size => "whole displacement",
+        Field::Strain => "strain",
+        Field::VonMises => "von Mises stress",
+    }
 }
 
 /// How a body with these paddles attached is shown, beside what of it.
-fn steering(geometry: &SpaceGeometry, units: &[String; 2], attached: &[u32], which: &Markup) -> Markup {
+fn steering(
+    (geometry, units): (&SpaceGeometry, &[String; 2]),
+    attached: &[u32],
+    fields: &[Field],
+    which: &Markup,
+) -> Markup {
     let planes = planes(geometry);
     let [view, _] = seen_from(geometry, attached);
-    // Along the needle, and more aside than through the paddles that are looked at.
-    let turned = |plane: &CutPlane| plane.normal.dot(&view).abs();
-    let first = usize::from(turned(&planes[1]) < turned(&planes[0]));
+    // Along the needle, and more aside than through the paddles that are looked at, unless it would be seen edge-on.
+    let facing = |plane: &CutPlane| plane.normal.dot(&view).abs();
+    let aside = usize::from(facing(&planes[1]) < facing(&planes[0]));
+    let first = if facing(&planes[aside]) < EDGE_ON { 1 - aside } else { aside };
     html! {
         fieldset {
             legend { "What is shown" }
             div.choices {
                 (which)
                 label { "colour " select #view-field {
-                    option value="orthogonal" { "orthogonal to the needle" } option value="size" { "whole displacement" }
+                    @for field in fields { option value=(key(*field)) { (called(*field)) } }
+                } }
+                label { "part " select #view-part {
+                    option value="whole" { "the whole body" } option value="near" { "around the target, on a scale of its own" }
                 } }
                 label { "cut " select #view-cut {
                     option value="none" { "none" }
@@ -174,19 +216,14 @@ pub(crate) fn live_view(geometry: &SpaceGeometry, units: &[String; 2], paddles: 
     let body = html! {
         section #body {
             p.stand-in.quiet { "No picture of the body: this browser has no WebGL." }
-            (view(&steering(geometry, units, paddles, &one), false))
+            (view(&steering((geometry, units), paddles, &DISPLACEMENTS, &one), false))
             figure.colours { (inline(&colour_bar(CHART_WIDTH, &FIELD.label(units), 0.0))) }
+            div #tip.on-screen hidden {}
         }
     };
-    let rest = SpaceState {
-        depth: 0.0,
-        paddles: Vec::new(),
-        paddle_displacements: Vec::new(),
-        displacements: vec![[0.0; 3]; geometry.nodes.len()],
-        target: [0.0; 3],
-    };
+    let rest = SpaceState { paddles: Vec::new(), paddle_displacements: Vec::new(), ..SpaceState::at_rest(geometry) };
     let case = Case { has_inclusions: !geometry.inclusions.is_empty(), strategies: vec![Some(moved_body(&rest))] };
-    let data = data_of((geometry, units), &all, &seen_from(geometry, paddles), (vec![case], true));
+    let data = data_of((geometry, units), (&all, &DISPLACEMENTS), &seen_from(geometry, paddles), (vec![case], true));
     LiveView {
         body: body.into_string(),
         style: format!("{}{}", style::view(), include_str!("live.css")),
@@ -232,9 +269,11 @@ pub(super) fn sections_picture(run: &SpaceRun, place: usize, strategy: usize) ->
 
 #[derive(Serialize)]
 struct Data<'a> {
-    /// Labels of length and of the fields.
+    /// Label of length.
     unit: &'a str,
-    labels: [String; 2],
+    fields: Vec<ShownField>,
+    /// How far from the target its surroundings reach, length.
+    near: f64,
     /// Bytes of an index.
     index: usize,
     /// Positions of nodes, three numbers of 32 bits each; like all that follow little-endian in base 64.
@@ -281,6 +320,28 @@ pub(crate) struct MovedBody {
     /// Displacements of nodes, three numbers of 16 bits each, in steps of this length.
     step: f64,
     displacements: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strain: Option<NodalValues>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    von_mises: Option<NodalValues>,
+}
+
+/// One value that is not negative per node, 16 bits each, in steps of this size.
+#[derive(Serialize)]
+struct NodalValues {
+    step: f64,
+    values: String,
+}
+
+impl NodalValues {
+    /// None of no values.
+    fn new(values: &[f64]) -> Option<Self> {
+        let largest = values.iter().copied().fold(0.0, f64::max);
+        let step = if largest > 0.0 { largest / f64::from(u16::MAX) } else { 1.0 };
+        let steps = values.iter().flat_map(|value| ((value / step).round() as u16).to_le_bytes());
+        let encoded = || STANDARD.encode(steps.collect::<Vec<u8>>());
+        (!values.is_empty()).then(|| Self { step, values: encoded() })
+    }
 }
 
 /// What the script reads of a state.
@@ -296,6 +357,8 @@ pub(crate) fn moved_body(state: &SpaceState) -> MovedBody {
         target: state.target,
         step,
         displacements: STANDARD.encode(steps.collect::<Vec<u8>>()),
+        strain: NodalValues::new(&state.strain),
+        von_mises: NodalValues::new(&state.von_mises),
     }
 }
 
@@ -307,13 +370,14 @@ fn data(run: &SpaceRun) -> String {
         strategies: bodies.iter().map(|state| state.as_ref().ok().map(moved_body)).collect(),
     });
     let geometry = &run.bodies.geometry;
-    data_of((geometry, &run.units), &attached, &seen_from(geometry, &attached), (cases.collect(), false))
+    let shown = (&attached[..], &fields(run)[..]);
+    data_of((geometry, &run.units), shown, &seen_from(geometry, &attached), (cases.collect(), false))
 }
 
-/// The same of these cases of a body, or of one that lives, with these of its paddles, seen from there.
+/// The same of these cases of a body, or of one that lives, with these of its paddles and these fields, seen from there.
 fn data_of(
     (geometry, units): (&SpaceGeometry, &[String; 2]),
-    paddles: &[u32],
+    (paddles, fields): (&[u32], &[Field]),
     view: &[Point<3>; 2],
     (cases, live): (Vec<Case>, bool),
 ) -> String {
@@ -326,7 +390,8 @@ fn data_of(
     let nodes = geometry.nodes.iter().flatten().flat_map(|part| (*part as f32).to_le_bytes());
     let data = Data {
         unit: &units[0],
-        labels: [Field::Orthogonal, Field::Size].map(|field| field.label(units)),
+        fields: fields.iter().map(|field| ShownField::new(*field, units)).collect(),
+        near: NEAR * geometry.extent(),
         index,
         nodes: STANDARD.encode(nodes.collect::<Vec<u8>>()),
         tetrahedra: encode(&mut geometry.tetrahedra.iter().flatten().copied()),

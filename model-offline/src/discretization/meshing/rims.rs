@@ -167,13 +167,13 @@ impl<'a> Curves<'a> {
     }
 }
 
-/// Triangles of the boundary that a patch holds, out of those given. All their nodes are within `tolerance` (length
-/// units) of the region.
+/// Triangles of the boundary that a patch holds, out of those given: those in its region, whose own surface belongs to it, to
+/// `tolerance`, length units.
 pub fn patch_triangles(mesh: &TetMesh, boundary: &[[u32; 3]], region: &dyn Implicit, tolerance: f64) -> Vec<[u32; 3]> {
     let at = |n: u32| mesh.nodes[n as usize];
     let held = |t: &&[u32; 3]| {
         let middle = t.iter().map(|n| at(*n)).sum::<Point<3>>() / 3.0;
-        t.iter().all(|n| region.holds(&at(*n), tolerance)) && region.patch_level(&middle) < 0.0
+        t.iter().all(|n| region.holds(&at(*n), tolerance)) && region.holds(&middle, tolerance)
     };
     boundary.iter().filter(held).copied().collect()
 }

@@ -258,3 +258,39 @@ impl<'a, 'c> Subcells<'a, 'c> {
 fn normal(a: Point2, b: Point2) -> Point2 {
     Point2::new(b.y - a.y, a.x - b.x)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretization::{Basis, NodeCloud};
+
+    /// A node that others leave nothing of the body has a cell without corners: it takes no part in either rule, and the others are
+    /// what they were.
+    #[test]
+    fn a_cell_without_any_part_of_the_body_takes_no_part() {
+        let lattice = (0..9).map(|n| Point2::new(f64::from(n % 3), f64::from(n / 3)));
+        let positions: Vec<Point2> = lattice.chain([Point2::new(1.3, 1.2)]).collect();
+        let square = |x: &Point2| NodalCell {
+            boundary: [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+                .map(|corner| (x + Point2::from(corner), Across::Outline(u32::MAX)))
+                .to_vec(),
+            area: 1.0,
+        };
+        let mut cells: Vec<NodalCell> = positions[..9].iter().map(square).collect();
+        let cloud = NodeCloud::new(positions, vec![2.6; 10]);
+        let shape = ShapeFunctions::new(&cloud, Basis::Linear);
+        let rules = |cells: &[NodalCell]| {
+            [scni_stabilised(&shape, cells, STABILISATION).unwrap(), modified_scni(&shape, cells).unwrap()]
+        };
+        let without = rules(&cells);
+        cells.push(NodalCell { boundary: Vec::new(), area: 0.0 });
+        for (with, without) in rules(&cells).iter().zip(&without) {
+            assert_eq!(with.len(), without.len() + 1);
+            for (point, same) in with.points().zip(without.points()) {
+                assert_eq!((point.cell, point.weight, point.nodes), (same.cell, same.weight, same.nodes));
+            }
+            let last = with.point(without.len());
+            assert!(last.cell == 9 && last.weight == 0.0 && last.nodes.is_empty());
+        }
+    }
+}

@@ -10,25 +10,25 @@ mod outside;
 mod section;
 mod sections;
 
-pub use self::body::{Colours, PaddlePatch, Shown, SpaceGeometry, SpaceState, orthogonal};
+pub use self::body::{Colours, DrawnBody, PaddlePatch, Shown, SpaceGeometry, SpaceState};
 pub use self::frame::{CutPlane, planes, seen_from};
 pub use self::outside::outside;
 pub use self::section::{Cut, cut};
 pub use self::sections::sections;
 use super::chart::number::plain;
-use super::chart::{Key, Legend, Marker, colour_bar, heading, sheet};
+use super::chart::{Key, Legend, Marker, colour_bar, heading, open_colour_bar, sheet};
 use super::field_picture::{Field, with_unit};
 
 /// Width of each drawing of a picture of its own, px.
 const WIDTH: f64 = 380.0;
 
-/// Outside and sections as a picture of its own, coloured by what paddles are to take away: the displacement orthogonal to
-/// the needle.
-pub fn svg(geometry: &SpaceGeometry, state: &SpaceState) -> String {
-    let values = &orthogonal(geometry, state)[..];
-    let scale = values.iter().copied().fold(0.0, f64::max);
+/// Outside and sections as a picture of its own, coloured by a field with these values at the nodes.
+pub fn svg(body: &DrawnBody, field: Field, values: &[f64]) -> String {
+    let DrawnBody { name, geometry, state, held_still } = body;
+    let largest = values.iter().copied().fold(0.0, f64::max);
+    let scale = field.scale(values);
     let colours = Colours::Field { values, scale };
-    let shown = Shown { geometry, state, colours, way: None, held_still: false };
+    let shown = Shown { geometry, state, colours, way: None, held_still: *held_still };
     let mut drawings = vec![outside(&shown, WIDTH)];
     drawings.extend(sections(&shown, WIDTH));
     let all = sheet("", &drawings, 2);
@@ -36,11 +36,12 @@ pub fn svg(geometry: &SpaceGeometry, state: &SpaceState) -> String {
         "Outside, and sections through the target at rest; displacements as they are. Blue: paddle (its rim, where a section \
          does not cut it); grey: needle and its contact; black or hatched: immobile; dashed: at rest, and inclusions; ring: \
          target at rest, dot: now. Largest value at a node:\u{a0}{}.",
-        plain(scale)
+        plain(largest)
     );
-    let title = format!("{}: depth\u{a0}{}", geometry.name, with_unit(state.depth, &geometry.units[0]));
+    let title = format!("{name}: depth\u{a0}{}", with_unit(state.depth, &geometry.units[0]));
     let width = all.size[0];
-    let bar = colour_bar(width.min(WIDTH), &Field::Orthogonal.label(&geometry.units), scale);
+    let bar = if largest > scale { open_colour_bar } else { colour_bar };
+    let bar = bar(width.min(WIDTH), &field.label(&geometry.units), scale);
     sheet(&title, &[heading(&title, &caption, width), all, bar], 1).file()
 }
 

@@ -141,7 +141,7 @@ impl SolidSection {
                 check(radius.is_finite() && *radius > 0.0, "a radius must be positive and finite")?;
                 Solid::Cylinder { from: point(from), to: point(to), radius: *radius }
             }
-            Self::Union(members) => Solid::Union(all(members)?),
+            Self::Union(members) => Solid::union(all(members)?),
             Self::Intersection(members) => Solid::Intersection(all(members)?),
             Self::Difference(members) => Solid::Difference(all(members)?),
         })

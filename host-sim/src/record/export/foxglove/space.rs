@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use model_offline::geometry::{Point, box_of};
 use model_offline::number::in_unit;
 use model_offline::output::chart::style::band_colour;
-use model_offline::output::space_picture::{SpaceGeometry, SpaceState, orthogonal, seen_from};
+use model_offline::output::field_picture::Field;
+use model_offline::output::space_picture::{SpaceGeometry, SpaceState, seen_from};
 use serde_json::Value;
 
 use super::layout::{Camera, layout};
@@ -36,6 +37,11 @@ pub struct SpaceStage<'b> {
     values: Vec<Vec<f64>>,
     /// The largest of all.
     scale: f64,
+}
+
+/// Displacement orthogonal to the needle, its size, at every node, length.
+fn orthogonal(geometry: &SpaceGeometry, state: &SpaceState) -> Vec<f64> {
+    Field::Orthogonal.values_in_space(geometry, state).unwrap_or_default()
 }
 
 impl<'b> SpaceStage<'b> {

@@ -2,6 +2,7 @@
 export {
   AmbientLight, BufferAttribute, BufferGeometry, Color, ConeGeometry, CylinderGeometry, DataTexture, DirectionalLight,
   DoubleSide, Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, MeshLambertMaterial, NearestFilter,
-  PerspectiveCamera, Plane, Scene, SphereGeometry, Spherical, SRGBColorSpace, TorusGeometry, Vector3, WebGLRenderer,
+  PerspectiveCamera, Plane, Raycaster, Scene, SphereGeometry, Spherical, SRGBColorSpace, TorusGeometry, Vector2, Vector3,
+  WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/addons/controls/OrbitControls.js";

@@ -156,3 +156,24 @@ fn what_cannot_be_meshed_is_refused() {
     assert!(matches!(small, Err(StuffingError::TooManyNodes { .. })), "{small:?}");
     assert!(matches!(stuff(&Request { size: &|_| 0.0, ..fine }), Err(StuffingError::BadSize { .. })));
 }
+
+/// A region that ends in the surface, as one drawn beside the body does, holds what of the surface lies in its own: all of a face, or a
+/// part of it, on the mesh that a region flat in that face has.
+#[test]
+fn a_region_that_touches_the_body_holds_what_it_touches() {
+    for (name, low, high, face, expected) in [
+        ("whole face", [0.0, 0.0, -1.0], [1.0, 1.0, 0.0], 0.0, 1.0),
+        ("part of it", [0.3, 0.25, -1.0], [0.7, 0.6, 0.0], 0.0, 0.14),
+        ("from the other side", [0.31, 0.27, 1.0], [0.7, 0.61, 2.0], 1.0, 0.39 * 0.34),
+    ] {
+        let mesh = |patch: &Solid| {
+            Case { patches: vec![patch.clone()], ..Case::new(name, cuboid([0.0; 3], [1.0; 3])) }.mesh(&|_| 0.12)
+        };
+        let flat = cuboid([low[0], low[1], face], [high[0], high[1], face]);
+        for touching in [cuboid(low, high), flat.clone()] {
+            let meshed = mesh(&touching);
+            assert_close(name, area(&meshed, &touching), expected, 1e-9);
+            assert_eq!(meshed.nodes.len(), mesh(&flat).nodes.len(), "{name}");
+        }
+    }
+}

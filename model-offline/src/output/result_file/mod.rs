@@ -1,6 +1,9 @@
 //! Results read again to be drawn: what `model-offline solve --json` and `host-sim run` wrote.
 
+mod in_space;
+
 use super::geometry::Geometry;
+use super::space_picture::DrawnBody;
 use super::surface::triangles;
 use crate::reading;
 use serde::Deserialize;
@@ -60,15 +63,6 @@ pub enum ResultError {
         path: PathBuf,
         /// Why.
         reason: String,
-    },
-    /// It is of a body in space.
-    #[error("{}: a result in space, of which only those of `place --json` are drawn", path.display())]
-    #[diagnostic(help(
-        "its bodies move in the report.html of `host-sim run`; `solve --vtu FILE` and `run --vtu` write them for ParaView; give the scene itself for a picture at rest"
-    ))]
-    InSpace {
-        /// The file.
-        path: PathBuf,
     },
     /// What is asked for is not in it.
     #[error("{}: {what}", path.display())]
@@ -143,17 +137,30 @@ pub(super) fn read_value(path: &Path) -> Result<serde_json::Value, ResultError> 
 /// Strategies in the order in which they are looked for.
 const STRATEGIES: [&str; 4] = ["dynamic", "dynamic-free-run", "static", "none"];
 
+/// A body in a state, in the plane or in space.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyBody {
+    /// In the plane.
+    Planar(Box<ResultBody>),
+    /// In space.
+    Space(Box<DrawnBody>),
+}
+
 /// Reads one state of a result.
 ///
 /// # Errors
 /// [`ResultError`].
-pub fn read_body(path: &Path, which: &Which) -> Result<ResultBody, ResultError> {
-    let no_result =
-        |error: serde_json::Error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() };
+pub fn read_body(path: &Path, which: &Which) -> Result<AnyBody, ResultError> {
     let value = read_value(path)?;
     if value.get("dimension").is_some_and(|dimension| *dimension == 3) {
-        return Err(ResultError::InSpace { path: path.to_owned() });
+        return Ok(AnyBody::Space(Box::new(in_space::read(path, value, which)?)));
     }
+    Ok(AnyBody::Planar(Box::new(in_the_plane(path, value, which)?)))
+}
+
+fn in_the_plane(path: &Path, value: serde_json::Value, which: &Which) -> Result<ResultBody, ResultError> {
+    let no_result =
+        |error: serde_json::Error| ResultError::NotAResult { path: path.to_owned(), reason: error.to_string() };
     let is_compared = value.get("cases").is_some();
     let body = if is_compared {
         compared(path, serde_json::from_value(value).map_err(no_result)?, which)?
@@ -206,13 +213,7 @@ fn check(body: &ResultBody) -> Result<(), &'static str> {
 }
 
 fn solved(path: &Path, solved: Solved, which: &Which) -> Result<ResultBody, ResultError> {
-    if *which != Which::default() {
-        return Err(ResultError::NotInIt {
-            path: path.to_owned(),
-            what: "a result of `solve` has one state".to_owned(),
-            help: "leave --case, --strategy and --depth out".to_owned(),
-        });
-    }
+    single_state(path, which)?;
     let Solved { scene, tissue, units, geometry, paddle, depth, node_displacements, strain, von_mises } = solved;
     let moved = geometry.nodes.iter().zip(&node_displacements).map(|(x, u)| [x[0] + u[0], x[1] + u[1]]);
     Ok(ResultBody {
@@ -227,18 +228,41 @@ fn solved(path: &Path, solved: Solved, which: &Which) -> Result<ResultBody, Resu
     })
 }
 
+/// Refuses a choice among the states of a result that has one.
+fn single_state(path: &Path, which: &Which) -> Result<(), ResultError> {
+    if *which == Which::default() {
+        return Ok(());
+    }
+    Err(ResultError::NotInIt {
+        path: path.to_owned(),
+        what: "a result of `solve` has one state".to_owned(),
+        help: "leave --case, --strategy and --depth out".to_owned(),
+    })
+}
+
+/// The place of the wanted one among the cases of these names.
+fn case_of(path: &Path, which: &Which, names: &[String]) -> Result<usize, ResultError> {
+    let number = which.case.unwrap_or(1);
+    if (1..=names.len()).contains(&number) {
+        return Ok(number - 1);
+    }
+    let names: Vec<String> = names.iter().zip(1..).map(|(name, k)| format!("{k}: {name}")).collect();
+    Err(ResultError::NotInIt {
+        path: path.to_owned(),
+        what: format!("it has no case {number}"),
+        help: names.join("; "),
+    })
+}
+
 fn attached(paddle: Option<u32>) -> String {
     paddle.map_or_else(|| "no paddle".to_owned(), |index| format!("paddle {index}"))
 }
 
 fn compared(path: &Path, mut compared: Compared, which: &Which) -> Result<ResultBody, ResultError> {
     let missing = |what: String, help: String| ResultError::NotInIt { path: path.to_owned(), what, help };
-    let (number, count) = (which.case.unwrap_or(1), compared.cases.len());
-    if !(1..=count).contains(&number) {
-        let names = compared.cases.iter().zip(1..).map(|(case, k)| format!("{k}: {}", case.name()));
-        return Err(missing(format!("it has no case {number}"), names.collect::<Vec<_>>().join("; ")));
-    }
-    let case = compared.cases.swap_remove(number - 1);
+    let names: Vec<String> = compared.cases.iter().map(Case::name).collect();
+    let place = case_of(path, which, &names)?;
+    let (number, case) = (place + 1, compared.cases.swap_remove(place));
     let get = |name: &str| case.strategies.get(&name.replace('-', "_")).filter(|strategy| !strategy.is_null());
     let there: Vec<&str> = STRATEGIES.into_iter().filter(|name| get(name).is_some()).collect();
     let wanted = which.strategy.as_deref().or(there.first().copied()).unwrap_or("any strategy");
@@ -270,10 +294,11 @@ fn compared(path: &Path, mut compared: Compared, which: &Which) -> Result<Result
 
 impl Case {
     fn name(&self) -> String {
-        if self.tissue == self.table_tissue {
-            self.tissue.clone()
-        } else {
-            format!("{} (table: {})", self.tissue, self.table_tissue)
-        }
+        case_name(&self.tissue, &self.table_tissue)
     }
+}
+
+/// A case is told by its tissue, and by that of its table where it is another.
+fn case_name(tissue: &str, table_tissue: &str) -> String {
+    if tissue == table_tissue { tissue.to_owned() } else { format!("{tissue} (table: {table_tissue})") }
 }
