@@ -3,7 +3,7 @@
 use super::chart::number::{in_unit, plain};
 use super::chart::style::BANDS;
 use super::chart::{Anchor, Drawing, Marker, Plane, Px, colour_bar, heading, map, open_colour_bar, sheet};
-use super::result_file::ResultBody;
+use super::geometry::Geometry;
 use super::surface::{Motion, inside, middle, triangles};
 
 /// Width of what is between the axes, px.
@@ -17,6 +17,27 @@ const STROKES: f64 = 0.03;
 const MOVES: f64 = 1e-3;
 /// Part of the nodes whose values are beyond the scale of a field that is without bound at the rim of a contact.
 const BEYOND: f64 = 0.02;
+
+/// A body in a state, as a result has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultBody {
+    /// What it is: scene, tissue, paddle.
+    pub name: String,
+    /// Units of length and stress; "1" where a scene names none.
+    pub units: [String; 2],
+    /// The scene at rest.
+    pub geometry: Geometry,
+    /// Needle depth, length.
+    pub depth: f64,
+    /// The paddle that is attached.
+    pub paddle: Option<u32>,
+    /// Nodes there.
+    pub nodes: Vec<[f64; 2]>,
+    /// Norm of the Green–Lagrange strain at every node; empty in results of older versions.
+    pub strain: Vec<f64>,
+    /// Von Mises stress at every node, stress; empty where the displacement does not tell it.
+    pub von_mises: Vec<f64>,
+}
 
 /// What the colours of a body can show.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

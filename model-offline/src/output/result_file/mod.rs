@@ -2,33 +2,13 @@
 
 mod in_space;
 
+use super::field_picture::ResultBody;
 use super::geometry::Geometry;
 use super::space_picture::DrawnBody;
 use super::surface::triangles;
 use crate::reading;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
-
-/// A body in a state, as a result has it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ResultBody {
-    /// What it is: scene, tissue, paddle.
-    pub name: String,
-    /// Units of length and stress; "1" where a scene names none.
-    pub units: [String; 2],
-    /// The scene at rest.
-    pub geometry: Geometry,
-    /// Needle depth, length.
-    pub depth: f64,
-    /// The paddle that is attached.
-    pub paddle: Option<u32>,
-    /// Nodes there.
-    pub nodes: Vec<[f64; 2]>,
-    /// Norm of the Green–Lagrange strain at every node; empty in results of older versions.
-    pub strain: Vec<f64>,
-    /// Von Mises stress at every node, stress; empty where the displacement does not tell it.
-    pub von_mises: Vec<f64>,
-}
 
 /// Which of a result's states is wanted.
 #[derive(Debug, Clone, Default, PartialEq)]
