@@ -160,13 +160,20 @@ fn what_is_easily_overlooked_is_said() {
         (BOX, "surface = \" \"", "has no name"),
         (BOX, "labels = { file = \"a.nrrd\", body = -1 }", "whole numbers from 0"),
         ("of = \"all\"", "of = [[1, 2, 3]]", "list of pairs"),
-        // A box that only touches the face from outside.
-        ("min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]", "min = [-1.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]", "reach into"),
+        // A box that ends before the face.
+        (
+            "min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]",
+            "min = [-1.0, 0.2, 0.2], max = [-0.01, 0.4, 0.4]",
+            "reach into",
+        ),
     ] {
         let folder = tempfile::tempdir().unwrap();
         let (code, said, written) = place(&scene(&[(from, to)]), &[], folder.path());
         assert!(code == 2 && on_one_line(&said).contains(expected) && written.is_none(), "{to}: {code} {said}");
     }
+    // Patches are closed sets: a box that touches the face from outside holds of it what a flat one does.
+    let touching = ("min = [0.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]", "min = [-1.0, 0.2, 0.2], max = [0.0, 0.4, 0.4]");
+    assert!((measure(&[touching]) / measure(&[]) - 1.0).abs() < 1e-9);
     // A preset that relaxes; what is said to help does.
     let folder = tempfile::tempdir().unwrap();
     let kpa = ("stress = \"1\"", "stress = \"kPa\"");
