@@ -71,6 +71,25 @@ pub trait Implicit: Debug + Send + Sync {
     }
 }
 
+/// What is round a point is looked at in so many directions. It is more than a half space from this part of them on, that is
+/// inside of an edge of 198 degrees and more.
+const DIRECTIONS: u32 = 200;
+const REENTRANT: f64 = 0.55;
+
+/// Whether round a point of the surface there is more of a body than a half space, as at the inner edge of an L: at `radius` from it,
+/// length units, which is small beside all that bends there. Elastic solutions are singular there without any load.
+pub fn is_reentrant(body: &dyn Implicit, x: &Point<3>, radius: f64) -> bool {
+    // Evenly spread, by the golden angle.
+    let turn = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let direction = |k: u32| {
+        let z = 1.0 - (2.0 * f64::from(k) + 1.0) / f64::from(DIRECTIONS);
+        let (r, angle) = ((1.0 - z * z).sqrt(), turn * f64::from(k));
+        Point::<3>::new(r * angle.cos(), r * angle.sin(), z)
+    };
+    let inside = (0..DIRECTIONS).filter(|k| body.level(&(x + radius * direction(*k))) < 0.0).count();
+    inside as f64 > REENTRANT * f64::from(DIRECTIONS)
+}
+
 /// Steps along a surface towards what is nearest, and towards the surface, at most; shares of the way that are tried.
 const STEPS_ALONG: usize = 60;
 const STEPS_ONTO: usize = 20;

@@ -9,7 +9,7 @@ pub mod polygon;
 pub mod solid;
 pub mod surface;
 
-pub use implicit::{Implicit, Sheet};
+pub use implicit::{Implicit, Sheet, is_reentrant};
 pub use measures::{Nearest, nearest_on_loop};
 pub use point::{Point, Point2, box_of, cross};
 pub use polygon::{

@@ -20,7 +20,8 @@ pub(super) struct Middles<'a> {
     pub(super) surface_edges: BTreeSet<(u32, u32)>,
     /// Edges along rims, with the region that each is the rim of.
     pub(super) rims: BTreeMap<(u32, u32), &'a dyn Implicit>,
-    pub(super) rim_nodes: BTreeSet<u32>,
+    /// Nodes of rims, and of the body's re-entrant edges: where the solution is singular.
+    pub(super) singular: BTreeSet<u32>,
     /// Edges on the surfaces of inclusions.
     pub(super) interfaces: BTreeMap<(u32, u32), &'a dyn Implicit>,
 }
@@ -42,7 +43,7 @@ impl<'a> Middles<'a> {
             mesh,
             body,
             surface_edges: surface.edges(),
-            rim_nodes: rims.keys().flat_map(|&(a, b)| [a, b]).collect(),
+            singular: rims.keys().copied().chain(surface.reentrant(body)).flat_map(|(a, b)| [a, b]).collect(),
             rims,
             interfaces: interface_edges(mesh, inclusions),
         }
@@ -59,7 +60,7 @@ impl<'a> Middles<'a> {
             }];
             return projected(middle, &onto, length);
         }
-        let start = match (self.rim_nodes.contains(&a), self.rim_nodes.contains(&b)) {
+        let start = match (self.singular.contains(&a), self.singular.contains(&b)) {
             (true, false) => x + (y - x) * 0.25,
             (false, true) => y + (x - y) * 0.25,
             _ => middle,

@@ -1,13 +1,17 @@
 //! What of a body's surface is held: patches of boundary triangles, their nodes and their rims.
 
 use crate::discretization::TetMesh;
-use crate::geometry::{Implicit, Point};
+use crate::geometry::{Implicit, Point, is_reentrant};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A node this far outside of a region, over the size of the body, is in it but for rounding.
 const ROUNDING: f64 = 1e-8;
 /// The surface turns by no more than this where a patch ends in the middle of a face: cos 30°.
 const SMOOTH: f64 = 0.866;
+/// A body's edge turns by more than this: cos 18°.
+const SHARP: f64 = 0.95;
+/// What is round an edge is looked at this share of its length away.
+const BESIDE: f64 = 0.1;
 /// A patch is a strip if its narrow side is below this part of its extent.
 const NARROW: f64 = 1.0 / 3.0;
 
@@ -38,18 +42,33 @@ impl<'m> Surface<'m> {
     /// Edges where a patch ends and the surface goes on smoothly: there the solution is singular like √r.
     pub(super) fn rim(&self, patch: &[[u32; 3]]) -> Vec<(u32, u32)> {
         let inside: BTreeSet<[u32; 3]> = patch.iter().copied().collect();
+        let smooth = |a: &[u32; 3], b: &[u32; 3]| self.normal(a).dot(&self.normal(b)) > SMOOTH;
+        self.edges_where(|_, a, b| inside.contains(a) != inside.contains(b) && smooth(a, b))
+    }
+
+    /// The body's own re-entrant edges: there the solution is singular too, round a right angle like r^0.54.
+    pub(super) fn reentrant(&self, body: &dyn Implicit) -> Vec<(u32, u32)> {
+        // Without edges, creases are those of the mesh.
+        if body.sheets().len() < 2 {
+            return Vec::new();
+        }
+        let at = |n: u32| self.mesh.nodes[n as usize];
+        self.edges_where(|(x, y), a, b| {
+            let (middle, length) = (0.5 * (at(x) + at(y)), (at(y) - at(x)).norm());
+            self.normal(a).dot(&self.normal(b)) < SHARP && is_reentrant(body, &middle, BESIDE * length)
+        })
+    }
+
+    /// Edges between two triangles of which something is the case.
+    fn edges_where(&self, is: impl Fn((u32, u32), &[u32; 3], &[u32; 3]) -> bool) -> Vec<(u32, u32)> {
         let mut beside: BTreeMap<(u32, u32), Vec<&[u32; 3]>> = BTreeMap::new();
         for t in &self.triangles {
             for edge in edges(t) {
                 beside.entry(edge).or_default().push(t);
             }
         }
-        let smooth = |a: &[u32; 3], b: &[u32; 3]| self.normal(a).dot(&self.normal(b)) > SMOOTH;
-        let rim = beside.into_iter().filter(|(_, beside)| match beside[..] {
-            [a, b] => inside.contains(a) != inside.contains(b) && smooth(a, b),
-            _ => false,
-        });
-        rim.map(|(edge, _)| edge).collect()
+        let found = beside.into_iter().filter(|(edge, beside)| matches!(beside[..], [a, b] if is(*edge, a, b)));
+        found.map(|(edge, _)| edge).collect()
     }
 
     /// Twice the narrow side of the rectangle with a patch's area and rim (its hydraulic diameter, where it is a strip); infinite
@@ -154,4 +173,46 @@ pub(super) fn edges(t: &[u32; 3]) -> [(u32, u32); 3] {
         let (a, b) = (t[k], t[(k + 1) % 3]);
         (a.min(b), a.max(b))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::discretization::meshing::{Request, stuff};
+    use crate::geometry::Solid;
+
+    fn cuboid(max: [f64; 3]) -> Solid {
+        Solid::Box { min: Point::<3>::zeros(), max: Point::<3>::from(max) }
+    }
+
+    /// Of the edges of a mesh those on a body's inner edge alone; a bore whose facets are coarse has none.
+    #[test]
+    fn a_mesh_knows_the_inner_edges_of_its_body() {
+        let reentrant = |body: &Solid, size: f64| -> Vec<[Point<3>; 2]> {
+            let size = |_: &Point<3>| size;
+            let request =
+                Request { body, interfaces: &[], patches: &[], size: &size, most_nodes: 100_000, pinned: &[] };
+            let mesh = stuff(&request).unwrap();
+            let found = Surface::new(&mesh, 1.0).reentrant(body);
+            found.into_iter().map(|(a, b)| [mesh.nodes[a as usize], mesh.nodes[b as usize]]).collect()
+        };
+        let l = Solid::Union(vec![cuboid([0.8, 0.4, 0.3]), cuboid([0.4, 0.4, 0.6])]);
+        for size in [0.1, 0.07] {
+            let found = reentrant(&l, size);
+            let length: f64 = found.iter().map(|[a, b]| (b - a).norm()).sum();
+            assert!((length - 0.4).abs() < 1e-9, "{length}");
+            assert!(found.iter().flatten().all(|x| (x.x - 0.4).abs() < 1e-9 && (x.z - 0.3).abs() < 1e-9));
+        }
+        let ball = |at: f64| Solid::Sphere { centre: Point::<3>::new(at, 0.0, 0.0), radius: 1.0 };
+        let circle = 2.0 * std::f64::consts::PI * 0.75_f64.sqrt();
+        let chords: f64 =
+            reentrant(&Solid::Union(vec![ball(0.0), ball(1.0)]), 0.3).iter().map(|[a, b]| (b - a).norm()).sum();
+        assert!((chords / circle - 1.0).abs() < 0.03, "{chords} of {circle}");
+        let (from, to) = (Point::<3>::new(0.5, 0.5, -1.0), Point::<3>::new(0.5, 0.5, 2.0));
+        let bore = Solid::Difference(vec![cuboid([1.0; 3]), Solid::Cylinder { from, to, radius: 0.2 }]);
+        let dent = Solid::Sphere { centre: Point::<3>::new(0.5, 0.5, 1.0), radius: 0.3 };
+        for body in [cuboid([1.0; 3]), bore, Solid::Difference(vec![cuboid([1.0; 3]), dent])] {
+            assert_eq!(reentrant(&body, 0.2), Vec::<[Point<3>; 2]>::new());
+        }
+    }
 }
