@@ -196,9 +196,9 @@ fn what_a_coarse_insertion_leaves_open_is_estimated() {
         scene.discretization.resolution = Resolution::Level(0);
         let (accurate, rest) = at_resolution(&scene).unwrap();
         let linear = scene.with_method(Method::new(Integration::FemT4));
-        let finer = SpaceModel::on(&linear, &mesh(&linear, &MeshSize::level(1)).unwrap()).unwrap();
+        let finer = SpaceModel::on(&linear, &mesh(&linear, &MeshSize::level(2)).unwrap()).unwrap();
         let [found, finer] = [coarse(&scene).unwrap(), finer].map(|model| {
-            assert!(model.nodes() < 6_000, "{}", model.nodes());
+            assert!(model.nodes() < 14_000, "{}", model.nodes());
             let insertions = InsertionModel::new(&scene, model, accurate.clone(), rest.clone());
             let placement = place_in_space(&insertions, parallel::available(), &|| ()).unwrap();
             let singles = placement.paddles.into_iter().map(|paddle| paddle.answer.static_study);
@@ -211,7 +211,7 @@ fn what_a_coarse_insertion_leaves_open_is_estimated() {
             let off = scene.needle.axis.cross(&(at_depth(found) - at_depth(finer))).norm();
             let [estimate, finer] = [found, finer].map(|study| *study.nonlinear_error.last().unwrap());
             println!("{name}: {estimate:e} off {off:e}");
-            // The finer one is off itself, by about half as much.
+            // The finer one is off itself, by about a quarter as much.
             assert!(1.5 * off < estimate, "{name}");
             // What is followed on finer nodes leaves less open.
             assert!(finer < 0.75 * estimate, "{name}");
@@ -259,8 +259,16 @@ fn the_papers_law_in_space_has_its_closed_forms() {
 /// A mesh that is no lattice: a ball of radius 1 with edges of about this length.
 fn ball(edge: f64) -> TetMesh {
     let body = Solid::Sphere { centre: Point::<3>::new(0.1, -0.2, 0.3), radius: 1.0 };
-    stuff(&Request { body: &body, interfaces: &[], patches: &[], size: &|_| edge, most_nodes: 10_000, pinned: &[] })
-        .unwrap()
+    stuff(&Request {
+        body: &body,
+        interfaces: &[],
+        patches: &[],
+        size: &|_: &Point<3>| edge,
+        lattice: None,
+        most_nodes: 10_000,
+        pinned: &[],
+    })
+    .unwrap()
 }
 
 const RULES: [Integration; 5] =

@@ -16,7 +16,16 @@ const MU: f64 = 318.5;
 
 fn meshed(low: Point<3>, high: Point<3>, patches: &[&dyn Implicit], size: &dyn Fn(&Point<3>) -> f64) -> TetMesh {
     let body = Solid::Box { min: low, max: high };
-    stuff(&Request { body: &body, interfaces: &[], patches, size, most_nodes: 40_000, pinned: &[] }).unwrap()
+    stuff(&Request {
+        body: &body,
+        interfaces: &[],
+        patches,
+        size: &size,
+        lattice: None,
+        most_nodes: 40_000,
+        pinned: &[],
+    })
+    .unwrap()
 }
 
 /// A body of linear tissue whose nodes have displacements wherever `prescribed` gives one, under the force `load` of its nodes.

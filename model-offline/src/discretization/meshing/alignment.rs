@@ -4,7 +4,7 @@ use super::features::Features;
 use super::lattice::Placement;
 use crate::geometry::{Point, Sheet};
 
-/// Spacings below this part of the wanted size buy alignment too dearly: such planes are left to snapping.
+/// Spacings below this part of the wanted size would have all of the lattice fine: such planes are left to snapping.
 const TOO_FINE: f64 = 0.35;
 /// Odd numbers of lattice spacings that a common divisor of the coordinates may be cut into.
 const DIVISIONS: [u32; 5] = [1, 3, 5, 7, 9];
@@ -33,19 +33,6 @@ pub(super) fn axis_planes(features: &Features<'_>) -> Vec<AxisPlane> {
         }
     }
     planes
-}
-
-impl AxisPlane {
-    /// Whether the plane crosses a cube that, split once or twice to leaves that are not too fine for `size`, it would
-    /// not cross any more; lengths in length units.
-    pub(super) fn asks_to_split(&self, placement: &Placement, centre: &Point<3>, side: f64, size: f64) -> bool {
-        let crosses = (self.at - centre[self.axis]).abs() < 0.5 * side * (1.0 - 1e-6);
-        let fits = |leaf: &f64| {
-            let steps = (self.at - placement.origin[self.axis]) / leaf;
-            *leaf >= TOO_FINE * size && (steps - steps.round()).abs() < 1e-6
-        };
-        crosses && [0.5 * side, 0.25 * side].iter().any(fits)
-    }
 }
 
 /// Places a root cube round `bounds` so that `planes` fall on lattice planes if they are commensurate, or else those

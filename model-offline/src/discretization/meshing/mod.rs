@@ -21,6 +21,6 @@ mod tests;
 
 pub use grading::Grading;
 pub use mesh::{Quality, TetMesh};
-pub use request::Request;
+pub use request::{Request, Sizes};
 pub use rims::{feature_points, patch_triangles, rim_points, surface_points};
 pub use stuffing::{StuffingError, stuff};

@@ -74,7 +74,8 @@ impl<'a> Curves<'a> {
         spacing: &'a dyn Fn(&Point<3>) -> f64,
     ) -> Option<Self> {
         let bounds = body.bounds()?;
-        let request = Request { body, interfaces, patches, size: &|_| 1.0, most_nodes: 0, pinned: &[] };
+        let request =
+            Request { body, interfaces, patches, size: &|_: &Point<3>| 1.0, lattice: None, most_nodes: 0, pinned: &[] };
         let features = Features::new(&request, (bounds.1 - bounds.0).max());
         Some(Self { features, bounds, spacing, within: !interfaces.is_empty() })
     }

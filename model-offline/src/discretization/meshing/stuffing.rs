@@ -1,6 +1,6 @@
 //! Isosurface stuffing: a graded lattice, cut along every sheet, improved.
 
-use super::alignment::{self, AxisPlane, axis_planes};
+use super::alignment::{self, axis_planes};
 use super::complex::Complex;
 use super::cutting::Fitted;
 use super::features::Features;
@@ -9,7 +9,7 @@ use super::lattice::{Placement, lattice};
 use super::mesh::TetMesh;
 use super::octree::{Cube, Octree};
 use super::quality::{EDGES, worst_sine};
-use super::request::Request;
+use super::request::{Request, corners};
 use crate::geometry::{Implicit, Point};
 use crate::number::length;
 
@@ -69,10 +69,12 @@ fn place(at: &Point<3>) -> String {
     format!("({}, {}, {})", length(at.x), length(at.y), length(at.z))
 }
 
-/// Leaves wider than this multiple of the wanted size are split: sizes are rounded to the nearest power of two.
+/// Leaves wider than this multiple of the largest size wanted at their corners are split: sizes are rounded to the nearest power of
+/// two.
 const COARSEST: f64 = std::f64::consts::SQRT_2 * (1.0 - 1e-9);
-/// Nor are leaves wider than this multiple of the size wanted at one of their corners.
-const STEEPEST: f64 = 1.8;
+/// Nor are leaves wider than this multiple of the smallest size wanted anywhere in them. Where the sizes at a rim halve, so do its
+/// leaves: what is asked here of a cube at a rim is asked alike of all that are as wide, wherever the rim crosses them.
+const STEEPEST: f64 = 1.5;
 /// A flat tetrahedron with all corners on the surface is left out.
 const FLAT: f64 = 0.1;
 
@@ -88,9 +90,13 @@ pub fn stuff(request: &Request<'_>) -> Result<TetMesh, StuffingError> {
         return Err(StuffingError::Vanishes);
     }
     let features = Features::new(request, extent);
-    let planes = axis_planes(&features);
-    let placement = alignment::place(bounds, &planes, sample_size(request, bounds)?);
-    let tree = grow(request, &features, &planes, &placement)?;
+    let sampled = sample_size(request, bounds)?;
+    let lattice = request.lattice.unwrap_or(sampled).min(0.5 * extent);
+    if lattice <= 0.0 {
+        return Err(StuffingError::BadSize { at: 0.5 * (bounds.0 + bounds.1), size: lattice });
+    }
+    let placement = alignment::place(bounds, &axis_planes(&features), lattice);
+    let tree = grow(request, &placement)?;
     let complex = background(request, &tree, &placement);
     if complex.nodes.len() > 2 * request.most_nodes {
         return Err(StuffingError::TooManyNodes { allowed: request.most_nodes, needed: complex.nodes.len() / 2 });
@@ -116,7 +122,7 @@ fn sample_size(request: &Request<'_>, (low, high): (Point<3>, Point<3>)) -> Resu
     let corner = |i: usize| Point::from_fn(|k, _| if i >> k & 1 == 0 { low[k] } else { high[k] });
     let mut smallest = f64::INFINITY;
     for at in (0..8).map(corner).chain([(low + high) / 2.0]) {
-        let size = (request.size)(&at);
+        let size = request.size.at(&at);
         if !(size > 0.0 && size.is_finite()) {
             return Err(StuffingError::BadSize { at, size });
         }
@@ -126,32 +132,13 @@ fn sample_size(request: &Request<'_>, (low, high): (Point<3>, Point<3>)) -> Resu
     Ok(smallest.min(0.5 * (high - low).max()))
 }
 
-/// The smallest size wanted at a corner of a cube.
-fn corner_size(request: &Request<'_>, centre: &Point<3>, side: f64) -> f64 {
-    let step = |i: usize, k: usize| if i >> k & 1 == 0 { -0.5 * side } else { 0.5 * side };
-    (0..8).map(|i| (request.size)(&(centre + Point::from_fn(|k, _| step(i, k))))).fold(f64::INFINITY, f64::min)
-}
-
-/// The octree: as fine as wanted, and not crossed by planes that it can be aligned with.
-fn grow(
-    request: &Request<'_>,
-    features: &Features<'_>,
-    planes: &[AxisPlane],
-    placement: &Placement,
-) -> Result<Octree, StuffingError> {
+/// The octree: as fine as wanted.
+fn grow(request: &Request<'_>, placement: &Placement) -> Result<Octree, StuffingError> {
     let splits = |cube: &Cube| {
         let (centre, side) = (placement.position(cube.centre()), placement.length(cube.side));
-        if request.body.level(&centre) > 0.9 * side {
-            return false;
-        }
-        let size = (request.size)(&centre);
-        let splits = |p: &AxisPlane| {
-            p.asks_to_split(placement, &centre, side, size)
-                && features.owners[p.owner].level(&centre).abs() < 0.9 * side
-        };
-        side > COARSEST * size
-            || side > STEEPEST * corner_size(request, &centre, side)
-            || (side > 0.99 * size && planes.iter().any(splits))
+        let largest = || corners(&centre, 0.5 * side).map(|x| request.size.at(&x)).fold(0.0, f64::max);
+        request.body.level(&centre) <= 0.9 * side
+            && (request.size.want_less(side / STEEPEST, &centre, 0.5 * side) || side > COARSEST * largest())
     };
     // A lattice has two nodes per leaf; a few leaves outside come on top, and all that is coarser.
     let most = request.most_nodes.saturating_mul(2).saturating_add(10_000);

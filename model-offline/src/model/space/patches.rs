@@ -190,8 +190,15 @@ mod tests {
     fn a_mesh_knows_the_inner_edges_of_its_body() {
         let reentrant = |body: &Solid, size: f64| -> Vec<[Point<3>; 2]> {
             let size = |_: &Point<3>| size;
-            let request =
-                Request { body, interfaces: &[], patches: &[], size: &size, most_nodes: 100_000, pinned: &[] };
+            let request = Request {
+                body,
+                interfaces: &[],
+                patches: &[],
+                size: &size,
+                lattice: None,
+                most_nodes: 100_000,
+                pinned: &[],
+            };
             let mesh = stuff(&request).unwrap();
             let found = Surface::new(&mesh, 1.0).reentrant(body);
             found.into_iter().map(|(a, b)| [mesh.nodes[a as usize], mesh.nodes[b as usize]]).collect()

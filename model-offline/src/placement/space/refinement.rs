@@ -458,10 +458,11 @@ mod tests {
     fn solutions_are_singular_at_inner_edges_of_a_body() {
         let AnyScene::Space(scene) = AnyScene::parse(SLOT, "slot.toml").unwrap() else { panic!("planar") };
         let scene = scene.with_method(Method::new(Integration::FemT10));
-        let (_, rest) = at_level(&scene, 0).unwrap();
+        let (_, rest) = at_level(&scene, 1).unwrap();
         let found: Vec<f64> = rest.iter().filter_map(|r| r.controllability.as_ref()).map(|c| c.measure).collect();
+        println!("{found:?}");
         for (found, fine) in found.iter().zip([9.6327, 11.0068, 28.1135, 6.9142]) {
-            assert!(distance(*found, fine) < 0.026, "{found} {fine}");
+            assert!(distance(*found, fine) < 0.012, "{found} {fine}");
         }
         assert_eq!(found.len(), 4);
     }

@@ -65,8 +65,8 @@ fn bodies_with_patches_and_interfaces_anywhere() {
         let case = random_case(seed);
         let fine = if seed % 2 == 0 { 0.03 } else { 0.08 };
         let sizes = graded(&case, 0.08, fine, 0.5);
-        match case.stuff(&|x| sizes.size(x)) {
-            Ok(mesh) => case.check(&mesh, &|x| sizes.size(x)),
+        match case.stuff(&sizes) {
+            Ok(mesh) => case.check(&mesh, &sizes),
             // A dent may leave next to nothing of a side of the block.
             Err(e) if seed % 6 == 4 && matches!(e, StuffingError::Unresolved { .. }) => eprintln!("random {seed}: {e}"),
             Err(e) => refused.push((seed, e)),

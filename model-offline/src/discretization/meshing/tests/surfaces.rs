@@ -7,7 +7,8 @@ use nalgebra::Rotation3;
 
 fn mesh_of(body: &CheckedSurface, interfaces: &[&dyn Implicit], size: f64) -> TetMesh {
     let size = |_: &Point<3>| size;
-    let request = Request { body, interfaces, patches: &[], size: &size, most_nodes: 200_000, pinned: &[] };
+    let request =
+        Request { body, interfaces, patches: &[], size: &size, lattice: None, most_nodes: 200_000, pinned: &[] };
     let mesh = stuff(&request).unwrap_or_else(|wrong| panic!("{wrong}"));
     let q = mesh.quality();
     assert!(q.min_dihedral > 3.0, "{q:?}");
