@@ -211,7 +211,7 @@ fn what_a_coarse_insertion_leaves_open_is_estimated() {
             let off = scene.needle.axis.cross(&(at_depth(found) - at_depth(finer))).norm();
             let [estimate, finer] = [found, finer].map(|study| *study.nonlinear_error.last().unwrap());
             println!("{name}: {estimate:e} off {off:e}");
-            // The finer one is off itself, by about a quarter as much.
+            // The finer one is off itself, by less.
             assert!(1.5 * off < estimate, "{name}");
             // What is followed on finer nodes leaves less open.
             assert!(finer < 0.75 * estimate, "{name}");
