@@ -114,12 +114,13 @@ pub fn encode<T: Scalar, const D: usize, const N: usize, const P: usize>(
     let too_small = TableError::BufferTooSmall { bytes: buffer.len() };
     let (header, body) = buffer.split_first_chunk_mut::<HEADER_BYTES>().ok_or(too_small)?;
     let payload_bytes = postcard::to_slice(table, body).map_err(|_| too_small)?.len();
+    let paddle_dof = D * P;
     *header = Header {
         format_version: FORMAT_VERSION,
         scalar: T::KIND,
         dimension: u8::try_from(D).map_err(|_| TableError::Dimension { found: D, expected: MAX_DIMENSION })?,
-        paddle_dof: u16::try_from(D * P)
-            .map_err(|_| TableError::PaddleDof { found: D * P, expected: MAX_DIMENSION * MAX_PADDLES })?,
+        paddle_dof: u16::try_from(paddle_dof)
+            .map_err(|_| TableError::PaddleDof { found: paddle_dof, expected: MAX_DIMENSION * MAX_PADDLES })?,
         scene_hash: table.scene_hash,
         payload_bytes: u32::try_from(payload_bytes).map_err(|_| too_small)?,
     }

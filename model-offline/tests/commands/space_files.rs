@@ -156,7 +156,8 @@ fn an_angle_from_a_surface_is_the_solid() {
     let folder = tempfile::tempdir().unwrap();
     let held = (HELD, "min = [1.0, 0.0, 0.35], max = [1.0, 1.0, 1.0]");
     let inclusion = (INCLUSION, "box = { min = [0.6, 0.4, 0.6], max = [0.7, 0.6, 0.7] }");
-    let text = |body: &str| block(&[(BOX, body), held, inclusion]);
+    // What fixtures leave is a small rest, of which level 0 is a fifth off: two meshes of it differ by more than bodies do.
+    let text = |body: &str| block(&[(BOX, body), held, inclusion, ("level = 0", "level = 1")]);
     let expected = study(&text(solid), folder.path());
     // Corners in the plane of x and z, all along y.
     let outline = [[0.0, 0.0], [0.55, 0.0], [0.55, 0.35], [1.0, 0.35], [1.0, 1.0], [0.0, 1.0]];
