@@ -85,12 +85,13 @@ fn block(stiffness: f64) -> SpaceModel {
 
 #[test]
 fn in_space_single_precision_finds_the_states_and_jacobians_of_double() {
-    for (stiffness, factors) in [(100.0, 2), (1e6, 3)] {
+    for (stiffness, far) in [(100.0, 1.0), (1e6, 1.0), (1e6, 3.0)] {
         let model = block(stiffness);
         let insertion = |solver| {
             let mut body = model.body(&[2], settings(solver)).unwrap();
             for k in 1..=2 {
-                body.drive(0.01 * f64::from(k), &[Vector3::new(0.002, -0.004, 0.001) * f64::from(k)]).unwrap();
+                let far = far * f64::from(k);
+                body.drive(0.01 * far, &[Vector3::new(0.002, -0.004, 0.001) * far]).unwrap();
             }
             let jacobian = body.actuation_jacobian().unwrap();
             let equilibrium = body.equilibrium();
@@ -100,8 +101,8 @@ fn in_space_single_precision_finds_the_states_and_jacobians_of_double() {
         };
         let (double, single) = (insertion(LinearSolver::Direct), insertion(LinearSolver::BySize));
         assert_eq!(double.4.factorisations, double.4.iterations + 1, "a factor for every tangent");
-        // One at rest, one for the Jacobian: in between it is the first that proves each state stable, of the harder tissue one.
-        assert_eq!(single.4.factorisations, factors, "{stiffness}: {:?}", single.4);
+        // One at rest, one for the Jacobian: in between it is the first that proves each state stable.
+        assert_eq!(single.4.factorisations, 2, "{stiffness}: {:?}", single.4);
         assert!((double.0 - single.0).norm() < 1e-9 * double.0.norm(), "{stiffness}");
         assert!((double.1 / single.1 - 1.0).abs() < 1e-9, "{stiffness}");
         assert!(

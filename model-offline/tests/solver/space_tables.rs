@@ -103,7 +103,8 @@ fn at_depth_the_accurate_model_says_what_insertions_are_made_of() {
     let model = scan();
     for attached in [[4, 5], [0, 1]] {
         let [corrected, alone, moved] = off_at(model, &attached, 0.15 * model.scene().needle.depth);
-        assert!(corrected < 0.03 && alone > 0.1 && moved < 0.04, "{attached:?}: {corrected:.3} {alone:.3} {moved:.3}");
+        println!("{attached:?}: {corrected:.3} {alone:.3} {moved:.3}");
+        assert!(corrected < 0.02 && alone > 3.0 * corrected && moved < 0.03);
     }
 }
 

@@ -3,7 +3,8 @@
 //! A model's error is estimated against quadratic tetrahedra whose middle nodes at the rims of patches have the solution's own
 //! √r ([`TetElements`](crate::discretization::tetrahedra::TetElements)), as those at the body's re-entrant edges; their own error is
 //! estimated by a coarser mesh. From a mesh to the one with half the size at the rims it falls by about a half, so
-//! that the difference of the two is about what is left; it is taken times [`SAFETY`]. Faces that cut edges and corners off an inclusion do so on both meshes, and may leave less of
+//! that the difference of the two is about what is left; it is taken times [`SAFETY`]. Where a measure agrees and its Jacobian does not,
+//! the Jacobian's difference is taken. Faces that cut edges and corners off an inclusion do so on both meshes, and may leave less of
 //! it on the finer one: what the inclusion does at all, times the part of it that is missed, is open as well.
 
 use super::discretised::{Discretised, SpaceErrorEstimate, answering, at_level};
@@ -49,6 +50,19 @@ fn distance(found: f64, reference: f64) -> f64 {
         [false, false] => (found / reference - 1.0).abs(),
         _ => f64::INFINITY,
     }
+}
+
+/// How far the answers of two meshes are apart, by paddle and pair: by what is read of their Jacobians, or by the Jacobians themselves
+/// where that is more. A number may agree by accident where hardly an entry of its Jacobian does.
+fn apart(read: fn(&Controllability) -> f64, coarser: &[SpaceResponse], finer: &[SpaceResponse]) -> Vec<f64> {
+    let both = coarser.iter().zip(finer).filter(|(a, b)| a.controllability.is_some() && b.controllability.is_some());
+    let of_jacobians = both.map(|(a, b)| (&a.jacobian - &b.jacobian).norm() / b.jacobian.norm());
+    // A Jacobian without an entry says nothing.
+    distances_of(read, coarser, finer)
+        .into_iter()
+        .zip(of_jacobians)
+        .map(|(d, of_jacobians)| d.max(of_jacobians))
+        .collect()
 }
 
 /// How far the targets of two bodies are apart orthogonal to the needle, per depth; by paddle and pair, then without any.
@@ -216,16 +230,16 @@ impl Ladder {
         };
         let on_patches = model.nodes_on_patches();
         if let Some(coarser) = coarser_on_all(&self.coarser, &on_patches) {
-            let apart = distances(coarser, &rest);
-            let errors = estimates(&apart);
+            let of_measures = apart(|controls| controls.measure, coarser, &rest);
+            let errors = estimates(&of_measures);
             // What does not do as it is need not be known any better.
             let missed =
                 if worst(&errors) <= self.tolerance { Missed::on(&model, &rest)? } else { Missed::none(&rest) };
             let errors = sums(&errors, &missed.errors);
-            let full = sums(&estimates(&distances_of(|controls| controls.full, coarser, &rest)), &missed.full);
+            let full = sums(&estimates(&apart(|controls| controls.full, coarser, &rest)), &missed.full);
             let per_depth =
                 sums(&estimates(&apart_per_depth(self.scene.needle.axis, coarser, &rest)), &missed.per_depth);
-            let decided_by = decided_by(&self.scene, &errors, &apart);
+            let decided_by = decided_by(&self.scene, &errors, &of_measures);
             let nodes = model.nodes();
             self.finest = Some(Reference { nodes, rest: rest.clone(), errors, full, per_depth, decided_by, level });
             self.model = Some(model).filter(|_| self.wants_model);
@@ -450,6 +464,20 @@ mod tests {
         let nobody = SpaceResponse { controllability: None, ..with(1.0) };
         let found = distances(&[with(1.5), with(f64::INFINITY), nobody.clone()], &[with(1.0), with(3.0), nobody]);
         assert_eq!(found, [0.5, f64::INFINITY]);
+    }
+
+    /// Two Jacobians of one measure are apart all the same; where the measures are farther apart, that counts.
+    #[test]
+    fn where_measures_agree_jacobians_need_not() {
+        let with = |measure: Option<f64>, entries: [f64; 3]| SpaceResponse {
+            jacobian: nalgebra::DMatrix::from_diagonal(&nalgebra::DVector::from_row_slice(&entries)),
+            target_per_depth: Vector3::zeros(),
+            controllability: measure.map(|measure| Controllability { measure, ..unit() }),
+        };
+        let coarser = [with(Some(0.5), [2.0, 2.0, 2.0]), with(None, [1.0; 3]), with(Some(1.0), [1.0; 3])];
+        let finer = [with(Some(0.5), [2.0, 2.0, 1.0]), with(None, [2.0; 3]), with(Some(2.0), [1.0; 3])];
+        assert_eq!(apart(|c| c.measure, &coarser, &finer), [1.0 / 3.0, 0.5]);
+        assert_eq!(apart(|c| c.full, &coarser, &finer), [1.0 / 3.0, 0.0]);
     }
 
     /// Beside a slot quadratic tetrahedra of level 1 are within 1.2 % of what 161,917 nodes answer with small elements at its inner
